@@ -1,0 +1,74 @@
+//! A number with its uncertainty, or the reason why there is none.
+
+/// A value and its standard error, in the same unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// The value.
+    pub value: f64,
+    /// One standard deviation of the estimator; zero for an exact value.
+    pub standard_error: f64,
+}
+
+impl Estimate {
+    /// A value known without error.
+    pub const fn exact(value: f64) -> Self {
+        Self { value, standard_error: 0.0 }
+    }
+
+    /// A value with its standard error.
+    pub const fn new(value: f64, standard_error: f64) -> Self {
+        Self { value, standard_error }
+    }
+
+    /// Central interval at a normal quantile (1.96 for 95 %).
+    pub fn interval(&self, quantile: f64) -> (f64, f64) {
+        (self.value - quantile * self.standard_error, self.value + quantile * self.standard_error)
+    }
+}
+
+/// A measured quantity: its estimate, or why it cannot be had.
+pub type Reading = Result<Estimate, NoReading>;
+
+/// Why a quantity cannot be read from a response.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoReading {
+    /// The noise floor, or the end of the response, comes before the decay has fallen far enough (ISO 3382-2, 5.3).
+    #[error("needs {needed_db:.0} dB of decay range; {available_db:.0} dB are available")]
+    DynamicRange {
+        /// Decay range that the quantity needs, in dB.
+        needed_db: f64,
+        /// Decay range that the response offers, in dB.
+        available_db: f64,
+    },
+    /// No sample stands out of the noise.
+    #[error("there is no onset: the response is silent or all noise")]
+    NoOnset,
+    /// The band reaches beyond half the sample rate.
+    #[error("the band reaches beyond half the sample rate of {sample_rate_hz} Hz")]
+    AboveNyquist {
+        /// The sample rate, in Hz.
+        sample_rate_hz: u32,
+    },
+    /// The response ends before the quantity is defined.
+    #[error("needs {needed_s:.3} s after the onset; there are {available_s:.3} s")]
+    TooShort {
+        /// Length needed, in seconds.
+        needed_s: f64,
+        /// Length available, in seconds.
+        available_s: f64,
+    },
+    /// The decay is as fast as the filter's own ringing (ISO 3382-2, 7.3: B T > 8).
+    #[error(
+        "bandwidth times decay time is {bandwidth_time:.1}, below {needed:.0}: the filter's own ringing would be read"
+    )]
+    FilterRinging {
+        /// Bandwidth times decay time found.
+        bandwidth_time: f64,
+        /// The least that is trusted.
+        needed: f64,
+    },
+    /// The level does not fall, or the fit did not settle.
+    #[error("the level does not decay")]
+    NoDecay,
+}

@@ -1,0 +1,67 @@
+//! Surfaces.
+
+use crate::error::check_range;
+use crate::{Error, OctaveBands, PerBand};
+
+/// How a surface treats sound energy, per octave band.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    absorption: PerBand<f64>,
+    scattering: PerBand<f64>,
+}
+
+impl Material {
+    /// Random-incidence absorption (ISO 354) and scattering (ISO 17497-1), each the share of energy, 0 to 1.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] outside 0..=1 or NaN, [`Error::BandMismatch`] if the two belong to different bands.
+    pub fn new(absorption: PerBand<f64>, scattering: PerBand<f64>) -> Result<Self, Error> {
+        if absorption.bands() != scattering.bands() {
+            return Err(Error::BandMismatch { left: absorption.bands(), right: scattering.bands() });
+        }
+        for &value in absorption.values() {
+            check_range("absorption", value, 0.0, 1.0, "between 0 and 1")?;
+        }
+        for &value in scattering.values() {
+            check_range("scattering", value, 0.0, 1.0, "between 0 and 1")?;
+        }
+        Ok(Self { absorption, scattering })
+    }
+
+    /// The same absorption and scattering in every band.
+    ///
+    /// # Errors
+    /// As [`Material::new`].
+    pub fn uniform(bands: OctaveBands, absorption: f64, scattering: f64) -> Result<Self, Error> {
+        Self::new(PerBand::uniform(bands, absorption), PerBand::uniform(bands, scattering))
+    }
+
+    /// Share of incident energy that does not come back.
+    pub fn absorption(&self) -> &PerBand<f64> {
+        &self.absorption
+    }
+
+    /// Share of reflected energy that leaves away from the specular direction.
+    pub fn scattering(&self) -> &PerBand<f64> {
+        &self.scattering
+    }
+
+    /// The bands.
+    pub fn bands(&self) -> OctaveBands {
+        self.absorption.bands()
+    }
+
+    /// The same surface with other absorption.
+    ///
+    /// # Errors
+    /// As [`Material::new`].
+    pub fn with_absorption(&self, absorption: PerBand<f64>) -> Result<Self, Error> {
+        Self::new(absorption, self.scattering.clone())
+    }
+
+    /// The same surface on another run of bands; a band that it lacks takes the nearest one's value.
+    #[must_use]
+    pub fn resampled(&self, bands: OctaveBands) -> Self {
+        Self { absorption: self.absorption.resampled(bands), scattering: self.scattering.resampled(bands) }
+    }
+}

@@ -1,0 +1,450 @@
+//! Traced paths: the seam between a tracer and everything after it.
+
+use crate::{Air, EnergyResponse, Error, Material, OctaveBands};
+
+/// What a surface did to a path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reflection {
+    /// Mirror reflection: energy times (1 - absorption) (1 - scattering).
+    Specular,
+    /// Lambert reflection: energy times (1 - absorption) scattering.
+    Scattered,
+}
+
+/// One way from the source to the receiver, as a tracer reports it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contribution {
+    /// Whole length of the path in metres.
+    pub length_m: f64,
+    /// Natural logarithm of the geometric energy weight (1/m2), absorption, scattering and air left out, and divided by the
+    /// density with which the tracer samples such a path: a direct path of length d has weight 1/d2.
+    pub log_weight: f64,
+    /// Chain of reflections: [`PathSet::DIRECT`] or what [`PathSet::reflect`] returned.
+    pub chain: u32,
+    /// Unit vector in which the path leaves the source.
+    pub departure: [f64; 3],
+    /// Unit vector from the receiver towards where the path comes from.
+    pub arrival: [f64; 3],
+    /// `None` for a path that was found exactly (direct sound, image sources): it renders as a coherent reflection.
+    /// Else the independent batch of rays (below [`PathSet::BATCHES`]) that it stems from.
+    pub batch: Option<u8>,
+}
+
+/// Everything that a tracer found between one source and one receiver, free of absorption, air and speed of sound: these
+/// are applied afterwards, without tracing again.
+///
+/// Reflections form a forest in which chains share their prefixes; contributions are kept as columns.
+/// Energies are scaled so that the direct sound at 1 m is 1.
+///
+/// ```
+/// use sabine_acoustics::{Air, Contribution, Material, OctaveBands, PathSet, Reflection};
+/// let mut paths = PathSet::new(1, 100.0);
+/// let floor = paths.reflect(PathSet::DIRECT, 0, Reflection::Specular);
+/// let up = [0.0, 0.0, 1.0];
+/// paths.push(Contribution { length_m: 5.0, log_weight: -2.0 * 5f64.ln(), chain: floor, departure: up, arrival: up, batch: None });
+/// let hard = Material::uniform(OctaveBands::T60, 0.2, 0.0)?;
+/// let energy = paths.energies(&[hard], &Air::default())?;
+/// // 1/25 of the energy at 1 m, less 20 % in the floor and a little in 5 m of air.
+/// assert!((energy[0][0] / (0.8 / 25.0) - 1.0).abs() < 1e-3);
+/// # Ok::<(), sabine_acoustics::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct PathSet {
+    materials: usize,
+    max_length_m: f64,
+    parents: Vec<u32>,
+    events: Vec<u16>,
+    lengths_m: Vec<f32>,
+    log_weights: Vec<f32>,
+    chains: Vec<u32>,
+    departures: Vec<u32>,
+    arrivals: Vec<u32>,
+    batches: Vec<u8>,
+}
+
+/// Batch of contributions that are exact.
+const EXACT: u8 = u8::MAX;
+
+impl PathSet {
+    /// The chain without reflections.
+    pub const DIRECT: u32 = 0;
+    /// Number of independent batches into which a tracer splits its rays, for Monte-Carlo standard errors.
+    pub const BATCHES: u8 = 32;
+    /// Bytes kept for each contribution; a reflection takes six more, shared by all chains that pass through it.
+    pub const BYTES_PER_CONTRIBUTION: usize = 21;
+
+    /// No paths yet, between surfaces of `materials` kinds, all paths up to `max_length_m` being looked for.
+    ///
+    /// # Panics
+    /// If there are 32,768 materials or more.
+    pub fn new(materials: usize, max_length_m: f64) -> Self {
+        assert!(materials < 1 << 15, "too many materials");
+        Self {
+            materials,
+            max_length_m,
+            parents: vec![0],
+            events: vec![0],
+            lengths_m: Vec::new(),
+            log_weights: Vec::new(),
+            chains: Vec::new(),
+            departures: Vec::new(),
+            arrivals: Vec::new(),
+            batches: Vec::new(),
+        }
+    }
+
+    /// Adds a reflection to the end of a chain and returns the longer chain.
+    ///
+    /// # Panics
+    /// If the chain or the material does not exist.
+    pub fn reflect(&mut self, chain: u32, material: u32, reflection: Reflection) -> u32 {
+        assert!((chain as usize) < self.parents.len(), "unknown chain {chain}");
+        assert!((material as usize) < self.materials, "unknown material {material}");
+        self.parents.push(chain);
+        self.events.push((material as u16) << 1 | u16::from(reflection == Reflection::Scattered));
+        (self.parents.len() - 1) as u32
+    }
+
+    /// Adds a path from source to receiver.
+    ///
+    /// # Panics
+    /// If its chain does not exist or its batch is not below [`PathSet::BATCHES`].
+    pub fn push(&mut self, contribution: Contribution) {
+        assert!((contribution.chain as usize) < self.parents.len(), "unknown chain {}", contribution.chain);
+        assert!(contribution.batch.is_none_or(|b| b < Self::BATCHES), "unknown batch");
+        self.lengths_m.push(contribution.length_m as f32);
+        self.log_weights.push(contribution.log_weight as f32);
+        self.chains.push(contribution.chain);
+        self.departures.push(pack_direction(contribution.departure));
+        self.arrivals.push(pack_direction(contribution.arrival));
+        self.batches.push(contribution.batch.unwrap_or(EXACT));
+    }
+
+    /// Appends the paths of another set between the same surfaces; weights stay as they are.
+    ///
+    /// # Panics
+    /// If the sets have different numbers of materials.
+    pub fn append(&mut self, other: &PathSet) {
+        assert_eq!(self.materials, other.materials, "paths of different scenes");
+        let offset = self.parents.len() as u32 - 1;
+        let shifted = |chain: u32| if chain == Self::DIRECT { chain } else { chain + offset };
+        self.parents.extend(other.parents[1..].iter().map(|&p| shifted(p)));
+        self.events.extend_from_slice(&other.events[1..]);
+        self.lengths_m.extend_from_slice(&other.lengths_m);
+        self.log_weights.extend_from_slice(&other.log_weights);
+        self.chains.extend(other.chains.iter().map(|&c| shifted(c)));
+        self.departures.extend_from_slice(&other.departures);
+        self.arrivals.extend_from_slice(&other.arrivals);
+        self.batches.extend_from_slice(&other.batches);
+    }
+
+    /// Number of contributions.
+    pub fn len(&self) -> usize {
+        self.lengths_m.len()
+    }
+
+    /// Whether no path reaches the receiver.
+    pub fn is_empty(&self) -> bool {
+        self.lengths_m.is_empty()
+    }
+
+    /// Number of materials.
+    pub fn materials(&self) -> usize {
+        self.materials
+    }
+
+    /// Length up to which paths were looked for, in metres.
+    pub fn max_length_m(&self) -> f64 {
+        self.max_length_m
+    }
+
+    /// Length of each contribution in metres.
+    pub fn lengths_m(&self) -> &[f32] {
+        &self.lengths_m
+    }
+
+    /// Logarithm of the geometric weight of each contribution; see [`Contribution::log_weight`].
+    pub fn log_weights(&self) -> &[f32] {
+        &self.log_weights
+    }
+
+    /// Chain of each contribution.
+    pub fn chains(&self) -> &[u32] {
+        &self.chains
+    }
+
+    /// Number of chains, [`PathSet::DIRECT`] included; a chain's parent has a lower index.
+    pub fn chain_count(&self) -> usize {
+        self.parents.len()
+    }
+
+    /// The last reflection of a chain: the chain before it, the material and what happened; `None` for the direct path.
+    ///
+    /// # Panics
+    /// If there is no such chain.
+    pub fn last_reflection(&self, chain: u32) -> Option<(u32, u32, Reflection)> {
+        if chain == Self::DIRECT {
+            return None;
+        }
+        let event = self.events[chain as usize];
+        let reflection = if event & 1 == 1 { Reflection::Scattered } else { Reflection::Specular };
+        Some((self.parents[chain as usize], u32::from(event >> 1), reflection))
+    }
+
+    /// Whether a contribution was found exactly and renders as a coherent reflection.
+    ///
+    /// # Panics
+    /// If there is no such contribution.
+    pub fn is_exact(&self, contribution: usize) -> bool {
+        self.batches[contribution] == EXACT
+    }
+
+    /// Independent batch of rays that a contribution stems from; `None` where it is exact.
+    ///
+    /// # Panics
+    /// If there is no such contribution.
+    pub fn batch(&self, contribution: usize) -> Option<u8> {
+        Some(self.batches[contribution]).filter(|&b| b != EXACT)
+    }
+
+    /// Unit vector in which a contribution leaves the source, to about 0.005 degrees.
+    ///
+    /// # Panics
+    /// If there is no such contribution.
+    pub fn departure(&self, contribution: usize) -> [f64; 3] {
+        unpack_direction(self.departures[contribution])
+    }
+
+    /// Unit vector from the receiver towards where a contribution comes from, to about 0.005 degrees.
+    ///
+    /// # Panics
+    /// If there is no such contribution.
+    pub fn arrival(&self, contribution: usize) -> [f64; 3] {
+        unpack_direction(self.arrivals[contribution])
+    }
+
+    /// How often each chain hit each material: `counts[chain * materials + material]`.
+    pub fn hit_counts(&self) -> Vec<u16> {
+        let mut counts = vec![0u16; self.parents.len() * self.materials];
+        for chain in 1..self.parents.len() {
+            let parent = self.parents[chain] as usize;
+            for material in 0..self.materials {
+                counts[chain * self.materials + material] = counts[parent * self.materials + material];
+            }
+            counts[chain * self.materials + usize::from(self.events[chain] >> 1)] += 1;
+        }
+        counts
+    }
+
+    /// Logarithm of what the surfaces leave of the energy of each chain in one band.
+    ///
+    /// # Errors
+    /// [`Error::MaterialCount`] if the number of materials is not that of the paths, [`Error::Index`] for an unknown band.
+    pub fn log_reflectance(&self, materials: &[Material], band: usize) -> Result<Vec<f32>, Error> {
+        self.check_materials(materials)?;
+        // Index event = material * 2 + scattered. ln 0 is minus infinity: the path carries nothing, as it should.
+        let mut step = Vec::with_capacity(2 * materials.len());
+        for material in materials {
+            let count = material.bands().len();
+            if band >= count {
+                return Err(Error::Index { what: "band", index: band, count });
+            }
+            let reflected = 1.0 - material.absorption().values()[band];
+            let scattered = material.scattering().values()[band];
+            step.push((reflected * (1.0 - scattered)).ln() as f32);
+            step.push((reflected * scattered).ln() as f32);
+        }
+        let mut log_gain = vec![0.0f32; self.parents.len()];
+        for chain in 1..self.parents.len() {
+            log_gain[chain] = log_gain[self.parents[chain] as usize] + step[usize::from(self.events[chain])];
+        }
+        Ok(log_gain)
+    }
+
+    /// Energy of each contribution in each band of the materials, `[band][contribution]`.
+    ///
+    /// # Errors
+    /// As [`PathSet::log_reflectance`].
+    pub fn energies(&self, materials: &[Material], air: &Air) -> Result<Vec<Vec<f32>>, Error> {
+        let bands = self.check_materials(materials)?;
+        let exponents = air.energy_exponent_per_m(bands);
+        (0..bands.len())
+            .map(|band| {
+                let log_gain = self.log_reflectance(materials, band)?;
+                let exponent = exponents.values()[band] as f32;
+                let energy = |((&length, &log_weight), &chain): ((&f32, &f32), &u32)| {
+                    (log_weight + log_gain[chain as usize] - exponent * length).exp()
+                };
+                Ok(self.lengths_m.iter().zip(&self.log_weights).zip(&self.chains).map(energy).collect())
+            })
+            .collect()
+    }
+
+    /// Energy in time bins, with Monte-Carlo standard errors from the scatter between batches of rays.
+    ///
+    /// # Errors
+    /// As [`PathSet::log_reflectance`]; [`Error::OutOfRange`] for a bin width that is not positive.
+    pub fn energy_response(
+        &self,
+        materials: &[Material],
+        air: &Air,
+        bin_s: f64,
+    ) -> Result<EnergyResponse, Error> {
+        let bands = self.check_materials(materials)?;
+        crate::error::check_range("bin width (s)", bin_s, 1e-6, 10.0, "between 1 us and 10 s")?;
+        let speed = air.speed_of_sound_m_s();
+        let bins = (self.max_length_m / speed / bin_s).ceil() as usize;
+        let batches = usize::from(Self::BATCHES);
+        let mut energy = Vec::with_capacity(bins * bands.len());
+        let mut standard_error = Vec::with_capacity(bins * bands.len());
+        for column in self.energies(materials, air)? {
+            let mut exact = vec![0.0f64; bins];
+            let mut sampled = vec![0.0f64; bins * batches];
+            for (i, &e) in column.iter().enumerate() {
+                let bin = (f64::from(self.lengths_m[i]) / speed / bin_s) as usize;
+                if bin >= bins {
+                    continue;
+                }
+                match self.batches[i] {
+                    EXACT => exact[bin] += f64::from(e),
+                    batch => sampled[bin * batches + usize::from(batch)] += f64::from(e),
+                }
+            }
+            for (bin, exact) in exact.into_iter().enumerate() {
+                let parts = &sampled[bin * batches..(bin + 1) * batches];
+                let sum: f64 = parts.iter().sum();
+                let mean = sum / batches as f64;
+                let scatter: f64 = parts.iter().map(|p| (p - mean) * (p - mean)).sum();
+                energy.push(exact + sum);
+                standard_error.push((scatter * batches as f64 / (batches as f64 - 1.0)).sqrt());
+            }
+        }
+        EnergyResponse::new(bands, bin_s, energy, standard_error)
+    }
+
+    fn check_materials(&self, materials: &[Material]) -> Result<OctaveBands, Error> {
+        if materials.len() != self.materials || materials.is_empty() {
+            return Err(Error::MaterialCount { expected: self.materials, found: materials.len() });
+        }
+        let bands = materials[0].bands();
+        match materials.iter().find(|m| m.bands() != bands) {
+            Some(other) => Err(Error::BandMismatch { left: bands, right: other.bands() }),
+            None => Ok(bands),
+        }
+    }
+}
+
+/// Octahedral map to two 16-bit integers (Cigolle et al. 2014, JCGT 3(2)): four bytes for a direction.
+fn pack_direction(direction: [f64; 3]) -> u32 {
+    let [x, y, z] = direction;
+    let sum = x.abs() + y.abs() + z.abs();
+    let (mut u, mut v) = (x / sum, y / sum);
+    if z < 0.0 {
+        (u, v) = ((1.0 - v.abs()) * u.signum(), (1.0 - u.abs()) * v.signum());
+    }
+    let quantise = |c: f64| ((c * 32767.0).round() as i16) as u16;
+    u32::from(quantise(u)) << 16 | u32::from(quantise(v))
+}
+
+fn unpack_direction(packed: u32) -> [f64; 3] {
+    let restore = |bits: u16| f64::from(bits as i16) / 32767.0;
+    let (mut x, mut y) = (restore((packed >> 16) as u16), restore(packed as u16));
+    let z = 1.0 - x.abs() - y.abs();
+    if z < 0.0 {
+        (x, y) = ((1.0 - y.abs()) * x.signum(), (1.0 - x.abs()) * y.signum());
+    }
+    let norm = (x * x + y * y + z * z).sqrt();
+    [x / norm, y / norm, z / norm]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const UP: [f64; 3] = [0.0, 0.0, 1.0];
+
+    fn path(length_m: f64, log_weight: f64, chain: u32, batch: Option<u8>) -> Contribution {
+        Contribution { length_m, log_weight, chain, departure: UP, arrival: UP, batch }
+    }
+
+    proptest! {
+        #[test]
+        fn packed_directions_keep_their_angle(z in -1.0f64..1.0, azimuth in 0.0f64..std::f64::consts::TAU) {
+            let r = (1.0 - z * z).sqrt();
+            let d = [r * azimuth.cos(), r * azimuth.sin(), z];
+            let back = unpack_direction(pack_direction(d));
+            let cross = [d[1] * back[2] - d[2] * back[1], d[2] * back[0] - d[0] * back[2], d[0] * back[1] - d[1] * back[0]];
+            let sine = cross.iter().map(|c| c * c).sum::<f64>().sqrt();
+            prop_assert!(sine.asin().to_degrees() < 0.005, "{d:?} became {back:?}");
+        }
+    }
+
+    #[test]
+    fn chains_multiply_what_their_surfaces_leave() {
+        let mut paths = PathSet::new(2, 100.0);
+        let a = paths.reflect(PathSet::DIRECT, 0, Reflection::Specular);
+        let ab = paths.reflect(a, 1, Reflection::Scattered);
+        paths.push(path(10.0, 0.0, ab, Some(0)));
+        let bands = OctaveBands::new(1000.0, 1000.0).unwrap();
+        let materials =
+            [Material::uniform(bands, 0.5, 0.2).unwrap(), Material::uniform(bands, 0.1, 0.3).unwrap()];
+        let air = Air::default();
+        let expected = 0.5 * 0.8 * 0.9 * 0.3 * (-10.0 * air.energy_exponent_per_m(bands).values()[0]).exp();
+        let found = paths.energies(&materials, &air).unwrap()[0][0];
+        assert!((f64::from(found) / expected - 1.0).abs() < 1e-6);
+        assert_eq!(&paths.hit_counts()[ab as usize * 2..], &[1, 1]);
+        assert_eq!(paths.last_reflection(ab), Some((a, 1, Reflection::Scattered)));
+    }
+
+    #[test]
+    fn a_perfect_absorber_silences_its_paths_and_only_them() {
+        let mut paths = PathSet::new(1, 100.0);
+        let hit = paths.reflect(PathSet::DIRECT, 0, Reflection::Specular);
+        paths.push(path(1.0, 0.0, PathSet::DIRECT, None));
+        paths.push(path(2.0, 0.0, hit, None));
+        let black = Material::uniform(OctaveBands::T60, 1.0, 0.0).unwrap();
+        let energy = paths.energies(&[black], &Air::default()).unwrap();
+        assert!(energy[0][0] > 0.9 && energy[0][1] == 0.0);
+    }
+
+    #[test]
+    fn appending_keeps_chains_apart() {
+        let mut left = PathSet::new(2, 100.0);
+        let a = left.reflect(PathSet::DIRECT, 0, Reflection::Specular);
+        left.push(path(1.0, 0.0, a, None));
+        let mut right = PathSet::new(2, 100.0);
+        let b = right.reflect(PathSet::DIRECT, 1, Reflection::Specular);
+        let bb = right.reflect(b, 1, Reflection::Specular);
+        right.push(path(2.0, 0.0, bb, None));
+        right.push(path(3.0, 0.0, PathSet::DIRECT, None));
+        left.append(&right);
+        let counts = left.hit_counts();
+        let of = |i: usize| &counts[left.chains()[i] as usize * 2..][..2];
+        assert_eq!((of(0), of(1), of(2)), (&[1, 0][..], &[0, 2][..], &[0, 0][..]));
+    }
+
+    #[test]
+    fn the_standard_error_is_that_of_a_sum_over_batches() {
+        let mut paths = PathSet::new(1, 34.0);
+        for batch in 0..PathSet::BATCHES {
+            paths.push(path(1.0, f64::from(batch % 2) * 2f64.ln(), PathSet::DIRECT, Some(batch)));
+        }
+        let bands = OctaveBands::new(125.0, 125.0).unwrap();
+        let m = Material::uniform(bands, 0.0, 0.0).unwrap();
+        let response = paths.energy_response(&[m], &Air::default(), 0.01).unwrap();
+        // 16 batches of 1 and 16 of 2: mean 1.5, sample variance 8/31, sum of 32 independent parts.
+        assert!((response.band(0)[0] - 48.0).abs() < 0.01);
+        assert!((response.band_standard_error(0)[0] - (32.0f64 * 8.0 / 31.0).sqrt()).abs() < 0.01);
+    }
+
+    #[test]
+    fn the_wrong_number_of_materials_is_refused() {
+        let paths = PathSet::new(2, 10.0);
+        let m = Material::uniform(OctaveBands::T60, 0.1, 0.1).unwrap();
+        assert!(matches!(
+            paths.energies(&[m], &Air::default()),
+            Err(Error::MaterialCount { expected: 2, found: 1 })
+        ));
+    }
+}
