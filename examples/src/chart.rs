@@ -49,6 +49,8 @@ pub struct Series {
     pub look: Look,
     /// Which of the six colours.
     pub colour: usize,
+    /// Whether the legend names it.
+    pub in_legend: bool,
 }
 
 /// What the horizontal axis counts.
@@ -78,7 +80,7 @@ pub struct Chart {
 impl Series {
     /// A series without intervals.
     pub fn new(name: impl Into<String>, look: Look, colour: usize, points: Vec<(f64, f64)>) -> Self {
-        Self { name: name.into(), points, half_widths: Vec::new(), look, colour }
+        Self { name: name.into(), points, half_widths: Vec::new(), look, colour, in_legend: true }
     }
 }
 
@@ -138,7 +140,7 @@ impl Chart {
         let ink = |size: u32| ("sans-serif", size).into_font().color(&INK);
         let (legend, body) = root.split_vertically(26);
         let mut left = 62;
-        for series in &self.series {
+        for series in self.series.iter().filter(|s| s.in_legend) {
             let colour = COLOURS[series.colour % COLOURS.len()];
             let dashes: &[(i32, i32)] =
                 if series.look == Look::Dashed { &[(0, 7), (11, 18)] } else { &[(0, 18)] };
@@ -170,14 +172,12 @@ impl Chart {
         if let Scale::Octaves(centres) = &self.x {
             // plotters places its own ticks on a linear axis; octaves want one at each centre.
             let plot = chart.plotting_area();
-            let (left, _) = plot.get_base_pixel();
             for &hz in centres {
                 let x = hz.log2();
                 plot.draw(&PathElement::new(vec![(x, y0), (x, y1)], GRID))?;
                 let (pixel, bottom) = plot.map_coordinate(&(x, y0));
                 let label = if hz < 1000.0 { format!("{hz}") } else { format!("{}k", hz / 1000.0) };
                 let shift = 4 * label.len() as i32;
-                let _ = left;
                 body.draw(&Text::new(label, (pixel - shift, bottom + 5 - 26), ink(14)))?;
             }
         }

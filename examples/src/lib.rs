@@ -2,10 +2,12 @@
 
 mod bar;
 mod chart;
+mod output;
 mod page;
 mod spectrogram;
 
 pub use bar::Bar;
 pub use chart::{Chart, Look, Scale, Series};
+pub use output::{OutputError, OutputFolder};
 pub use page::{Page, escape};
 pub use spectrogram::spectrogram_png;
