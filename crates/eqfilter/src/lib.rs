@@ -1,1 +1,15 @@
-//! Under construction.
+//! FIR filters from gains in octave bands, and fast convolution.
+
+mod config;
+mod convolve;
+mod designer;
+mod error;
+mod filter;
+mod octave;
+mod solve;
+
+pub use config::{AboveBand, EqFilterConfig};
+pub use convolve::convolve;
+pub use designer::EqDesigner;
+pub use error::Error;
+pub use filter::{EqFilter, Phase};
