@@ -70,16 +70,6 @@ pub enum Error {
         /// Samples given.
         found: usize,
     },
-    /// A response prepared for another block size or length.
-    #[error(
-        "the response was prepared for blocks of {prepared} samples and another length than the convolver, which has blocks of {block}"
-    )]
-    Layout {
-        /// Block size that it was prepared for.
-        prepared: usize,
-        /// Block size of the convolver.
-        block: usize,
-    },
     /// A value of the vocabulary that cannot be built: a signal that overflowed, an unknown band.
     #[error(transparent)]
     Acoustics(#[from] sabine_acoustics::Error),
