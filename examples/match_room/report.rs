@@ -36,7 +36,7 @@ pub fn html(input: &MatchInput<'_>, matched: &RoomMatch, summary: &MatchSummary)
     page.markup(&t60_chart(matched, summary).svg()?);
     page.markup("</section><section>");
     page.heading("Equalisation");
-    page.markup(&eq_chart(matched, summary).svg()?);
+    page.markup(&eq_chart(matched).svg()?);
     page.markup("</section><section>");
     page.heading("Decay of the rendered response");
     page.markup(&decay_chart(&matched.decay, &matched.t60_reached_s).svg()?);
@@ -114,7 +114,7 @@ fn t60_chart(matched: &RoomMatch, summary: &MatchSummary) -> Chart {
     }
 }
 
-fn eq_chart(matched: &RoomMatch, summary: &MatchSummary) -> Chart {
+fn eq_chart(matched: &RoomMatch) -> Chart {
     let centres: Vec<f64> = matched.targets.eq_db().bands().iter_hz().collect();
     let mut heard = Series::new(
         "heard (90 %)",
@@ -130,9 +130,8 @@ fn eq_chart(matched: &RoomMatch, summary: &MatchSummary) -> Chart {
         1,
         matched.eq_simulated_db.iter().map(|(hz, &e)| (hz, e)).collect(),
     );
-    let realised = matched.eq_filter.response_db(&dense_hz(&centres));
-    let filter = Series::new("filter", Look::Line, 2, pairs(&dense_hz(&centres), &realised));
-    let _ = summary;
+    let gains = dense_hz(&centres).into_iter().map(|hz| (hz, matched.eq_filter.gain_db(hz))).collect();
+    let filter = Series::new("filter", Look::Line, 2, gains);
     Chart {
         x_label: "Frequency (Hz)".into(),
         y_label: "Level re 1 kHz (dB)".into(),

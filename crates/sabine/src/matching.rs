@@ -6,7 +6,7 @@ use sabine_acoustics::{
     PathSet, PerBand, Propagator, Reading, RoomEstimator, RoomParameters, RoomTargets, Signal, equalisation, report,
     resample,
 };
-use sabine_eqfilter::{EqFilter, EqFilterConfig};
+use sabine_eqfilter::{AboveBand, EqFilter, EqFilterConfig};
 use sabine_estimator::Estimator;
 use sabine_optimize::{AbsorptionPrior, FitConfig, MaterialFit, MaterialFitter};
 use sabine_propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
@@ -63,6 +63,8 @@ impl Default for MatchConfig {
 pub struct RoomMatch {
     /// What the recording sounds like, per octave.
     pub targets: RoomTargets,
+    /// Air of the room.
+    pub air: Air,
     /// The fitted materials, and what stood in the way.
     pub fit: MaterialFit,
     /// Names of the materials, in the order of the fit.
@@ -203,8 +205,9 @@ pub fn match_room_with(
     let eq_simulated_db = equalisation(&response, OctaveBands::EQ)?
         .map(|reading| reading.as_ref().map_or(f64::NAN, |estimate| estimate.value));
     let eq_filter = {
+        let above = config.above_8_khz_db.map(|gain_db| AboveBand { from_band_hz: 8000.0, gain_db });
         let gains_db = eq_gains(targets.eq_db(), &eq_simulated_db, config.largest_eq_db, &mut warnings)?;
-        EqFilter::design(&gains_db, sample_rate_hz, EqFilterConfig { shelf_from_8_khz_db: config.above_8_khz_db, ..EqFilterConfig::default() })?
+        EqFilter::design(&gains_db, sample_rate_hz, EqFilterConfig { above, ..EqFilterConfig::default() })?
     };
     let dry = resample(input.dry.signal, sample_rate_hz)?;
     let wet = sabine_eqfilter::convolve(dry.samples(), response.samples());
@@ -214,6 +217,7 @@ pub fn match_room_with(
     let decay = decay_curves(&response)?;
     Ok(RoomMatch {
         targets,
+        air,
         material_names: room.scene().materials().iter().map(|named| named.name.clone()).collect(),
         materials_before,
         t60_reached_s: parameters.t30_s,

@@ -102,8 +102,7 @@ impl MatchSummary {
             eq_simulated_db: simulated.iter().map(|(_, e)| Some(**e).filter(|e| e.is_finite())).collect(),
             materials,
             not_determined: matched.fit.not_determined.iter().map(ToString::to_string).collect(),
-            eq_filter_delay_s: matched.eq_filter.delay_samples() as f64
-                / f64::from(matched.eq_filter.sample_rate_hz()),
+            eq_filter_delay_s: matched.eq_filter.delay_s(),
             level_db: matched.level_db,
             sample_rate_hz: matched.matched.sample_rate_hz(),
             seconds: matched.seconds.iter().map(|(stage, s)| ((*stage).to_owned(), *s)).collect(),
