@@ -30,18 +30,6 @@ pub enum Error {
         /// Share of samples in flat tops, in percent.
         percent: f64,
     },
-    /// An identifier that the room does not have.
-    #[error("{room}: there is no {kind} \"{id}\"; there are: {known}", known = known.join(", "))]
-    UnknownId {
-        /// The room's folder.
-        room: String,
-        /// "source" or "receiver".
-        kind: &'static str,
-        /// The identifier asked for.
-        id: String,
-        /// Those that exist.
-        known: Vec<String>,
-    },
     /// No path leads from the source to the receiver.
     #[error("no path reaches receiver \"{receiver}\" from source \"{source_id}\": is one of them closed off?")]
     NoPath {

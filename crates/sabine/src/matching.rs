@@ -140,7 +140,7 @@ pub fn match_room_with(
     let mut clock = Clock::start();
     let mut warnings = Vec::new();
     let room = input.room;
-    let (source, receiver) = input.find_positions()?;
+    let (source, receiver) = (room.source(input.source)?, room.receiver(input.receiver)?);
     let clipped = input.speech.check()?;
     if clipped > 0.0 {
         warnings.push(Warning::SlightlyClipped { percent: 100.0 * clipped });
@@ -159,12 +159,12 @@ pub fn match_room_with(
     let air = room.air();
     let materials_before: Vec<Material> =
         room.scene().materials().iter().map(|named| named.material.resampled(bands)).collect();
-    let priors: Vec<AbsorptionPrior> = room
-        .absorption_priors()
+    let priors: Vec<AbsorptionPrior> = materials_before
         .iter()
-        .map(|p| AbsorptionPrior {
-            mean: p.mean.resampled(bands),
-            standard_deviation: p.standard_deviation.resampled(bands),
+        .zip(room.priors())
+        .map(|(material, prior)| AbsorptionPrior {
+            mean: material.absorption().clone(),
+            standard_deviation: prior.absorption_sd.resampled(bands),
         })
         .collect();
     let scene = room.scene().with_materials(materials_before.clone())?;
@@ -231,25 +231,6 @@ pub fn match_room_with(
         seconds: clock.stages,
         warnings,
     })
-}
-
-impl<'a> MatchInput<'a> {
-    fn find_positions(&self) -> Result<(&'a Source, &'a Receiver), Error> {
-        let unknown = |kind, id: &str, known| Error::UnknownId {
-            room: self.room.directory().display().to_string(),
-            kind,
-            id: id.to_owned(),
-            known,
-        };
-        let (sources, receivers) = (self.room.sources(), self.room.receivers());
-        let source = sources.iter().find(|s| s.id == self.source).ok_or_else(|| {
-            unknown("source", self.source, sources.iter().map(|s| s.id.clone()).collect())
-        })?;
-        let receiver = receivers.iter().find(|r| r.id == self.receiver).ok_or_else(|| {
-            unknown("receiver", self.receiver, receivers.iter().map(|r| r.id.clone()).collect())
-        })?;
-        Ok((source, receiver))
-    }
 }
 
 /// Aims that make up for what the rendered response still misses, or nothing if it is close enough.
