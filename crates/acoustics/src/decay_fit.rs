@@ -19,6 +19,8 @@ const WIDEST_BIN: f64 = 0.04;
 const BIN_GROWTH: f64 = 1.035;
 /// Bins after the knee, where only noise is left.
 const FLOOR_BINS: usize = 24;
+/// Fewest bins that a confined fit may rest on.
+const LEAST_BINS: usize = 16;
 /// Most iterations of Fisher scoring.
 const ITERATIONS: usize = 60;
 /// Most slopes that are looked for.
@@ -28,6 +30,14 @@ const MOST_SLOPES: usize = 3;
 const SLOPE_EVIDENCE: f64 = 16.0;
 /// Least ratio of the decay times of two slopes.
 const LEAST_RATIO: f64 = 1.3;
+/// Least fall that shows of the slowest of several slopes, in dB: less might be a floor that drifts.
+const LEAST_VISIBLE_FALL_DB: f64 = 12.0;
+/// Least fall of any of several slopes from the start to the end of the response, in dB, for the same reason.
+const LEAST_FALL_DB: f64 = 20.0;
+/// Dispersion above which the decay is not what the model says, and the fall from the start, in dB, to which the fit then
+/// confines itself: the range from which a reverberation time is defined, -5 to -35 dB, and 10 dB beyond.
+const LARGEST_DISPERSION: f64 = 2.0;
+const CONFINED_FALL_DB: f64 = 45.0;
 /// Power of the decay over the noise below which nothing is fitted, in dB.
 const LEAST_RANGE_DB: f64 = 10.0;
 
@@ -93,11 +103,18 @@ impl DecayFit {
             });
         }
         let floor = NoiseFloor::find(samples, step_s, bandwidth_hz)?;
-        let bins = bins(samples, step_s, bandwidth_hz, floor.knee_s);
-        let mut best = Model::single(&floor, &bins).maximise(&bins);
-        while best.slopes() < MOST_SLOPES {
-            let Some(next) = best.with_one_more_slope(&bins, bandwidth_hz) else { break };
-            best = next;
+        let mut bins = bins(samples, step_s, bandwidth_hz, floor.knee_s);
+        let longest_s = 60.0 / LEAST_FALL_DB * samples.len() as f64 * step_s;
+        let limits = Limits { bandwidth_hz, longest_s };
+        let mut best = Model::single(&floor, &bins).best(&bins, &limits);
+        if best.dispersion(&bins) > LARGEST_DISPERSION {
+            // Decays of real rooms bend: what is far below the range of interest must not decide. The noise is known by now.
+            let confined_s = best.time_of_fall(CONFINED_FALL_DB);
+            let kept = bins.iter().take_while(|bin| bin.to_s <= confined_s).count();
+            if kept >= LEAST_BINS && kept < bins.len() {
+                bins.truncate(kept);
+                best = best.single_again(&bins).best(&bins, &limits);
+            }
         }
         let dispersion = best.dispersion(&bins);
         let covariance = best.covariance(&bins, dispersion).ok_or(NoReading::NoDecay)?;
@@ -308,9 +325,49 @@ struct Model {
     deviance: f64,
     /// Logarithm of a noise that counts as none.
     least_noise: f64,
+    /// True if the noise is not to be fitted.
+    noise_is_known: bool,
+}
+
+/// What limits the slopes that may be added.
+struct Limits {
+    bandwidth_hz: f64,
+    longest_s: f64,
 }
 
 impl Model {
+    /// The likeliest model of as many slopes as the data ask for.
+    fn best(self, bins: &[Bin], limits: &Limits) -> Self {
+        let mut best = self.maximise(bins);
+        while best.slopes() < MOST_SLOPES {
+            let Some(next) = best.with_one_more_slope(bins, limits) else { break };
+            best = next;
+        }
+        best
+    }
+
+    /// Where a fit of one slope to other bins may start, with the noise of this model held.
+    fn single_again(&self, bins: &[Bin]) -> Self {
+        let n = self.parameters.len();
+        let strongest = self.parameters[..n - 1]
+            .chunks_exact(2)
+            .max_by(|a, b| a[0].total_cmp(&b[0]))
+            .map_or_else(|| self.parameters[..2].to_vec(), <[f64]>::to_vec);
+        let parameters = vec![strongest[0], strongest[1], self.parameters[n - 1]];
+        Self { noise_is_known: true, ..Self::at(parameters, bins, self.least_noise) }
+    }
+
+    /// When the decays together have fallen by so many dB.
+    fn time_of_fall(&self, fall_db: f64) -> f64 {
+        let n = self.parameters.len();
+        let power = |t: f64| -> f64 {
+            self.parameters[..n - 1].chunks_exact(2).map(|pair| (pair[0] - t * pair[1].exp()).exp()).sum()
+        };
+        let target = power(0.0) * 10f64.powf(-0.1 * fall_db);
+        let slowest = self.parameters[1..n - 1].iter().step_by(2).copied().fold(f64::MAX, f64::min).exp();
+        bisect(0.0, fall_db / 60.0 * LN_MILLION / slowest, |t| power(t) - target)
+    }
+
     fn single(floor: &NoiseFloor, bins: &[Bin]) -> Self {
         let loudest = bins.iter().fold(f64::MIN_POSITIVE, |most, bin| most.max(bin.power));
         let least_noise = (1e-16 * loudest).ln();
@@ -341,7 +398,11 @@ impl Model {
             derivatives[i * n..(i + 1) * n].iter_mut().for_each(|d| *d /= expected[i]);
             deviance += 2.0 * bin.shape * (bin.power / expected[i] + expected[i].ln());
         }
-        Self { parameters, expected, derivatives, deviance, least_noise }
+        Self { parameters, expected, derivatives, deviance, least_noise, noise_is_known: false }
+    }
+
+    fn moved(&self, parameters: Vec<f64>, bins: &[Bin]) -> Self {
+        Self { noise_is_known: self.noise_is_known, ..Self::at(parameters, bins, self.least_noise) }
     }
 
     fn slopes(&self) -> usize {
@@ -362,6 +423,10 @@ impl Model {
                 }
             }
         }
+        if self.noise_is_known {
+            score[n - 1] = 0.0;
+            leave_out(&mut information, n, n - 1);
+        }
         (score, information)
     }
 
@@ -377,7 +442,7 @@ impl Model {
             }
             let Some(step) = solve(&damped, &score) else { break };
             let parameters = self.parameters.iter().zip(&step).map(|(p, s)| p + s.clamp(-1.0, 1.0)).collect();
-            let tried = Self::at(parameters, bins, self.least_noise);
+            let tried = self.moved(parameters, bins);
             if tried.deviance <= self.deviance {
                 let gain = self.deviance - tried.deviance;
                 self = tried;
@@ -397,18 +462,18 @@ impl Model {
     }
 
     /// The model with one more slope, if the data ask for it.
-    fn with_one_more_slope(&self, bins: &[Bin], bandwidth_hz: f64) -> Option<Self> {
+    fn with_one_more_slope(&self, bins: &[Bin], limits: &Limits) -> Option<Self> {
         let end_s = bins.last()?.to_s;
         let dispersion = self.dispersion(bins).max(1.0);
-        let needed = SLOPE_EVIDENCE.max(2.0 * (bandwidth_hz * end_s).ln());
+        let needed = SLOPE_EVIDENCE.max(2.0 * (limits.bandwidth_hz * end_s).ln());
         let (evidence, start) = self.most_wanted_slope(bins)?;
         // The score test anticipates the gain; only a promising slope is worth a fit.
         if evidence < 0.25 * needed {
             return None;
         }
-        let tried = Self::at(start, bins, self.least_noise).maximise(bins);
+        let tried = self.moved(start, bins).maximise(bins);
         let dispersion = dispersion.min(tried.dispersion(bins).max(1.0));
-        ((self.deviance - tried.deviance) / dispersion > needed && tried.is_physical(end_s, bandwidth_hz))
+        ((self.deviance - tried.deviance) / dispersion > needed && tried.is_physical(end_s, limits))
             .then_some(tried)
     }
 
@@ -454,16 +519,22 @@ impl Model {
         best
     }
 
-    /// Slopes far enough apart, each long enough to be seen and falling within the response.
-    fn is_physical(&self, end_s: f64, bandwidth_hz: f64) -> bool {
-        let mut times: Vec<f64> = self.parameters[1..self.parameters.len() - 1]
-            .iter()
-            .step_by(2)
-            .map(|rate| LN_MILLION / rate.exp())
-            .collect();
-        times.sort_by(f64::total_cmp);
-        times.windows(2).all(|pair| pair[1] > LEAST_RATIO * pair[0])
-            && times.iter().all(|&t| t < 6.0 * end_s && bandwidth_hz * t > 8.0)
+    /// Slopes far enough apart, each long enough to be seen, the slowest distinct from a drifting floor.
+    fn is_physical(&self, end_s: f64, limits: &Limits) -> bool {
+        let n = self.parameters.len();
+        let mut slopes: Vec<(f64, f64)> =
+            self.parameters[..n - 1].chunks_exact(2).map(|pair| (pair[0], pair[1].exp())).collect();
+        slopes.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let apart = slopes.windows(2).all(|pair| pair[0].1 > LEAST_RATIO * pair[1].1);
+        let times_s = slopes.iter().map(|(_, rate)| LN_MILLION / rate);
+        let unsmeared =
+            times_s.clone().all(|t60_s| limits.bandwidth_hz * t60_s > 8.0 && t60_s < limits.longest_s);
+        let [.., (fast_log, fast), (slow_log, slow)] = slopes[..] else { return apart && unsmeared };
+        // From where the last two cross to where the slowest meets the noise, or the end.
+        let crossing_s = ((fast_log - slow_log) / (fast - slow)).max(0.0);
+        let knee_s = ((slow_log - self.parameters[n - 1]) / slow).min(end_s);
+        let fall_db = 60.0 * slow / LN_MILLION * (knee_s - crossing_s);
+        apart && unsmeared && fall_db > LEAST_VISIBLE_FALL_DB
     }
 
     /// Pearson's chi-squared per degree of freedom, over groups of bins that hold at least eight independent values each.
@@ -489,11 +560,7 @@ impl Model {
         let (_, mut information) = self.score(bins);
         let floor = n * n - 1;
         if information[floor] < 1e-3 {
-            for i in 0..n {
-                information[i * n + n - 1] = 0.0;
-                information[(n - 1) * n + i] = 0.0;
-            }
-            information[floor] = 1.0;
+            leave_out(&mut information, n, n - 1);
         }
         let mut covariance = vec![0.0; n * n];
         for i in 0..n {
@@ -535,6 +602,15 @@ impl Model {
             covariance,
         }
     }
+}
+
+/// Takes a parameter out of an information matrix of order `n`.
+fn leave_out(information: &mut [f64], n: usize, parameter: usize) {
+    for i in 0..n {
+        information[i * n + parameter] = 0.0;
+        information[parameter * n + i] = 0.0;
+    }
+    information[parameter * n + parameter] = 1.0;
 }
 
 /// Solves a symmetric positive definite system by Cholesky's method; none if it is not.
