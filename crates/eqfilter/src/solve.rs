@@ -80,8 +80,8 @@ pub(crate) fn solve(problem: &Problem, wanted_db: &[f64], start_db: &[f64]) -> S
                 slope[i] =
                     now.products[b * problem.parts + i] * start[i] / (wanted[b] * wanted[b] * now.gains[b]);
             }
-            for i in 0..free {
-                direction[i] = dot(&problem.smooth[i * free..][..free], slope);
+            for (direction, row) in direction.iter_mut().zip(problem.smooth.chunks_exact(free)) {
+                *direction = dot(row, slope);
             }
         }
         let mut normal = [[0.0; MOST_BANDS]; MOST_BANDS];
@@ -158,10 +158,11 @@ impl State {
 /// Solves a symmetric positive definite system of `n` equations by elimination; the solution replaces the right-hand side.
 fn solve_in_place(matrix: &mut [[f64; MOST_BANDS]; MOST_BANDS], rhs: &mut [f64; MOST_BANDS], n: usize) {
     for i in 0..n {
+        let pivot = matrix[i];
         for row in i + 1..n {
-            let factor = matrix[row][i] / matrix[i][i];
-            for column in i..n {
-                matrix[row][column] -= factor * matrix[i][column];
+            let factor = matrix[row][i] / pivot[i];
+            for (x, p) in matrix[row].iter_mut().zip(&pivot) {
+                *x -= factor * p;
             }
             rhs[row] -= factor * rhs[i];
         }
