@@ -3,26 +3,40 @@
 //! Under construction: the front page follows.
 
 mod air;
+mod atomic_file;
+mod audio;
+#[cfg(feature = "symphonia")]
+mod audio_symphonia;
 mod bands;
 mod energy;
 mod error;
 mod estimate;
 mod material;
+mod material_library;
+mod measured_room;
 mod paths;
 mod progress;
+mod resample;
 mod scene;
 mod signal;
 mod targets;
 mod traits;
 
 pub use air::Air;
+pub use atomic_file::write_atomically;
+pub use audio::{AudioInfo, Channel, SampleFormat, probe_wav, read_audio, write_wav};
 pub use bands::{OctaveBands, PerBand};
 pub use energy::{EnergyDecayCurve, EnergyResponse};
 pub use error::Error;
 pub use estimate::{Estimate, NoReading, Reading};
 pub use material::Material;
+pub use material_library::{LibraryMaterial, library_material, material_library};
+pub use measured_room::{
+    Levels, MaterialPrior, MeasuredRoom, Measurement, NewResponse, NewRoom, ResponseEntry, TimeZero,
+};
 pub use paths::{Contribution, PathSet, Reflection};
 pub use progress::{Observer, report};
+pub use resample::{resample, resample_response};
 pub use scene::{NamedMaterial, Receiver, Scene, Source, Triangle};
 pub use signal::{ImpulseResponse, Signal};
 pub use targets::RoomTargets;
