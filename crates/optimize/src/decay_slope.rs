@@ -1,6 +1,7 @@
 //! The slope that ISO 3382 reads: that of the decay curve.
 
 use crate::decay::slope_with_sensitivity;
+use crate::expansion::{Bins, Expansion};
 use crate::history::History;
 use crate::objective::SlopeModel;
 use sabine_acoustics::{EnergyDecayCurve, Estimate, Reading};
@@ -17,6 +18,25 @@ impl<H: Borrow<History>> DecaySlope<H> {
     /// Pairs of a history and the weights of its paths in this band.
     pub fn new(pairs: Vec<(H, Vec<f32>)>, range_db: (f64, f64)) -> Self {
         Self { pairs, range_db }
+    }
+
+    /// The curves near an absorption: one pass over all paths.
+    pub fn expand(&self, absorption: &[f64]) -> Expansion {
+        let expand = |(history, weights): &(H, Vec<f32>)| {
+            let history = history.borrow();
+            let mut energy = vec![0.0; history.bins()];
+            let mut hits = vec![0.0; history.bins() * history.materials];
+            history.accumulate(weights, absorption, &mut energy, &mut hits);
+            for (row, e) in hits.chunks_exact_mut(history.materials).zip(&energy).filter(|(_, e)| **e > 0.0) {
+                row.iter_mut().for_each(|h| *h /= e);
+            }
+            Bins { bin_s: history.bin_s, energy, hits }
+        };
+        Expansion {
+            pairs: self.pairs.iter().map(expand).collect(),
+            about: absorption.to_vec(),
+            range_db: self.range_db,
+        }
     }
 
     /// Reverberation time in seconds, with its Monte-Carlo standard error; why there is none, if none of the curves gives one.
@@ -66,35 +86,7 @@ impl<H: Borrow<History>> DecaySlope<H> {
 
 impl<H: Borrow<History> + Send + Sync> SlopeModel for DecaySlope<H> {
     fn slope(&self, absorption: &[f64], gradient: &mut [f64]) -> Option<f64> {
-        gradient.fill(0.0);
-        let (mut t60_s, mut count) = (0.0, 0.0);
-        for (history, weights) in &self.pairs {
-            let history = history.borrow();
-            let k = history.materials;
-            let mut energy = vec![0.0; history.bins()];
-            let mut moments = vec![0.0; history.bins() * k];
-            let mut sensitivity = vec![0.0; history.bins()];
-            history.accumulate(weights, absorption, &mut energy, &mut moments);
-            let Some(slope) = slope_with_sensitivity(&energy, history.bin_s, self.range_db, &mut sensitivity)
-            else {
-                continue;
-            };
-            count += 1.0;
-            t60_s += -60.0 / slope;
-            let by_slope = 60.0 / (slope * slope);
-            for (row, s) in moments.chunks_exact(k).zip(&sensitivity) {
-                for (g, moment) in gradient.iter_mut().zip(row) {
-                    *g -= by_slope * s * moment;
-                }
-            }
-        }
-        if count == 0.0 {
-            return None;
-        }
-        let mean_s = t60_s / count;
-        for (g, a) in gradient.iter_mut().zip(absorption) {
-            *g *= 60.0 / (mean_s * mean_s) / count / (1.0 - a);
-        }
-        Some(-60.0 / mean_s)
+        // An expansion is exact where it is made.
+        self.expand(absorption).slope(absorption, gradient)
     }
 }

@@ -110,7 +110,7 @@ impl MaterialFitter {
             .par_chunks(together)
             .zip(targets.values().par_chunks(together))
             .map(|(bands, targets)| {
-                let mut group = Group::new(bands, &self.config);
+                let group = Group::new(bands, &self.config);
                 let solution = group.solve()?;
                 let relative_error: Vec<f64> = targets.iter().map(|t| t.standard_error / t.value).collect();
                 let spread = Spread::new(&group, bands, &solution, &relative_error, self.config.bounds);

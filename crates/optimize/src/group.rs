@@ -1,6 +1,6 @@
 //! Bands that are fitted together, and the rounds in which their targets are met.
 
-use crate::bounded::minimise;
+use crate::bounded::{Minimum, minimise};
 use crate::decay_slope::DecaySlope;
 use crate::history::History;
 use crate::objective::SlopeModel;
@@ -30,13 +30,27 @@ impl Band<'_> {
         }
     }
 
+    /// The fitted slope near an absorption, fast to evaluate: exact there, and everywhere for lines through single paths.
+    fn expand(&self, absorption: &[f64]) -> Box<dyn SlopeModel> {
+        match &self.line {
+            Some(line) => Box::new(line.clone()),
+            None => Box::new(self.curve.expand(absorption)),
+        }
+    }
+
     /// m/m' - 1 and its gradient: zero where the target is met, linear in ln(1 - absorption) for an ideal decay, and of the
     /// same size for long and short targets.
-    fn residual(&self, absorption: &[f64], gradient: &mut [f64]) -> Option<f64> {
+    fn residual(&self, model: &dyn SlopeModel, absorption: &[f64], gradient: &mut [f64]) -> Option<f64> {
         let wanted = -60.0 / self.target_s;
-        let slope = self.slope(absorption, gradient)?;
+        let slope = model.slope(absorption, gradient)?;
         gradient.iter_mut().for_each(|g| *g /= wanted);
         Some(slope / wanted - 1.0)
+    }
+}
+
+impl SlopeModel for Band<'_> {
+    fn slope(&self, absorption: &[f64], gradient: &mut [f64]) -> Option<f64> {
+        Band::slope(self, absorption, gradient)
     }
 }
 
@@ -49,100 +63,100 @@ pub(crate) struct Solution {
     pub cost: f64,
 }
 
+/// Passes over the paths before the fit falls back on evaluating all of them in every step.
+const PASSES: usize = 12;
+/// Change of any material, in standard deviations of its prior, below which another pass would bring nothing: the error
+/// left is of the order of its square.
+const SETTLED: f64 = 0.03;
+
 /// The most probable materials that meet the targets: minimises half the squared deviations from the priors, in standard
 /// deviations, subject to m/m' = 1, by the method of multipliers (Nocedal and Wright 2006, chapter 17).
+///
+/// The decay curves are expanded about the present materials, the problem is solved on the expansion, and expanded again,
+/// until the materials settle. Four passes over the paths are usual, instead of one for each of some thirty evaluations.
 pub(crate) struct Group<'a, 'b> {
     bands: &'b [Band<'a>],
     config: &'b FitConfig,
     /// Band and material of each variable; held materials have none.
     free: Vec<(usize, usize)>,
-    /// Of each band: weight of the squared residual, and the shift that stands for the multiplier.
-    weight: Vec<f64>,
-    shift: Vec<f64>,
+    /// Variables of the same material in neighbouring bands.
+    neighbours: Vec<(usize, usize)>,
+    lower: Vec<f64>,
+    upper: Vec<f64>,
 }
 
 impl<'a, 'b> Group<'a, 'b> {
     pub fn new(bands: &'b [Band<'a>], config: &'b FitConfig) -> Self {
-        let free = bands
+        let free: Vec<(usize, usize)> = bands
             .iter()
             .enumerate()
             .flat_map(|(b, band)| (0..band.mean.len()).map(move |k| (b, k)))
             .filter(|&(b, k)| bands[b].standard_deviation[k] > 0.0)
             .collect();
-        Self { bands, config, free, weight: vec![0.0; bands.len()], shift: vec![0.0; bands.len()] }
+        let bounds = |&(b, k): &(usize, usize)| {
+            let (mean, sd) = (bands[b].mean[k], bands[b].standard_deviation[k]);
+            ((config.bounds.0 - mean) / sd, (config.bounds.1 - mean) / sd)
+        };
+        let (lower, upper) = free.iter().map(bounds).unzip();
+        let at = |b: usize, k: usize| free.iter().position(|&f| f == (b, k));
+        let pairs = free.iter().enumerate();
+        let neighbours = pairs.filter_map(|(low, &(b, k))| at(b + 1, k).map(|high| (low, high))).collect();
+        Self { bands, config, free, neighbours, lower, upper }
     }
 
-    pub fn solve(&mut self) -> Result<Solution, Error> {
+    pub fn solve(&self) -> Result<Solution, Error> {
         let prior = self.solve_from(&vec![0.0; self.free.len()])?;
         if self.met(&prior) {
             return Ok(prior);
         }
         // Not met from the prior: try once more from the prior scaled so that the slope is right.
         let Some(start) = self.scaled_start(&prior) else { return Ok(prior) };
-        let mut again = self.solve_from(&start)?;
-        again.iterations += prior.iterations;
+        let again = self.solve_from(&start)?;
         let worst = |s: &Solution| s.residual.iter().flatten().fold(0.0, |w: f64, r| w.max(r.abs()));
-        if worst(&again) < worst(&prior) {
-            Ok(again)
-        } else {
-            Ok(Solution { iterations: again.iterations, ..prior })
-        }
+        let iterations = prior.iterations + again.iterations;
+        let best = if worst(&again) < worst(&prior) { again } else { prior };
+        Ok(Solution { iterations, ..best })
     }
 
     fn met(&self, solution: &Solution) -> bool {
         solution.residual.iter().flatten().all(|r| r.abs() <= self.config.target_tolerance)
     }
 
-    fn solve_from(&mut self, start: &[f64]) -> Result<Solution, Error> {
-        let (lower, upper): (Vec<f64>, Vec<f64>) = self
-            .free
-            .iter()
-            .map(|&(b, k)| {
-                let (mean, sd) = (self.bands[b].mean[k], self.bands[b].standard_deviation[k]);
-                ((self.config.bounds.0 - mean) / sd, (self.config.bounds.1 - mean) / sd)
-            })
-            .unzip();
-        let mut x: Vec<f64> =
-            start.iter().zip(&lower).zip(&upper).map(|((x, l), u)| x.clamp(*l, *u)).collect();
-        let first = self.residuals(&x);
-        for (b, residual) in first.iter().enumerate() {
-            let square = residual.as_ref().map_or(0.0, |(_, g)| g.iter().map(|g| g * g).sum());
-            self.weight[b] = if square > 0.0 { 1.0 / (self.config.prior_weight * square) } else { 0.0 };
-            self.shift[b] = 0.0;
-        }
-        // A fifth of the tolerance, so that a target is well met where it can be.
-        let enough = 0.2 * self.config.target_tolerance;
-        let mut before: Vec<f64> = vec![f64::INFINITY; self.bands.len()];
-        let mut stuck = vec![0; self.bands.len()];
+    fn solve_from(&self, start: &[f64]) -> Result<Solution, Error> {
+        let bounds = self.lower.iter().zip(&self.upper);
+        let mut x: Vec<f64> = start.iter().zip(bounds).map(|(x, (l, u))| x.clamp(*l, *u)).collect();
         let mut iterations = 0;
-        let mut residual;
-        let mut round = 0;
-        loop {
-            let minimum = minimise(&*self, &x, &lower, &upper, self.config.max_iterations)?;
+        let mut rounds = Rounds::new(self, self.expand(&x), &x);
+        for _ in 0..PASSES {
+            let minimum = rounds.solve(&x)?;
             iterations += minimum.iterations;
+            let moved = x.iter().zip(&minimum.x).fold(0.0, |w: f64, (a, b)| w.max((a - b).abs()));
+            let expected = rounds.residual(&minimum.x);
             x = minimum.x;
-            residual = self.residuals(&x).into_iter().map(|r| r.map(|(r, _)| r)).collect::<Vec<_>>();
-            round += 1;
-            let mut open = false;
-            for b in 0..self.bands.len() {
-                let Some(r) = residual[b].filter(|r| r.abs() > enough && self.weight[b] > 0.0) else {
-                    continue;
-                };
-                if r.abs() > 0.9 * before[b] {
-                    stuck[b] += 1;
-                }
-                open |= stuck[b] < 2;
-                let grow = if r.abs() > 0.25 * before[b] { 10.0 } else { 1.0 };
-                self.shift[b] = (self.shift[b] + r) / grow;
-                self.weight[b] *= grow;
-                before[b] = r.abs();
-            }
-            if !open || round >= self.config.max_rounds {
-                break;
+            rounds.models = self.expand(&x);
+            let found = rounds.residual(&x);
+            let surprise = expected.iter().zip(&found).fold(0.0, |w: f64, (e, f)| match (e, f) {
+                (Some(e), Some(f)) => w.max((e - f).abs()),
+                _ => w,
+            });
+            if moved < SETTLED && surprise < 0.1 * self.config.target_tolerance {
+                return Ok(self.solution(&x, found, iterations));
             }
         }
-        let cost = self.prior_cost(&x, &mut vec![0.0; x.len()]);
-        Ok(Solution { absorption: self.absorption(&x), residual, iterations, cost })
+        // The expansion does not settle, where bins hold few paths of very different histories: use the paths themselves.
+        rounds.models = self.bands.iter().map(|band| Box::new(band) as _).collect();
+        let minimum = rounds.solve(&x)?;
+        let found = rounds.residual(&minimum.x);
+        Ok(self.solution(&minimum.x, found, iterations + minimum.iterations))
+    }
+
+    fn solution(&self, x: &[f64], residual: Vec<Option<f64>>, iterations: usize) -> Solution {
+        let cost = self.prior_cost(x, &mut vec![0.0; x.len()]);
+        Solution { absorption: self.absorption(x), residual, iterations, cost }
+    }
+
+    fn expand(&self, x: &[f64]) -> Vec<Box<dyn SlopeModel + 'b>> {
+        self.bands.par_iter().zip(self.absorption(x)).map(|(band, a)| band.expand(&a) as _).collect()
     }
 
     /// The prior's means, ln(1 - absorption) multiplied in each band by what gives the wanted slope; `None` if no factor does.
@@ -165,7 +179,7 @@ impl<'a, 'b> Group<'a, 'b> {
                 band.mean.iter().zip(&band.standard_deviation).map(of).collect()
             };
             let scratch = &mut vec![0.0; band.mean.len()];
-            let mut residual = |log_factor: f64| band.residual(&scaled(log_factor), scratch);
+            let mut residual = |log_factor: f64| band.residual(band, &scaled(log_factor), scratch);
             let (mut low, mut high) = (-6.0, 6.0);
             if !(residual(low)? < 0.0 && residual(high)? > 0.0) {
                 continue;
@@ -195,28 +209,13 @@ impl<'a, 'b> Group<'a, 'b> {
         absorption
     }
 
-    /// Residual of each band and its gradient by the deviations of its materials, in standard deviations.
-    fn residuals(&self, x: &[f64]) -> Vec<Option<(f64, Vec<f64>)>> {
-        let absorption = self.absorption(x);
-        self.bands
-            .par_iter()
-            .zip(&absorption)
-            .map(|(band, absorption)| {
-                let mut gradient = vec![0.0; absorption.len()];
-                let residual = band.residual(absorption, &mut gradient)?;
-                gradient.iter_mut().zip(&band.standard_deviation).for_each(|(g, sd)| *g *= sd);
-                Some((residual, gradient))
-            })
-            .collect()
-    }
-
     fn prior_cost(&self, x: &[f64], gradient: &mut [f64]) -> f64 {
         let mut cost = 0.0;
         for (g, z) in gradient.iter_mut().zip(x) {
             cost += 0.5 * z * z;
             *g = *z;
         }
-        for (low, high) in self.neighbours() {
+        for &(low, high) in self.neighbours() {
             let step = x[high] - x[low];
             cost += 0.5 * self.config.smoothness * step * step;
             gradient[high] += self.config.smoothness * step;
@@ -225,14 +224,9 @@ impl<'a, 'b> Group<'a, 'b> {
         cost
     }
 
-    /// Variables of the same material in neighbouring bands, where smoothness is asked for.
-    pub fn neighbours(&self) -> Vec<(usize, usize)> {
-        if self.config.smoothness == 0.0 {
-            return Vec::new();
-        }
-        let at = |b: usize, k: usize| self.free.iter().position(|&f| f == (b, k));
-        let pairs = self.free.iter().enumerate();
-        pairs.filter_map(|(low, &(b, k))| at(b + 1, k).map(|high| (low, high))).collect()
+    /// Variables of the same material in neighbouring bands; without smoothness each band is a group of its own.
+    pub fn neighbours(&self) -> &[(usize, usize)] {
+        &self.neighbours
     }
 
     /// See [`FitConfig::smoothness`].
@@ -246,20 +240,90 @@ impl<'a, 'b> Group<'a, 'b> {
     }
 }
 
-impl Objective for Group<'_, '_> {
+/// The augmented Lagrangian of a group: prior cost + sum of weight/2 (residual + shift)2 over the bands.
+struct Rounds<'g, 'a, 'b> {
+    group: &'g Group<'a, 'b>,
+    models: Vec<Box<dyn SlopeModel + 'b>>,
+    weight: Vec<f64>,
+    shift: Vec<f64>,
+}
+
+impl<'g, 'a, 'b> Rounds<'g, 'a, 'b> {
+    fn new(group: &'g Group<'a, 'b>, models: Vec<Box<dyn SlopeModel + 'b>>, x: &[f64]) -> Self {
+        let count = models.len();
+        let mut rounds = Self { group, models, weight: vec![0.0; count], shift: vec![0.0; count] };
+        for (weight, residual) in rounds.weight.iter_mut().zip(group.residuals(&rounds.models, x)) {
+            let square: f64 = residual.map_or(0.0, |(_, g)| g.iter().map(|g| g * g).sum());
+            *weight = if square > 0.0 { 1.0 / (group.config.prior_weight * square) } else { 0.0 };
+        }
+        rounds
+    }
+
+    fn residual(&self, x: &[f64]) -> Vec<Option<f64>> {
+        self.group.residuals(&self.models, x).into_iter().map(|r| r.map(|(r, _)| r)).collect()
+    }
+
+    /// Minimises, shifts the targets by what is missing, and minimises again, until they are met or nothing helps.
+    fn solve(&mut self, start: &[f64]) -> Result<Minimum, Error> {
+        let config = self.group.config;
+        // A tenth of the tolerance, so that a target is well met where it can be.
+        let enough = 0.1 * config.target_tolerance;
+        let mut before = vec![f64::INFINITY; self.models.len()];
+        let mut stuck = vec![0; self.models.len()];
+        let mut minimum = Minimum { x: start.to_vec(), cost: f64::NAN, iterations: 0 };
+        for _ in 0..config.max_rounds {
+            let (lower, upper) = (&self.group.lower, &self.group.upper);
+            let next = minimise(&*self, &minimum.x, lower, upper, config.max_iterations)?;
+            minimum = Minimum { iterations: minimum.iterations + next.iterations, ..next };
+            let mut open = false;
+            for (b, residual) in self.residual(&minimum.x).into_iter().enumerate() {
+                let Some(r) = residual.filter(|r| r.abs() > enough && self.weight[b] > 0.0) else { continue };
+                stuck[b] += usize::from(r.abs() > 0.9 * before[b]);
+                open |= stuck[b] < 2;
+                let grow = if r.abs() > 0.25 * before[b] { 10.0 } else { 1.0 };
+                self.shift[b] = (self.shift[b] + r) / grow;
+                self.weight[b] *= grow;
+                before[b] = r.abs();
+            }
+            if !open {
+                break;
+            }
+        }
+        Ok(minimum)
+    }
+}
+
+impl Group<'_, '_> {
+    /// Residual of each band and its gradient by the deviations of its materials, in standard deviations.
+    fn residuals(&self, models: &[Box<dyn SlopeModel + '_>], x: &[f64]) -> Vec<Option<(f64, Vec<f64>)>> {
+        self.bands
+            .par_iter()
+            .zip(models)
+            .zip(self.absorption(x))
+            .map(|((band, model), absorption)| {
+                let mut gradient = vec![0.0; absorption.len()];
+                let residual = band.residual(model.as_ref(), &absorption, &mut gradient)?;
+                gradient.iter_mut().zip(&band.standard_deviation).for_each(|(g, sd)| *g *= sd);
+                Some((residual, gradient))
+            })
+            .collect()
+    }
+}
+
+impl Objective for Rounds<'_, '_, '_> {
     fn dimension(&self) -> usize {
-        self.free.len()
+        self.group.free.len()
     }
 
     fn value_and_gradient(&self, x: &[f64], gradient: &mut [f64]) -> f64 {
-        let mut cost = self.prior_cost(x, gradient);
-        let residuals = self.residuals(x);
+        let mut cost = self.group.prior_cost(x, gradient);
+        let residuals = self.group.residuals(&self.models, x);
         for (b, residual) in residuals.iter().enumerate() {
             if let Some((r, _)) = residual {
                 cost += 0.5 * self.weight[b] * (r + self.shift[b]).powi(2);
             }
         }
-        for (g, &(b, k)) in gradient.iter_mut().zip(&self.free) {
+        for (g, &(b, k)) in gradient.iter_mut().zip(&self.group.free) {
             if let Some((r, by)) = &residuals[b] {
                 *g += self.weight[b] * (r + self.shift[b]) * by[k];
             }

@@ -5,6 +5,7 @@ mod config;
 mod decay;
 mod decay_slope;
 mod error;
+mod expansion;
 mod fit;
 mod fitter;
 mod group;

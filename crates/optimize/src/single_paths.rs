@@ -8,6 +8,7 @@ use std::borrow::Borrow;
 /// A line through (t, 10 lg e) of every path, all counting alike. As 10 lg e is linear in ln(1 - absorption), so is the
 /// slope, and two sums over the paths are all it takes: m = m0 + sum of rate * ln(1 - absorption).
 /// Several source-receiver pairs: the mean of their slopes.
+#[derive(Clone)]
 pub(crate) struct SinglePathSlope {
     /// Slope in dB/s if nothing absorbed but the air; `None` without two paths at different times.
     rigid: Option<f64>,

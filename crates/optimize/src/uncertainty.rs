@@ -45,7 +45,7 @@ impl Spread {
         };
 
         let mut precision = DMatrix::<f64>::identity(n, n);
-        for (low, high) in group.neighbours() {
+        for &(low, high) in group.neighbours() {
             let s = group.smoothness();
             precision[(low, low)] += s;
             precision[(high, high)] += s;
