@@ -4,7 +4,7 @@ use crate::decay::slope_with_sensitivity;
 use crate::expansion::{Bins, Expansion};
 use crate::history::History;
 use crate::objective::SlopeModel;
-use sabine_acoustics::{EnergyDecayCurve, Estimate, Reading};
+use sabine_acoustics::{EnergyDecayCurve, Estimate, NoReading, Reading};
 use std::borrow::Borrow;
 
 /// Slope of the decay curves of several source-receiver pairs: -60 over the mean of their reverberation times
@@ -39,48 +39,31 @@ impl<H: Borrow<History>> DecaySlope<H> {
         }
     }
 
-    /// Reverberation time in seconds, with its Monte-Carlo standard error; why there is none, if none of the curves gives one.
-    pub fn reading(&self, absorption: &[f64]) -> Reading {
-        let mut why = sabine_acoustics::NoReading::NoOnset;
-        let readable = self.pairs.iter().any(|(history, weights)| {
-            let history = history.borrow();
-            let mut energy = vec![0.0; history.bins()];
-            history.accumulate(weights, absorption, &mut energy, &mut []);
-            let sampled = EnergyDecayCurve::from_energy(&energy, history.bin_s)
-                .decay_time_s(self.range_db.0, self.range_db.1);
-            sampled.map_err(|reason| why = reason).is_ok()
-        });
-        match self.slope_and_variance(absorption).filter(|_| readable) {
-            Some((slope, variance)) => {
-                Ok(Estimate::new(-60.0 / slope, 60.0 / (slope * slope) * variance.sqrt()))
-            }
-            None => Err(why),
-        }
-    }
-
-    /// Slope as in [`SlopeModel::slope`], and its variance from the scatter between batches of rays, in (dB/s)2.
-    pub fn slope_and_variance(&self, absorption: &[f64]) -> Option<(f64, f64)> {
+    /// Reverberation time in seconds where an expansion was made, with its Monte-Carlo standard error from the scatter between
+    /// batches of rays; why there is none, if none of the curves gives one.
+    pub fn reading(&self, expansion: &Expansion) -> Reading {
+        let mut why = NoReading::NoOnset;
         let (mut t60_s, mut variance, mut count) = (0.0, 0.0, 0.0);
-        for (history, weights) in &self.pairs {
-            let history = history.borrow();
-            let mut energy = vec![0.0; history.bins()];
-            let mut sensitivity = vec![0.0; history.bins()];
-            history.accumulate(weights, absorption, &mut energy, &mut []);
-            let Some(slope) = slope_with_sensitivity(&energy, history.bin_s, self.range_db, &mut sensitivity)
-            else {
+        for ((history, weights), bins) in self.pairs.iter().zip(&expansion.pairs) {
+            let sampled = EnergyDecayCurve::from_energy(&bins.energy, bins.bin_s)
+                .decay_time_s(self.range_db.0, self.range_db.1);
+            if let Err(reason) = sampled {
+                why = reason;
                 continue;
-            };
+            }
+            let mut sensitivity = vec![0.0; bins.energy.len()];
+            let slope = slope_with_sensitivity(&bins.energy, bins.bin_s, self.range_db, &mut sensitivity);
+            let Some(slope) = slope else { continue };
             count += 1.0;
             t60_s += -60.0 / slope;
-            variance +=
-                history.variance(weights, absorption, &sensitivity) * (60.0 / (slope * slope)).powi(2);
+            let by_slope = 60.0 / (slope * slope);
+            let spread = history.borrow().variance(weights, &expansion.about, &sensitivity);
+            variance += by_slope * by_slope * spread;
         }
         if count == 0.0 {
-            return None;
+            return Err(why);
         }
-        let mean_s = t60_s / count;
-        let by_t60 = 60.0 / (mean_s * mean_s);
-        Some((-60.0 / mean_s, by_t60 * by_t60 * variance / (count * count)))
+        Ok(Estimate::new(t60_s / count, f64::sqrt(variance) / count))
     }
 }
 

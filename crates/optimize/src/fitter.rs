@@ -2,7 +2,7 @@
 
 use crate::decay_slope::DecaySlope;
 use crate::fit::{AtBound, MaterialFit, Unreachable, UnreachableReason, Warning};
-use crate::group::{Band, Group};
+use crate::group::{Band, Fitted, Group};
 use crate::history::History;
 use crate::objective::check_paths;
 use crate::single_paths::SinglePathSlope;
@@ -140,12 +140,11 @@ impl MaterialFitter {
             let band_hz = octaves.nominal_hz(b);
             let (solution, spread) = &fitted[b / together];
             let here = b % together;
-            let values = &solution.absorption[here];
+            let found = &solution.bands[here];
+            let values = &found.absorption;
             let bounded = AtBound::find(band, values, band_hz, self.config.bounds);
-            let reading = band.curve.reading(values);
-            if let Some(reason) =
-                self.unreachable(band, values, solution.residual[here], limits_s.values()[b])
-            {
+            let reading = found.t60_s.clone();
+            if let Some(reason) = self.unreachable(band, found, limits_s.values()[b]) {
                 fit.unreachable.push(Unreachable { band_hz, reason });
             }
             for k in 0..materials.len() {
@@ -175,14 +174,8 @@ impl MaterialFitter {
     }
 
     /// Why the target of a band is not met; `None` where it is.
-    fn unreachable(
-        &self,
-        band: &Band<'_>,
-        absorption: &[f64],
-        residual: Option<f64>,
-        limit_s: f64,
-    ) -> Option<UnreachableReason> {
-        let Some(residual) = residual else { return Some(UnreachableReason::NoEnergy) };
+    fn unreachable(&self, band: &Band<'_>, found: &Fitted, limit_s: f64) -> Option<UnreachableReason> {
+        let Some(residual) = found.residual else { return Some(UnreachableReason::NoEnergy) };
         if residual.abs() <= self.config.target_tolerance {
             return None;
         }
@@ -192,8 +185,7 @@ impl MaterialFitter {
         if residual > 0.0 && target_s >= limit_s {
             return Some(UnreachableReason::AirLimit { limit_s, target_s });
         }
-        let mut gradient = vec![0.0; absorption.len()];
-        band.slope(absorption, &mut gradient);
+        let Fitted { absorption, gradient, .. } = found;
         let greatest = gradient.iter().fold(0.0f64, |w, g| w.max(g.abs()));
         let matters = |k: &usize| gradient[*k].abs() > 1e-3 * greatest;
         let mut free =

@@ -2,12 +2,13 @@
 
 use crate::bounded::{Minimum, minimise};
 use crate::decay_slope::DecaySlope;
+use crate::expansion::Expansion;
 use crate::history::History;
 use crate::objective::SlopeModel;
 use crate::single_paths::SinglePathSlope;
 use crate::{Error, FitConfig};
 use rayon::prelude::*;
-use sabine_acoustics::Objective;
+use sabine_acoustics::{Objective, Reading};
 
 /// Everything about one band: its slopes, its target, and its materials' priors.
 pub(crate) struct Band<'a> {
@@ -22,25 +23,22 @@ pub(crate) struct Band<'a> {
 }
 
 impl Band<'_> {
-    /// Slope that is fitted, in dB/s.
-    pub fn slope(&self, absorption: &[f64], gradient: &mut [f64]) -> Option<f64> {
+    /// The fitted slope near an absorption, fast to evaluate: exact there, and everywhere for lines through single paths.
+    fn expand(&self, absorption: &[f64]) -> Model<'_> {
         match &self.line {
-            Some(line) => line.slope(absorption, gradient),
-            None => self.curve.slope(absorption, gradient),
+            Some(line) => Model::Line(line),
+            None => Model::Curve(self.curve.expand(absorption)),
         }
     }
 
-    /// The fitted slope near an absorption, fast to evaluate: exact there, and everywhere for lines through single paths.
-    fn expand(&self, absorption: &[f64]) -> Box<dyn SlopeModel> {
-        match &self.line {
-            Some(line) => Box::new(line.clone()),
-            None => Box::new(self.curve.expand(absorption)),
-        }
+    /// The fitted slope, all paths being asked each time.
+    fn paths(&self) -> Model<'_> {
+        self.line.as_ref().map_or(Model::Paths(&self.curve), Model::Line)
     }
 
     /// m/m' - 1 and its gradient: zero where the target is met, linear in ln(1 - absorption) for an ideal decay, and of the
     /// same size for long and short targets.
-    fn residual(&self, model: &dyn SlopeModel, absorption: &[f64], gradient: &mut [f64]) -> Option<f64> {
+    fn residual(&self, model: &Model<'_>, absorption: &[f64], gradient: &mut [f64]) -> Option<f64> {
         let wanted = -60.0 / self.target_s;
         let slope = model.slope(absorption, gradient)?;
         gradient.iter_mut().for_each(|g| *g /= wanted);
@@ -48,19 +46,40 @@ impl Band<'_> {
     }
 }
 
-impl SlopeModel for Band<'_> {
+/// What stands for the slope of a band while the solver works.
+enum Model<'b> {
+    Curve(Expansion),
+    Line(&'b SinglePathSlope),
+    /// All paths, in every step.
+    Paths(&'b dyn SlopeModel),
+}
+
+impl SlopeModel for Model<'_> {
     fn slope(&self, absorption: &[f64], gradient: &mut [f64]) -> Option<f64> {
-        Band::slope(self, absorption, gradient)
+        match self {
+            Self::Curve(expansion) => expansion.slope(absorption, gradient),
+            Self::Line(line) => line.slope(absorption, gradient),
+            Self::Paths(curve) => curve.slope(absorption, gradient),
+        }
     }
 }
 
-/// Where the fit of a group ended; absorption and residual by band.
+/// Where the fit of a group ended.
 pub(crate) struct Solution {
-    pub absorption: Vec<Vec<f64>>,
-    /// `None` in a band without energy.
-    pub residual: Vec<Option<f64>>,
+    pub bands: Vec<Fitted>,
     pub iterations: usize,
     pub cost: f64,
+}
+
+/// Where the fit of a band ended.
+pub(crate) struct Fitted {
+    pub absorption: Vec<f64>,
+    /// m/m' - 1; `None` in a band without energy.
+    pub residual: Option<f64>,
+    /// Its derivative by each absorption.
+    pub gradient: Vec<f64>,
+    /// What the decay curves read.
+    pub t60_s: Reading,
 }
 
 /// Passes over the paths before the fit falls back on evaluating all of them in every step.
@@ -112,14 +131,15 @@ impl<'a, 'b> Group<'a, 'b> {
         // Not met from the prior: try once more from the prior scaled so that the slope is right.
         let Some(start) = self.scaled_start(&prior) else { return Ok(prior) };
         let again = self.solve_from(&start)?;
-        let worst = |s: &Solution| s.residual.iter().flatten().fold(0.0, |w: f64, r| w.max(r.abs()));
+        let worst =
+            |s: &Solution| s.bands.iter().filter_map(|b| b.residual).fold(0.0, |w: f64, r| w.max(r.abs()));
         let iterations = prior.iterations + again.iterations;
         let best = if worst(&again) < worst(&prior) { again } else { prior };
         Ok(Solution { iterations, ..best })
     }
 
     fn met(&self, solution: &Solution) -> bool {
-        solution.residual.iter().flatten().all(|r| r.abs() <= self.config.target_tolerance)
+        solution.bands.iter().filter_map(|b| b.residual).all(|r| r.abs() <= self.config.target_tolerance)
     }
 
     fn solve_from(&self, start: &[f64]) -> Result<Solution, Error> {
@@ -140,31 +160,42 @@ impl<'a, 'b> Group<'a, 'b> {
                 _ => w,
             });
             if moved < SETTLED && surprise < 0.1 * self.config.target_tolerance {
-                return Ok(self.solution(&x, found, iterations));
+                return Ok(self.solution(&x, rounds.models, iterations));
             }
         }
         // The expansion does not settle, where bins hold few paths of very different histories: use the paths themselves.
-        rounds.models = self.bands.iter().map(|band| Box::new(band) as _).collect();
+        rounds.models = self.bands.iter().map(Band::paths).collect();
         let minimum = rounds.solve(&x)?;
-        let found = rounds.residual(&minimum.x);
-        Ok(self.solution(&minimum.x, found, iterations + minimum.iterations))
+        rounds.models = self.expand(&minimum.x);
+        Ok(self.solution(&minimum.x, rounds.models, iterations + minimum.iterations))
     }
 
-    fn solution(&self, x: &[f64], residual: Vec<Option<f64>>, iterations: usize) -> Solution {
+    fn solution(&self, x: &[f64], models: Vec<Model<'b>>, iterations: usize) -> Solution {
+        let absorption = self.absorption(x);
+        let at = |((band, model), absorption): ((&Band<'_>, Model<'_>), &Vec<f64>)| {
+            let mut gradient = vec![0.0; absorption.len()];
+            let residual = band.residual(&model, absorption, &mut gradient);
+            let curve = match model {
+                Model::Curve(expansion) => expansion,
+                _ => band.curve.expand(absorption),
+            };
+            Fitted { absorption: absorption.clone(), residual, gradient, t60_s: band.curve.reading(&curve) }
+        };
+        let bands = self.bands.par_iter().zip(models).zip(&absorption).map(at).collect();
         let cost = self.prior_cost(x, &mut vec![0.0; x.len()]);
-        Solution { absorption: self.absorption(x), residual, iterations, cost }
+        Solution { bands, iterations, cost }
     }
 
-    fn expand(&self, x: &[f64]) -> Vec<Box<dyn SlopeModel + 'b>> {
-        self.bands.par_iter().zip(self.absorption(x)).map(|(band, a)| band.expand(&a) as _).collect()
+    fn expand(&self, x: &[f64]) -> Vec<Model<'b>> {
+        self.bands.par_iter().zip(self.absorption(x)).map(|(band, a)| band.expand(&a)).collect()
     }
 
     /// The prior's means, ln(1 - absorption) multiplied in each band by what gives the wanted slope; `None` if no factor does.
     fn scaled_start(&self, from: &Solution) -> Option<Vec<f64>> {
-        let mut absorption = from.absorption.clone();
+        let mut absorption: Vec<Vec<f64>> = from.bands.iter().map(|b| b.absorption.clone()).collect();
         let mut found = false;
         for (b, band) in self.bands.iter().enumerate() {
-            if from.residual[b].is_none_or(|r| r.abs() <= self.config.target_tolerance) {
+            if from.bands[b].residual.is_none_or(|r| r.abs() <= self.config.target_tolerance) {
                 continue;
             }
             let scaled = |log_factor: f64| -> Vec<f64> {
@@ -179,7 +210,7 @@ impl<'a, 'b> Group<'a, 'b> {
                 band.mean.iter().zip(&band.standard_deviation).map(of).collect()
             };
             let scratch = &mut vec![0.0; band.mean.len()];
-            let mut residual = |log_factor: f64| band.residual(band, &scaled(log_factor), scratch);
+            let mut residual = |log_factor: f64| band.residual(&band.paths(), &scaled(log_factor), scratch);
             let (mut low, mut high) = (-6.0, 6.0);
             if !(residual(low)? < 0.0 && residual(high)? > 0.0) {
                 continue;
@@ -243,13 +274,13 @@ impl<'a, 'b> Group<'a, 'b> {
 /// The augmented Lagrangian of a group: prior cost + sum of weight/2 (residual + shift)2 over the bands.
 struct Rounds<'g, 'a, 'b> {
     group: &'g Group<'a, 'b>,
-    models: Vec<Box<dyn SlopeModel + 'b>>,
+    models: Vec<Model<'b>>,
     weight: Vec<f64>,
     shift: Vec<f64>,
 }
 
 impl<'g, 'a, 'b> Rounds<'g, 'a, 'b> {
-    fn new(group: &'g Group<'a, 'b>, models: Vec<Box<dyn SlopeModel + 'b>>, x: &[f64]) -> Self {
+    fn new(group: &'g Group<'a, 'b>, models: Vec<Model<'b>>, x: &[f64]) -> Self {
         let count = models.len();
         let mut rounds = Self { group, models, weight: vec![0.0; count], shift: vec![0.0; count] };
         for (weight, residual) in rounds.weight.iter_mut().zip(group.residuals(&rounds.models, x)) {
@@ -295,14 +326,14 @@ impl<'g, 'a, 'b> Rounds<'g, 'a, 'b> {
 
 impl Group<'_, '_> {
     /// Residual of each band and its gradient by the deviations of its materials, in standard deviations.
-    fn residuals(&self, models: &[Box<dyn SlopeModel + '_>], x: &[f64]) -> Vec<Option<(f64, Vec<f64>)>> {
+    fn residuals(&self, models: &[Model<'_>], x: &[f64]) -> Vec<Option<(f64, Vec<f64>)>> {
         self.bands
             .par_iter()
             .zip(models)
             .zip(self.absorption(x))
             .map(|((band, model), absorption)| {
                 let mut gradient = vec![0.0; absorption.len()];
-                let residual = band.residual(model.as_ref(), &absorption, &mut gradient)?;
+                let residual = band.residual(model, &absorption, &mut gradient)?;
                 gradient.iter_mut().zip(&band.standard_deviation).for_each(|(g, sd)| *g *= sd);
                 Some((residual, gradient))
             })

@@ -152,9 +152,3 @@ pub(crate) fn check_paths(paths: &[&PathSet], materials: &[Material]) -> Result<
         None => Ok(()),
     }
 }
-
-impl<T: SlopeModel + ?Sized> SlopeModel for &T {
-    fn slope(&self, absorption: &[f64], gradient: &mut [f64]) -> Option<f64> {
-        (**self).slope(absorption, gradient)
-    }
-}

@@ -58,21 +58,20 @@ impl Spread {
         // One row for each band with a slope: relative change of T60 by each deviation, and its error.
         let (mut rows, mut movable, mut errors) = (Vec::new(), Vec::new(), Vec::new());
         for (b, band) in bands.iter().enumerate() {
-            let absorption = &solution.absorption[b];
-            let mut gradient = vec![0.0; absorption.len()];
-            let Some(slope) = band.slope(absorption, &mut gradient).filter(|s| *s != 0.0) else { continue };
+            let fitted = &solution.bands[b];
+            let Some(residual) = fitted.residual.filter(|r| *r != -1.0) else { continue };
             spread.data[b] = true;
             let at = |i: usize| -> f64 {
                 let (of, k) = free[i];
-                if of == b { gradient[k] / slope * band.standard_deviation[k] } else { 0.0 }
+                if of == b { fitted.gradient[k] / (1.0 + residual) * band.standard_deviation[k] } else { 0.0 }
             };
             let row = DVector::from_fn(n, |i, _| at(i));
             let fixed = |i: usize| {
-                let a = solution.absorption[free[i].0][free[i].1];
+                let a = solution.bands[free[i].0].absorption[free[i].1];
                 at_bound(a, bounds.0) || at_bound(a, bounds.1)
             };
             movable.push(DVector::from_fn(n, |i, _| if fixed(i) { 0.0 } else { row[i] }));
-            let rays = band.curve.slope_and_variance(absorption).map_or(0.0, |(m, v)| v / (m * m));
+            let rays = fitted.t60_s.as_ref().map_or(0.0, |t| (t.standard_error / t.value).powi(2));
             errors.push(relative_error[b] * relative_error[b] + rays);
             let total: f64 = row.norm_squared();
             for (i, &(of, k)) in free.iter().enumerate().filter(|(_, f)| f.0 == b) {
