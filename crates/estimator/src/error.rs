@@ -158,6 +158,12 @@ pub enum WeightsFault {
         /// The field.
         field: &'static str,
     },
+    /// No extractor can give the features that the weights ask for.
+    #[error("no such features: {source}")]
+    Features {
+        /// The cause.
+        source: sabine_features::Error,
+    },
     /// The weights were made for other features, bands or another format.
     #[error("`{field}` is {found}; this program needs {expected}")]
     Layout {
