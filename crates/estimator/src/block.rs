@@ -1,6 +1,7 @@
 //! Convolution, ReLU and max pooling of a batch, forward and backward.
 
 use crate::correlate::{Correlate, CorrelateWeights, PackedWeights};
+use crate::norm::lane_sum;
 use crate::pool::{PoolRow, Unpool};
 use crate::shape::BlockShape;
 use rayon::prelude::*;
@@ -56,58 +57,54 @@ pub(crate) fn forward_sample(
 }
 
 /// A batch forward: pooled planes and the marks of where each maximum was.
-pub(crate) fn forward(shape: BlockShape, x: &[f32], weights: &[f32], bias: &[f32]) -> (Vec<f32>, Vec<u8>) {
+pub(crate) fn forward(
+    shape: BlockShape,
+    x: &[f32],
+    weights: &[f32],
+    bias: &[f32],
+    out: &mut [f32],
+    marks: &mut [u8],
+) {
     let packed = pack_forward(shape, weights);
-    let samples = x.len() / shape.input_len();
-    let mut out = vec![0.0; samples * shape.output_len()];
-    let mut marks = vec![0u8; out.len()];
     out.par_chunks_exact_mut(shape.output_len())
         .zip(marks.par_chunks_exact_mut(shape.output_len()))
         .zip(x.par_chunks_exact(shape.input_len()))
         .for_each_init(Vec::new, |scratch, ((out, marks), x)| {
             forward_sample(shape, &packed, bias, x, out, Some(marks), scratch);
         });
-    (out, marks)
 }
 
-/// Gradients of a block.
-pub(crate) struct BlockGradients {
-    /// With respect to the input, where it was asked for.
-    pub x: Option<Vec<f32>>,
-    pub weights: Vec<f32>,
-    pub bias: Vec<f32>,
+/// What the way back of a block reads.
+#[derive(Clone, Copy)]
+pub(crate) struct BlockBackward<'a> {
+    pub shape: BlockShape,
+    pub x: &'a [f32],
+    pub weights: &'a [f32],
+    pub marks: &'a [u8],
+    /// Gradient of the pooled planes.
+    pub gradient: &'a [f32],
 }
 
-/// A batch backward, given the gradient of the pooled planes. Sums over the batch run in the order of the samples.
-pub(crate) fn backward(
-    shape: BlockShape,
-    x: &[f32],
-    weights: &[f32],
-    marks: &[u8],
-    gradient: &[f32],
-    input_gradient: bool,
-) -> BlockGradients {
-    let packed = pack_backward(shape, weights);
-    let offsets = shape.offsets();
-    let samples = x.len() / shape.input_len();
-    let mut gx = vec![0.0; if input_gradient { x.len() } else { 0 }];
+/// A batch backward: adds the gradients of weights and bias (one after the other) to `out`, and writes that of the input
+/// to `gx` where it is asked for. Sums over the batch run in the order of the samples.
+pub(crate) fn backward(block: BlockBackward<'_>, out: &mut [f32], gx: Option<&mut [f32]>) {
+    let shape = block.shape;
+    let packed = pack_backward(shape, block.weights);
+    let samples = block.x.len() / shape.input_len();
     // One row of gradients for each sample: added up afterwards in a fixed order.
     let row = shape.weights() + shape.outputs;
     let mut rows = vec![0.0f32; samples * row];
-    let one = |scratch: &mut Vec<f32>, index: usize, out: &mut [f32], gx: Option<&mut [f32]>| {
-        let x = &x[index * shape.input_len()..][..shape.input_len()];
-        let range = index * shape.output_len()..(index + 1) * shape.output_len();
-        backward_sample(shape, &packed, &offsets, x, &marks[range.clone()], &gradient[range], out, gx, scratch);
-    };
-    if input_gradient {
+    if let Some(gx) = gx {
         rows.par_chunks_exact_mut(row)
             .zip(gx.par_chunks_exact_mut(shape.input_len()))
             .enumerate()
-            .for_each_init(Vec::new, |scratch, (index, (out, gx))| one(scratch, index, out, Some(gx)));
+            .for_each_init(Vec::new, |scratch, (sample, (out, gx))| {
+                backward_sample(block, sample, &packed, out, Some(gx), scratch);
+            });
     } else {
-        rows.par_chunks_exact_mut(row)
-            .enumerate()
-            .for_each_init(Vec::new, |scratch, (index, out)| one(scratch, index, out, None));
+        rows.par_chunks_exact_mut(row).enumerate().for_each_init(Vec::new, |scratch, (sample, out)| {
+            backward_sample(block, sample, &packed, out, None, scratch);
+        });
     }
     let mut total = vec![0.0f64; row];
     for row in rows.chunks_exact(row) {
@@ -115,26 +112,27 @@ pub(crate) fn backward(
             *total += f64::from(*value);
         }
     }
-    let bias = total.split_off(shape.weights()).into_iter().map(|g| g as f32).collect();
-    let weights = total.into_iter().map(|g| g as f32).collect();
-    BlockGradients { x: input_gradient.then_some(gx), weights, bias }
+    for (out, total) in out.iter_mut().zip(total) {
+        *out += total as f32;
+    }
 }
 
-#[allow(clippy::too_many_arguments)] // the sizes and buffers of one kernel call
 fn backward_sample(
-    shape: BlockShape,
+    block: BlockBackward<'_>,
+    sample: usize,
     packed: &PackedWeights,
-    offsets: &[usize],
-    x: &[f32],
-    marks: &[u8],
-    gradient: &[f32],
     out: &mut [f32],
     gx: Option<&mut [f32]>,
     scratch: &mut Vec<f32>,
 ) {
-    let reach = reach(offsets);
+    let shape = block.shape;
+    let x = &block.x[sample * shape.input_len()..][..shape.input_len()];
+    let gradient = &block.gradient[sample * shape.output_len()..][..shape.output_len()];
+    let marks = &block.marks[sample * shape.output_len()..][..shape.output_len()];
+    let offsets = shape.offsets();
+    let reach = reach(&offsets);
     let stride = reach + shape.plane();
-    scratch.clear();
+    // Unpooling writes every position that it reaches, and no other is ever written: zeros stay zeros.
     scratch.resize(shape.outputs * stride, 0.0);
     Unpool { shape, gradient, marks, out: scratch, pad: reach }.run();
     let (weights, bias) = out.split_at_mut(shape.weights());
@@ -145,16 +143,13 @@ fn backward_sample(
         x,
         x_stride: shape.plane(),
         inputs: shape.inputs,
-        offsets,
+        offsets: &offsets,
         gradient: weights,
         length: shape.span(),
     }
     .run();
     for (plane, bias) in bias.iter_mut().enumerate() {
-        let pooled = shape.output_len() / shape.outputs;
-        let range = plane * pooled..(plane + 1) * pooled;
-        let passed = gradient[range.clone()].iter().zip(&marks[range]).filter(|(_, mark)| **mark != 0);
-        *bias = passed.map(|(g, _)| f64::from(*g)).sum::<f64>() as f32;
+        *bias = lane_sum([&scratch[plane * stride..(plane + 1) * stride]], |[g]| g) as f32;
     }
     if let Some(gx) = gx {
         Correlate {

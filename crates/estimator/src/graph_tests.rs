@@ -161,7 +161,7 @@ fn every_gradient_meets_central_differences() {
             .collect();
         let weights = noise(samples * config.outputs, 2);
         let mut graph = Graph::new(&parameters).unwrap();
-        let out = graph.forward(inputs.clone(), Some(keep.clone())).unwrap();
+        let out = graph.forward(|x| *x = inputs.clone(), Some(keep.clone())).unwrap();
         let seed = Tensor::from_vec(weights.clone(), (samples, config.outputs), &Device::Cpu).unwrap();
         let gradients = (out * seed).unwrap().sum_all().unwrap().backward().unwrap();
 
@@ -208,7 +208,7 @@ fn training_and_folded_networks_meet_the_naive_one() {
         let folded = Network::new(&parameters).infer_batch(&inputs);
         let trained: Vec<f32> = Graph::new(&parameters)
             .unwrap()
-            .forward(inputs, None)
+            .forward(|x| *x = inputs, None)
             .unwrap()
             .flatten_all()
             .unwrap()
@@ -235,7 +235,7 @@ fn threads_do_not_change_a_bit() {
     let run = |threads| {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| {
             let mut graph = Graph::new(&parameters).unwrap();
-            let out = graph.forward(inputs.clone(), None).unwrap();
+            let out = graph.forward(|x| x.clone_from(&inputs), None).unwrap();
             let gradients = out.sqr().unwrap().sum_all().unwrap().backward().unwrap();
             let bits = |v: &Var| -> Vec<u32> {
                 let g: Vec<f32> = gradients.get(v).unwrap().flatten_all().unwrap().to_vec1().unwrap();
@@ -260,7 +260,7 @@ fn timing() {
             let mut graph = Graph::new(&parameters).unwrap();
             for _ in 0..3 {
                 let t = std::time::Instant::now();
-                let out = graph.forward(inputs.clone(), None).unwrap();
+                let out = graph.forward(|x| x.clone_from(&inputs), None).unwrap();
                 let tf = t.elapsed();
                 let gradients = out.sqr().unwrap().sum_all().unwrap().backward().unwrap();
                 let tt = t.elapsed();

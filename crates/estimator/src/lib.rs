@@ -14,6 +14,7 @@ mod norm;
 mod parameters;
 mod pool;
 mod shape;
+mod stack;
 mod warning;
 mod windows;
 

@@ -1,5 +1,6 @@
 //! Batch normalisation of a batch `[sample][channel][position]`, forward and backward.
 
+use pulp::Arch;
 use rayon::prelude::*;
 
 /// Mean and reciprocal standard deviation of each channel over a batch.
@@ -18,8 +19,15 @@ impl BatchMoments {
 }
 
 /// Sum of `f` over positions with a fixed order of additions: sixteen lanes in chunks, the chunks in double precision.
-#[inline]
-fn lane_sum<const N: usize>(inputs: [&[f32]; N], f: impl Fn([f32; N]) -> f32) -> f64 {
+pub(crate) fn lane_sum<const N: usize>(inputs: [&[f32]; N], f: impl Fn([f32; N]) -> f32) -> f64 {
+    Arch::new().dispatch(
+        #[inline(always)]
+        || lane_sum_inline(inputs, f),
+    )
+}
+
+#[inline(always)]
+fn lane_sum_inline<const N: usize>(inputs: [&[f32]; N], f: impl Fn([f32; N]) -> f32) -> f64 {
     const LANES: usize = 16;
     const CHUNK: usize = 256;
     let length = inputs[0].len();
@@ -66,7 +74,7 @@ fn channel_sums<const K: usize>(
     totals
 }
 
-/// Normalised, scaled and shifted batch, and the moments it was normalised by.
+/// Writes the normalised, scaled and shifted batch to `y`; gives the moments it was normalised by.
 pub(crate) fn forward(
     x: &[f32],
     channels: usize,
@@ -74,7 +82,8 @@ pub(crate) fn forward(
     scale: &[f32],
     shift: &[f32],
     epsilon: f64,
-) -> (Vec<f32>, BatchMoments) {
+    y: &mut [f32],
+) -> BatchMoments {
     let sample_len = channels * positions;
     let samples = x.len() / sample_len;
     let count = (samples * positions) as f64;
@@ -94,28 +103,23 @@ pub(crate) fn forward(
         mean: mean.into_iter().map(|m| m as f32).collect(),
         variance: variance.into_iter().map(|v| v as f32).collect(),
     };
-    let mut y = vec![0.0; x.len()];
     y.par_chunks_exact_mut(sample_len).zip(x.par_chunks_exact(sample_len)).for_each(|(y, x)| {
         let planes = y.chunks_exact_mut(positions).zip(x.chunks_exact(positions));
         for (channel, (y, x)) in planes.enumerate() {
             let gain = scale[channel] * moments.inverse_deviation(channel, epsilon);
             let (mean, shift) = (moments.mean[channel], shift[channel]);
-            for (y, x) in y.iter_mut().zip(x) {
-                *y = (x - mean) * gain + shift;
-            }
+            Arch::new().dispatch(|| {
+                for (y, x) in y.iter_mut().zip(x) {
+                    *y = (x - mean) * gain + shift;
+                }
+            });
         }
     });
-    (y, moments)
+    moments
 }
 
-/// Gradients of the normalisation.
-pub(crate) struct NormGradients {
-    pub x: Vec<f32>,
-    pub scale: Vec<f32>,
-    pub shift: Vec<f32>,
-}
-
-/// The way back of [`forward`]: the moments depend on the batch, and so their gradient flows too.
+/// The way back of [`forward`]: the moments depend on the batch, and so their gradient flows too. `gradient` is that of the
+/// output on entry and that of the input on return; gives the gradients of scale and shift.
 pub(crate) fn backward(
     x: &[f32],
     channels: usize,
@@ -123,8 +127,8 @@ pub(crate) fn backward(
     scale: &[f32],
     moments: &BatchMoments,
     epsilon: f64,
-    gradient: &[f32],
-) -> NormGradients {
+    gradient: &mut [f32],
+) -> (Vec<f32>, Vec<f32>) {
     let sample_len = channels * positions;
     let samples = x.len() / sample_len;
     let count = (samples * positions) as f64;
@@ -135,28 +139,19 @@ pub(crate) fn backward(
         let (mean, inverse) = (moments.mean[c], moments.inverse_deviation(c, epsilon));
         [lane_sum([g], |[g]| g), lane_sum([g, x], |[g, x]| g * (x - mean) * inverse)]
     });
-    let mut gx = vec![0.0; x.len()];
-    gx.par_chunks_exact_mut(sample_len)
-        .zip(x.par_chunks_exact(sample_len))
-        .zip(gradient.par_chunks_exact(sample_len))
-        .for_each(|((gx, x), g)| {
-            let planes = gx
-                .chunks_exact_mut(positions)
-                .zip(x.chunks_exact(positions))
-                .zip(g.chunks_exact(positions));
-            for (channel, ((gx, x), g)) in planes.enumerate() {
-                let (mean, inverse) = (moments.mean[channel], moments.inverse_deviation(channel, epsilon));
-                let gain = scale[channel] * inverse;
-                let mean_g = (sums[channel][0] / count) as f32;
-                let mean_gx = (sums[channel][1] / count) as f32;
-                for ((gx, x), g) in gx.iter_mut().zip(x).zip(g) {
-                    *gx = gain * (g - mean_g - (x - mean) * inverse * mean_gx);
+    gradient.par_chunks_exact_mut(sample_len).zip(x.par_chunks_exact(sample_len)).for_each(|(g, x)| {
+        let planes = g.chunks_exact_mut(positions).zip(x.chunks_exact(positions));
+        for (channel, (g, x)) in planes.enumerate() {
+            let (mean, inverse) = (moments.mean[channel], moments.inverse_deviation(channel, epsilon));
+            let gain = scale[channel] * inverse;
+            let mean_g = (sums[channel][0] / count) as f32;
+            let mean_gx = (sums[channel][1] / count) as f32;
+            Arch::new().dispatch(|| {
+                for (g, x) in g.iter_mut().zip(x) {
+                    *g = gain * (*g - mean_g - (x - mean) * inverse * mean_gx);
                 }
-            }
-        });
-    NormGradients {
-        x: gx,
-        scale: sums.iter().map(|s| s[1] as f32).collect(),
-        shift: sums.iter().map(|s| s[0] as f32).collect(),
-    }
+            });
+        }
+    });
+    (sums.iter().map(|s| s[1] as f32).collect(), sums.iter().map(|s| s[0] as f32).collect())
 }
