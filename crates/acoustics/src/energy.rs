@@ -105,6 +105,21 @@ impl EnergyDecayCurve {
         Self { remaining, step_s }
     }
 
+    /// Sums energies from the end to the beginning, less the noise that each of them holds, starting from the energy that is
+    /// still to come after the last of them (subtraction and correction of ISO 3382-1, 5.3.3, and Guski 2015).
+    ///
+    /// Where noise outweighs what is left, the curve stays level: it never rises.
+    pub fn without_noise(energy: &[f64], step_s: f64, noise: f64, tail: f64) -> Self {
+        let mut remaining = energy.to_vec();
+        let (mut sum, mut most) = (tail, tail.max(0.0));
+        for value in remaining.iter_mut().rev() {
+            sum += *value - noise;
+            most = most.max(sum);
+            *value = most;
+        }
+        Self { remaining, step_s }
+    }
+
     /// Energy from the start of each step to the end.
     pub fn remaining(&self) -> &[f64] {
         &self.remaining

@@ -3,27 +3,41 @@
 //! Under construction: the front page follows.
 
 mod air;
+mod band_energy;
 mod bands;
+mod decay_fit;
 mod energy;
+mod equalisation;
 mod error;
 mod estimate;
+mod filter_bank;
 mod material;
+mod onset;
+mod parameters;
 mod paths;
 mod progress;
 mod scene;
 mod signal;
+mod spectrum;
 mod targets;
+mod third_octaves;
 mod traits;
 
 pub use air::Air;
 pub use bands::{OctaveBands, PerBand};
+pub use decay_fit::{DecayFit, Slope};
 pub use energy::{EnergyDecayCurve, EnergyResponse};
+pub use equalisation::equalisation;
 pub use error::Error;
 pub use estimate::{Estimate, NoReading, Reading};
+pub use filter_bank::{FilterBank, ThirdOctaveFilterBank};
 pub use material::Material;
+pub use onset::Onset;
+pub use parameters::{BandParameters, RoomParameters};
 pub use paths::{Contribution, PathSet, Reflection};
 pub use progress::{Observer, report};
 pub use scene::{NamedMaterial, Receiver, Scene, Source, Triangle};
 pub use signal::{ImpulseResponse, Signal};
 pub use targets::RoomTargets;
+pub use third_octaves::ThirdOctaveBands;
 pub use traits::{Augment, FeatureExtractor, Objective, Propagator, RayHit, RayScene, RoomEstimator};

@@ -1,0 +1,547 @@
+//! Exponential decays plus noise, by maximum likelihood.
+//!
+//! Squared samples of a band are summed over bins. Band-limited Gaussian noise of bandwidth B holds about B dt independent
+//! values in a bin of width dt, so a bin's mean power y is nearly Gamma distributed about its expectation m with shape
+//! B dt. The expectation is a sum of decays and a floor,
+//! m(t) = sum_k a_k exp(-t / tau_k) + n, T_k = ln(10^6) tau_k,
+//! integrated over the bin. The parameters (as logarithms) maximise the likelihood by Fisher scoring; its information
+//! matrix gives the standard errors (Karjalainen et al. 2002 for the model; Balint et al. and the theory of generalised
+//! linear models with Gamma response for the errors).
+
+use crate::{Estimate, NoReading};
+
+/// ln(10^6): the power falls by 60 dB in this many time constants.
+const LN_MILLION: f64 = 13.815_510_557_964_274;
+/// Bins between the start and the knee, and after the knee.
+const DECAY_BINS: usize = 96;
+const FLOOR_BINS: usize = 24;
+/// Most iterations of Fisher scoring.
+const ITERATIONS: usize = 60;
+/// Most slopes that are looked for.
+const MOST_SLOPES: usize = 3;
+/// Twice the gain in log-likelihood that one more slope (two parameters) must bring. By chance a single slope reaches 16
+/// with a probability below 0.1 %, which leaves room for what the bins idealise.
+const SLOPE_EVIDENCE: f64 = 16.0;
+/// Least ratio of the decay times of two slopes.
+const LEAST_RATIO: f64 = 1.3;
+/// Power of the decay over the noise below which nothing is fitted, in dB.
+const LEAST_RANGE_DB: f64 = 10.0;
+
+/// One exponential decay.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slope {
+    /// Time in which it falls by 60 dB, in seconds.
+    pub t60_s: Estimate,
+    /// Power (mean square) at the start of the fit.
+    pub power: f64,
+    /// The same relative to the power of all slopes together, in dB: 0 for a single slope.
+    pub level_db: Estimate,
+}
+
+/// One to three decays and a noise floor, fitted to the energy of a band.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DecayFit {
+    slopes: Vec<Slope>,
+    noise_power: f64,
+    start_s: f64,
+    end_s: f64,
+    dispersion: f64,
+    parameters: Vec<f64>,
+    covariance: Vec<f64>,
+}
+
+/// What is fitted: mean power in a bin.
+#[derive(Clone, Copy, Debug)]
+struct Bin {
+    from_s: f64,
+    to_s: f64,
+    power: f64,
+    shape: f64,
+}
+
+impl DecayFit {
+    /// Fits squared samples (or energies) `energy`, `step_s` apart, from `start_s` to the end; time zero is the first of them.
+    /// `bandwidth_hz` is the bandwidth of the samples: half the sample rate for white noise.
+    ///
+    /// ```
+    /// use sabine_acoustics::DecayFit;
+    /// // A decay of 60 dB in 0.5 s that sinks into a floor 40 dB below its start.
+    /// let power = |t: f64| 10f64.powf(-6.0 * t / 0.5) + 1e-4;
+    /// let energy: Vec<f64> = (0..16000).map(|i| power(i as f64 / 16000.0)).collect();
+    /// let fit = DecayFit::fit(&energy, 1.0 / 16000.0, 0.0, 8000.0)?;
+    /// assert!((fit.t60_s().value - 0.5).abs() < 1e-3);
+    /// assert!((fit.knee_s() - 0.5 * 40.0 / 60.0).abs() < 2e-3);
+    /// # Ok::<(), sabine_acoustics::NoReading>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`NoReading::NoOnset`] for silence, [`NoReading::TooShort`] for fewer than 16 steps or less than 8 independent values,
+    /// [`NoReading::NoDecay`] where the level does not fall, [`NoReading::DynamicRange`] where it falls by less than 10 dB
+    /// before the noise or the end.
+    pub fn fit(energy: &[f64], step_s: f64, start_s: f64, bandwidth_hz: f64) -> Result<Self, NoReading> {
+        let first = (start_s / step_s).round().max(0.0) as usize;
+        let samples = energy.get(first..).unwrap_or(&[]);
+        let least = (8.0 / (bandwidth_hz * step_s)).ceil().max(16.0) as usize;
+        if samples.len() < least {
+            return Err(NoReading::TooShort {
+                needed_s: (first + least) as f64 * step_s,
+                available_s: energy.len() as f64 * step_s,
+            });
+        }
+        let floor = NoiseFloor::find(samples, step_s, bandwidth_hz)?;
+        let bins = bins(samples, step_s, bandwidth_hz, floor.knee_s);
+        let scale = bins.iter().fold(0.0_f64, |most, bin| most.max(bin.power));
+        let mut best = Model::single(&floor, scale).maximise(&bins);
+        while best.slopes() < MOST_SLOPES {
+            let Some(next) = best.with_one_more_slope(&bins, bandwidth_hz) else { break };
+            best = next;
+        }
+        let dispersion = best.dispersion(&bins);
+        let covariance = best.covariance(&bins, dispersion).ok_or(NoReading::NoDecay)?;
+        let fit = best.finish(covariance, dispersion, first as f64 * step_s, energy.len() as f64 * step_s);
+        fit.check()
+    }
+
+    /// The decays, the steepest first.
+    pub fn slopes(&self) -> &[Slope] {
+        &self.slopes
+    }
+
+    /// Mean square of the noise; zero where the response ends before any shows.
+    pub fn noise_power(&self) -> f64 {
+        self.noise_power
+    }
+
+    /// Start of the fit, in seconds.
+    pub fn start_s(&self) -> f64 {
+        self.start_s
+    }
+
+    /// Variance of the bins relative to that of Gaussian noise: 1 for an ideal decay. Standard errors include it.
+    pub fn dispersion(&self) -> f64 {
+        self.dispersion
+    }
+
+    /// Power of the decays, without the noise, at a time in seconds.
+    pub fn decay_power_at(&self, time_s: f64) -> f64 {
+        self.slopes
+            .iter()
+            .map(|slope| slope.power * (-(time_s - self.start_s) * LN_MILLION / slope.t60_s.value).exp())
+            .sum()
+    }
+
+    /// Energy of the decays from a time on, without the noise, divided by the step: what Schroeder integration would sum.
+    pub(crate) fn decay_energy_after(&self, time_s: f64, step_s: f64) -> f64 {
+        self.slopes
+            .iter()
+            .map(|slope| {
+                let tau_s = slope.t60_s.value / LN_MILLION;
+                slope.power * (-(time_s - self.start_s) / tau_s).exp() * tau_s / step_s
+            })
+            .sum()
+    }
+
+    /// When the decay has sunk to the noise, in seconds; the end of the response if that comes first.
+    pub fn knee_s(&self) -> f64 {
+        if self.decay_power_at(self.end_s) >= self.noise_power {
+            return self.end_s;
+        }
+        bisect(self.start_s, self.end_s, |t| self.decay_power_at(t) - self.noise_power)
+    }
+
+    /// Level of the decay at the start over its level at the knee, in dB.
+    pub fn range_db(&self) -> f64 {
+        10.0 * (self.decay_power_at(self.start_s) / self.decay_power_at(self.knee_s())).log10()
+    }
+
+    /// Reverberation time: twice the time in which the backward-integrated decay, free of noise, falls from -5 to -35 dB
+    /// below its value at the start of the fit. For one slope this is its own decay time.
+    pub fn t60_s(&self) -> Estimate {
+        let value = |parameters: &[f64]| {
+            let level_db = |t: f64| {
+                let energy = |t: f64| -> f64 {
+                    parameters.chunks_exact(2).map(|pair| (pair[0] - pair[1] - t * pair[1].exp()).exp()).sum()
+                };
+                10.0 * (energy(t) / energy(0.0)).log10()
+            };
+            let longest_s =
+                LN_MILLION / parameters.iter().skip(1).step_by(2).copied().fold(f64::MAX, f64::min).exp();
+            let when = |db: f64| bisect(0.0, 2.0 * longest_s, |t| level_db(t) - db);
+            2.0 * (when(-35.0) - when(-5.0))
+        };
+        let count = 2 * self.slopes.len();
+        let centre = value(&self.parameters[..count]);
+        let gradient: Vec<f64> = (0..count)
+            .map(|i| {
+                let mut shifted = self.parameters[..count].to_vec();
+                shifted[i] += 1e-4;
+                let above = value(&shifted);
+                shifted[i] -= 2e-4;
+                (above - value(&shifted)) / 2e-4
+            })
+            .collect();
+        let width = self.parameters.len();
+        let variance: f64 = (0..count)
+            .flat_map(|i| (0..count).map(move |j| (i, j)))
+            .map(|(i, j)| gradient[i] * gradient[j] * self.covariance[i * width + j])
+            .sum();
+        Estimate::new(centre, variance.max(0.0).sqrt())
+    }
+
+    fn check(self) -> Result<Self, NoReading> {
+        let available_db = self.range_db();
+        let plausible = self.slopes.iter().all(|slope| slope.t60_s.value.is_finite() && slope.power > 0.0);
+        if !plausible || available_db.is_nan() {
+            return Err(NoReading::NoDecay);
+        }
+        if available_db < LEAST_RANGE_DB {
+            return Err(NoReading::DynamicRange { needed_db: LEAST_RANGE_DB, available_db });
+        }
+        Ok(self)
+    }
+}
+
+/// A first guess of where the decay meets the noise (after Lundeby et al. 1995).
+struct NoiseFloor {
+    power: f64,
+    knee_s: f64,
+    rate_per_s: f64,
+    start_power: f64,
+}
+
+impl NoiseFloor {
+    fn find(samples: &[f64], step_s: f64, bandwidth_hz: f64) -> Result<Self, NoReading> {
+        // Blocks of about eight independent values: 1.5 dB of scatter.
+        let block = ((8.0 / (bandwidth_hz * step_s)).ceil() as usize).clamp(1, samples.len() / 2);
+        let block = block.max(samples.len() / 400);
+        let power: Vec<f64> =
+            samples.chunks_exact(block).map(|chunk| chunk.iter().sum::<f64>() / block as f64).collect();
+        let block_s = block as f64 * step_s;
+        let loudest = (0..power.len()).max_by(|&a, &b| power[a].total_cmp(&power[b])).unwrap_or(0);
+        if power[loudest] <= 0.0 {
+            return Err(NoReading::NoOnset);
+        }
+        let mean_from = |from: usize| {
+            let tail = &power[from.min(power.len() - power.len().div_ceil(10))..];
+            tail.iter().sum::<f64>() / tail.len() as f64
+        };
+        let mut noise = mean_from(power.len()).max(1e-20 * power[loudest]);
+        let mut found = None;
+        for _ in 0..6 {
+            let above = noise * 10f64.powf(0.5);
+            let end =
+                (loudest..power.len()).find(|&i| power[i] < above).unwrap_or(power.len()).max(loudest + 2);
+            let Some((level, rate)) = log_line(&power, loudest, end.min(power.len()), block_s) else { break };
+            if rate <= 0.0 {
+                break;
+            }
+            let knee_s = ((level - noise.ln()) / rate).clamp(block_s, power.len() as f64 * block_s);
+            found = Some((level, rate, knee_s));
+            // The floor is read 7 dB of decay after the knee.
+            noise = mean_from(((knee_s + 1.6 / rate) / block_s) as usize).max(1e-20 * power[loudest]);
+        }
+        let (level, rate_per_s, knee_s) = found.ok_or(NoReading::NoDecay)?;
+        Ok(Self { power: noise, knee_s, rate_per_s, start_power: level.exp() })
+    }
+}
+
+/// Least-squares line through the logarithm of powers `from..to`: its value at time zero and how fast it falls.
+fn log_line(power: &[f64], from: usize, to: usize, block_s: f64) -> Option<(f64, f64)> {
+    let (mut n, mut t1, mut y1, mut tt, mut ty) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for (i, &p) in power.iter().enumerate().take(to).skip(from).filter(|(_, p)| **p > 0.0) {
+        let (t, y) = ((i as f64 + 0.5) * block_s, p.ln());
+        n += 1.0;
+        t1 += t;
+        y1 += y;
+        tt += t * t;
+        ty += t * y;
+    }
+    let slope = (n * ty - t1 * y1) / (n * tt - t1 * t1);
+    slope.is_finite().then(|| ((y1 - slope * t1) / n, -slope))
+}
+
+/// Narrow bins up to a little beyond the knee, wide ones after it.
+fn bins(samples: &[f64], step_s: f64, bandwidth_hz: f64, knee_s: f64) -> Vec<Bin> {
+    let knee = ((1.2 * knee_s / step_s) as usize).clamp(1, samples.len());
+    let least = (1.0 / (bandwidth_hz * step_s)).ceil().max(1.0) as usize;
+    let fine = (knee / DECAY_BINS).max(least);
+    let coarse = ((samples.len() - knee) / FLOOR_BINS).max(fine);
+    let mut bins = Vec::with_capacity(DECAY_BINS + FLOOR_BINS + 2);
+    let mut from = 0;
+    while from < samples.len() {
+        let width = if from < knee { fine } else { coarse };
+        let to = (from + width).min(samples.len());
+        let power = samples[from..to].iter().sum::<f64>() / (to - from) as f64;
+        let (from_s, to_s) = (from as f64 * step_s, to as f64 * step_s);
+        bins.push(Bin { from_s, to_s, power, shape: bandwidth_hz * (to_s - from_s) });
+        from = to;
+    }
+    bins
+}
+
+/// The model: for each slope ln(power at time zero) and ln(rate), then ln(noise power).
+#[derive(Clone, Debug)]
+struct Model {
+    parameters: Vec<f64>,
+    deviance: f64,
+    /// Noise weaker than this share of the loudest bin counts as none.
+    least_noise: f64,
+}
+
+impl Model {
+    fn single(floor: &NoiseFloor, scale: f64) -> Self {
+        let least_noise = 1e-16 * scale;
+        let parameters = vec![
+            floor.start_power.max(least_noise).ln(),
+            floor.rate_per_s.ln(),
+            floor.power.max(least_noise).ln(),
+        ];
+        Self { parameters, deviance: f64::INFINITY, least_noise }
+    }
+
+    fn slopes(&self) -> usize {
+        self.parameters.len() / 2
+    }
+
+    /// Expected power in a bin and its derivatives by each parameter.
+    fn expect(parameters: &[f64], bin: &Bin, derivatives: &mut [f64]) -> f64 {
+        let width = bin.to_s - bin.from_s;
+        let mut total = 0.0;
+        for k in 0..parameters.len() / 2 {
+            let (power, rate) = (parameters[2 * k].exp(), parameters[2 * k + 1].exp());
+            let (e0, e1) = ((-rate * bin.from_s).exp(), (-rate * bin.to_s).exp());
+            let mean = if rate * width > 1e-6 {
+                (e0 - e1) / (rate * width)
+            } else {
+                (-rate * 0.5 * (bin.from_s + bin.to_s)).exp()
+            };
+            derivatives[2 * k] = power * mean;
+            derivatives[2 * k + 1] = power * ((e1 * bin.to_s - e0 * bin.from_s) / width - mean);
+            total += power * mean;
+        }
+        let noise = parameters[parameters.len() - 1].exp();
+        derivatives[parameters.len() - 1] = noise;
+        total + noise
+    }
+
+    /// Twice the negative log-likelihood, up to a constant of the data.
+    fn deviance(parameters: &[f64], bins: &[Bin]) -> f64 {
+        let mut derivatives = vec![0.0; parameters.len()];
+        bins.iter()
+            .map(|bin| {
+                let expected = Self::expect(parameters, bin, &mut derivatives);
+                2.0 * bin.shape * (bin.power / expected + expected.ln())
+            })
+            .sum()
+    }
+
+    /// Score and Fisher information.
+    fn score(&self, bins: &[Bin]) -> (Vec<f64>, Vec<f64>) {
+        let n = self.parameters.len();
+        let (mut score, mut information) = (vec![0.0; n], vec![0.0; n * n]);
+        let mut derivatives = vec![0.0; n];
+        for bin in bins {
+            let expected = Self::expect(&self.parameters, bin, &mut derivatives);
+            let residual = bin.shape * (bin.power / expected - 1.0) / expected;
+            let weight = bin.shape / (expected * expected);
+            for i in 0..n {
+                score[i] += residual * derivatives[i];
+                for j in 0..=i {
+                    information[i * n + j] += weight * derivatives[i] * derivatives[j];
+                }
+            }
+        }
+        for i in 0..n {
+            for j in 0..i {
+                information[j * n + i] = information[i * n + j];
+            }
+        }
+        (score, information)
+    }
+
+    /// Fisher scoring with Levenberg's damping.
+    fn maximise(mut self, bins: &[Bin]) -> Self {
+        let n = self.parameters.len();
+        let mut damping = 1e-3;
+        self.deviance = Self::deviance(&self.parameters, bins);
+        for _ in 0..ITERATIONS {
+            let (score, information) = self.score(bins);
+            let mut damped = information.clone();
+            for i in 0..n {
+                damped[i * n + i] += damping * information[i * n + i] + 1e-9;
+            }
+            let Some(mut step) = solve(&damped, &score) else { break };
+            for x in &mut step {
+                *x = x.clamp(-1.0, 1.0);
+            }
+            let mut tried: Vec<f64> = self.parameters.iter().zip(&step).map(|(p, s)| p + s).collect();
+            tried[n - 1] = tried[n - 1].max(self.least_noise.ln());
+            let deviance = Self::deviance(&tried, bins);
+            if deviance <= self.deviance {
+                let gain = self.deviance - deviance;
+                self.parameters = tried;
+                self.deviance = deviance;
+                damping = (damping * 0.2).max(1e-9);
+                if gain < 1e-5 {
+                    break;
+                }
+            } else {
+                damping *= 8.0;
+                if damping > 1e8 {
+                    break;
+                }
+            }
+        }
+        self
+    }
+
+    /// The model with one more slope, if the data ask for it.
+    fn with_one_more_slope(&self, bins: &[Bin], bandwidth_hz: f64) -> Option<Self> {
+        let n = self.parameters.len();
+        let end_s = bins.last()?.to_s;
+        let slowest = self.parameters[1..n - 1].iter().step_by(2).copied().fold(f64::MAX, f64::min).exp();
+        let total: f64 = self.parameters[..n - 1].iter().step_by(2).map(|p| p.exp()).sum();
+        let mut best: Option<Self> = None;
+        for (ratio, level) in [(0.4, 0.1), (0.4, 0.003), (0.15, 0.001), (3.0, 1.0)] {
+            let mut parameters = self.parameters[..n - 1].to_vec();
+            parameters.extend([(total * level).ln(), (slowest * ratio).ln(), self.parameters[n - 1]]);
+            let tried = Self { parameters, ..self.clone() }.maximise(bins);
+            if best.as_ref().is_none_or(|best| tried.deviance < best.deviance) {
+                best = Some(tried);
+            }
+        }
+        let dispersion = self.dispersion(bins).min(best.as_ref()?.dispersion(bins)).max(1.0);
+        let independent = bandwidth_hz * end_s;
+        let needed = SLOPE_EVIDENCE.max(2.0 * independent.ln());
+        best.filter(|best| {
+            (self.deviance - best.deviance) / dispersion > needed && best.is_physical(end_s, bandwidth_hz)
+        })
+    }
+
+    /// Slopes far enough apart, each long enough to be seen and falling within the response.
+    fn is_physical(&self, end_s: f64, bandwidth_hz: f64) -> bool {
+        let mut times: Vec<f64> = self.parameters[1..self.parameters.len() - 1]
+            .iter()
+            .step_by(2)
+            .map(|rate| LN_MILLION / rate.exp())
+            .collect();
+        times.sort_by(f64::total_cmp);
+        times.windows(2).all(|pair| pair[1] > LEAST_RATIO * pair[0])
+            && times.iter().all(|&t| t < 6.0 * end_s && bandwidth_hz * t > 8.0)
+    }
+
+    /// Pearson's chi-squared per degree of freedom, over groups of bins that hold at least eight independent values each.
+    fn dispersion(&self, bins: &[Bin]) -> f64 {
+        let mut derivatives = vec![0.0; self.parameters.len()];
+        let (mut chi_squared, mut groups) = (0.0, 0.0);
+        let (mut shape, mut sum) = (0.0, 0.0);
+        for bin in bins {
+            let expected = Self::expect(&self.parameters, bin, &mut derivatives);
+            shape += bin.shape;
+            sum += bin.shape * (bin.power / expected - 1.0);
+            if shape >= 8.0 {
+                chi_squared += sum * sum / shape;
+                groups += 1.0;
+                (shape, sum) = (0.0, 0.0);
+            }
+        }
+        let freedom = groups - self.parameters.len() as f64;
+        if freedom >= 4.0 { chi_squared / freedom } else { 1.0 }
+    }
+
+    /// Inverse of the information; a floor that does not show has no say.
+    fn covariance(&self, bins: &[Bin], dispersion: f64) -> Option<Vec<f64>> {
+        let n = self.parameters.len();
+        let (_, mut information) = self.score(bins);
+        let floor = n * n - 1;
+        if information[floor] < 1e-3 {
+            for i in 0..n {
+                information[i * n + n - 1] = 0.0;
+                information[(n - 1) * n + i] = 0.0;
+            }
+            information[floor] = 1.0;
+        }
+        let mut covariance = vec![0.0; n * n];
+        for i in 0..n {
+            let mut unit = vec![0.0; n];
+            unit[i] = dispersion.max(1.0);
+            let column = solve(&information, &unit)?;
+            for (j, x) in column.into_iter().enumerate() {
+                covariance[j * n + i] = x;
+            }
+        }
+        Some(covariance)
+    }
+
+    fn finish(self, covariance: Vec<f64>, dispersion: f64, start_s: f64, end_s: f64) -> DecayFit {
+        let n = self.parameters.len();
+        let noise = self.parameters[n - 1].exp();
+        let total: f64 = self.parameters[..n - 1].iter().step_by(2).map(|p| p.exp()).sum();
+        let mut slopes: Vec<Slope> = (0..self.slopes())
+            .map(|k| {
+                let power = self.parameters[2 * k].exp();
+                let t60_s = LN_MILLION / self.parameters[2 * k + 1].exp();
+                let sd = |i: usize| covariance[i * n + i].max(0.0).sqrt();
+                let level_db = 10.0 * (power / total).log10();
+                Slope {
+                    t60_s: Estimate::new(t60_s, t60_s * sd(2 * k + 1)),
+                    power,
+                    level_db: Estimate::new(level_db, 10.0 / std::f64::consts::LN_10 * sd(2 * k)),
+                }
+            })
+            .collect();
+        slopes.sort_by(|a, b| a.t60_s.value.total_cmp(&b.t60_s.value));
+        DecayFit {
+            slopes,
+            noise_power: if noise > 1.01 * self.least_noise { noise } else { 0.0 },
+            start_s,
+            end_s,
+            dispersion,
+            parameters: self.parameters,
+            covariance,
+        }
+    }
+}
+
+/// Solves a symmetric positive definite system by Cholesky's method; none if it is not.
+fn solve(matrix: &[f64], right: &[f64]) -> Option<Vec<f64>> {
+    let n = right.len();
+    let mut lower = vec![0.0; n * n];
+    for i in 0..n {
+        for j in 0..=i {
+            let sum: f64 = (0..j).map(|k| lower[i * n + k] * lower[j * n + k]).sum();
+            let rest = matrix[i * n + j] - sum;
+            if i == j {
+                if rest.is_nan() || rest <= 0.0 {
+                    return None;
+                }
+                lower[i * n + i] = rest.sqrt();
+            } else {
+                lower[i * n + j] = rest / lower[j * n + j];
+            }
+        }
+    }
+    let mut x = right.to_vec();
+    for i in 0..n {
+        let sum: f64 = (0..i).map(|k| lower[i * n + k] * x[k]).sum();
+        x[i] = (x[i] - sum) / lower[i * n + i];
+    }
+    for i in (0..n).rev() {
+        let sum: f64 = (i + 1..n).map(|k| lower[k * n + i] * x[k]).sum();
+        x[i] = (x[i] - sum) / lower[i * n + i];
+    }
+    Some(x)
+}
+
+/// Where a falling function crosses zero.
+fn bisect(mut low: f64, mut high: f64, falling: impl Fn(f64) -> f64) -> f64 {
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if falling(middle) > 0.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}

@@ -1,0 +1,117 @@
+//! The spectrum of a padded signal, filtered by gains at frequencies.
+
+use realfft::num_complex::Complex;
+use realfft::{RealFftPlanner, RealToComplex};
+use std::cell::RefCell;
+use std::sync::Arc;
+
+thread_local! {
+    /// Plans made so far: planning a length costs more than transforming it.
+    static PLANNER: RefCell<RealFftPlanner<f64>> = RefCell::new(RealFftPlanner::new());
+}
+
+/// Spectrum of a real signal followed by silence.
+#[derive(Clone, Debug)]
+pub(crate) struct Spectrum {
+    bins: Vec<Complex<f64>>,
+    samples: usize,
+    transform_len: usize,
+    bin_hz: f64,
+}
+
+impl Spectrum {
+    /// Transforms `samples` with at least `padding_s` of silence after them.
+    pub(crate) fn new(samples: &[f64], sample_rate_hz: u32, padding_s: f64) -> Self {
+        let rate = f64::from(sample_rate_hz);
+        let transform_len = fast_len(samples.len() + (padding_s * rate).ceil() as usize);
+        let forward: Arc<dyn RealToComplex<f64>> =
+            PLANNER.with(|planner| planner.borrow_mut().plan_fft_forward(transform_len));
+        let mut padded = samples.to_vec();
+        padded.resize(transform_len, 0.0);
+        let mut bins = forward.make_output_vec();
+        // Fails only for buffers of the wrong length, and these were made for the plan.
+        let done = forward.process(&mut padded, &mut bins);
+        debug_assert!(done.is_ok());
+        Self { bins, samples: samples.len(), transform_len, bin_hz: rate / transform_len as f64 }
+    }
+
+    /// The signal filtered by a real gain, which is evaluated (and taken as not zero) within `support_hz` only.
+    pub(crate) fn filtered(&self, support_hz: (f64, f64), gain: impl Fn(f64) -> f64) -> Vec<f64> {
+        let inverse = PLANNER.with(|planner| planner.borrow_mut().plan_fft_inverse(self.transform_len));
+        let mut product = inverse.make_input_vec();
+        let scale = 1.0 / self.transform_len as f64;
+        for i in self.range(support_hz) {
+            product[i] = self.bins[i] * (scale * gain(i as f64 * self.bin_hz));
+        }
+        // A real signal has no imaginary part at zero and at half the sample rate.
+        product[0].im = 0.0;
+        if self.transform_len.is_multiple_of(2) {
+            product[self.transform_len / 2].im = 0.0;
+        }
+        let mut output = inverse.make_output_vec();
+        let done = inverse.process(&mut product, &mut output);
+        debug_assert!(done.is_ok());
+        output.truncate(self.samples);
+        output
+    }
+
+    /// Energy (sum of squared samples) of the signal filtered by a gain.
+    pub(crate) fn energy(&self, support_hz: (f64, f64), gain: impl Fn(f64) -> f64) -> f64 {
+        let sum: f64 = self
+            .range(support_hz)
+            .map(|i| {
+                // Every bin stands for itself and its mirror image, but for the two ends.
+                let ends = i == 0 || 2 * i == self.transform_len;
+                (if ends { 1.0 } else { 2.0 })
+                    * self.bins[i].norm_sqr()
+                    * gain(i as f64 * self.bin_hz).powi(2)
+            })
+            .sum();
+        sum / self.transform_len as f64
+    }
+
+    fn range(&self, support_hz: (f64, f64)) -> std::ops::Range<usize> {
+        let last = self.bins.len() as f64;
+        let low = (support_hz.0 / self.bin_hz).floor().clamp(0.0, last) as usize;
+        let high = ((support_hz.1 / self.bin_hz).ceil() + 1.0).clamp(0.0, last) as usize;
+        low..high
+    }
+}
+
+/// The next even length whose only prime factors are 2, 3 and 5.
+fn fast_len(least: usize) -> usize {
+    let mut best = least.max(2).next_power_of_two();
+    for threes_and_fives in [3, 5, 9, 15, 25, 27, 45, 75, 81, 125, 135, 225] {
+        let mut candidate = 2 * threes_and_fives;
+        while candidate < least {
+            candidate *= 2;
+        }
+        best = best.min(candidate);
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn energy_is_that_of_the_filtered_samples() {
+        let samples: Vec<f64> = (0..500).map(|i| (f64::from(i) * 0.7).sin() + 0.1).collect();
+        let spectrum = Spectrum::new(&samples, 8000, 0.5);
+        let all = (0.0, f64::INFINITY);
+        let direct: f64 = samples.iter().map(|x| x * x).sum();
+        assert!((spectrum.energy(all, |_| 1.0) / direct - 1.0).abs() < 1e-12);
+        for (x, y) in samples.iter().zip(spectrum.filtered(all, |_| 1.0)) {
+            assert!((x - y).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn lengths_are_fast_and_long_enough() {
+        for least in [1, 2, 3, 1000, 28001, 100_000] {
+            let len = fast_len(least);
+            assert!(len >= least && len.is_multiple_of(2) && len <= 2 * least + 2, "{least}: {len}");
+        }
+    }
+}
