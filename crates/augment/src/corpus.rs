@@ -215,6 +215,13 @@ impl ResponseCorpus {
         Ok(())
     }
 
+    /// Adds the responses of another folder.
+    pub fn extend(&mut self, other: Self) {
+        self.responses.extend(other.responses);
+        self.files.extend(other.files);
+        self.left_out.extend(other.left_out);
+    }
+
     /// The responses.
     pub fn responses(&self) -> &[MeasuredResponse] {
         &self.responses

@@ -134,7 +134,8 @@ impl SyntheticRooms {
         let colour_db = eq_curve_db(rng, self.config.eq_inflation);
         let mut sum = vec![Complex32::new(0.0, 0.0); split.length() / 2 + 1];
         let images = images(&room, rng);
-        let mut late_energy = 0.0;
+        // Energies of the late part and of a direct sound of amplitude one, both in the colour drawn.
+        let (mut late_energy, mut direct_unit) = (0.0, 1e-12);
         for band in 0..split.bands() {
             let mut track = vec![0.0_f32; samples];
             let step = |t60: f64| (-0.5 * SIXTY_DB / (t60 * rate)).exp() as f32;
@@ -156,13 +157,16 @@ impl SyntheticRooms {
             }
             let spectrum = split.spectrum(&track)?;
             let gain = 10f32.powf(colour_db[band] as f32 / 20.0);
-            late_energy += track.iter().map(|s| f64::from(s * s)).sum::<f64>() / split.bands() as f64;
+            let share = f64::from(split.weights(band).iter().sum::<f32>()) / split.weights(band).len() as f64;
+            let coloured = f64::from(gain).powi(2) * share;
+            late_energy += track.iter().map(|s| f64::from(s * s)).sum::<f64>() * coloured;
+            direct_unit += coloured;
             for ((total, s), w) in sum.iter_mut().zip(&spectrum).zip(split.weights(band)) {
                 *total += s * (w * gain);
             }
         }
         let mut response = split.signal(sum, samples)?;
-        self.place_direct(rng, &room, &colour_db, late_energy, split, &mut response)?;
+        self.place_direct(rng, &room, &colour_db, late_energy / direct_unit, split, &mut response)?;
         if rng.random::<f64>() < self.config.noise_floor_fraction {
             let peak = response.iter().fold(0.0_f32, |p, s| p.max(s.abs()));
             let level = peak * 10f32.powf(rng.random_range(-85.0..-55.0_f32) / 20.0);
