@@ -32,7 +32,7 @@ mod traits;
 
 pub use air::Air;
 pub use atomic_file::write_atomically;
-pub use audio::{AudioInfo, Channel, SampleFormat, probe_wav, read_audio, write_wav};
+pub use audio::{AudioInfo, Channel, SampleFormat, encode_wav, probe_wav, read_audio, write_wav};
 pub use bands::{OctaveBands, PerBand};
 pub use decay_fit::{DecayFit, Slope};
 pub use energy::{EnergyDecayCurve, EnergyResponse};
