@@ -20,6 +20,7 @@ mod scene;
 mod signal;
 mod spectrum;
 mod targets;
+mod theory;
 mod third_octaves;
 mod traits;
 
@@ -39,5 +40,6 @@ pub use progress::{Observer, report};
 pub use scene::{NamedMaterial, Receiver, Scene, Source, Triangle};
 pub use signal::{ImpulseResponse, Signal};
 pub use targets::RoomTargets;
+pub use theory::{DiffuseRoom, schroeder_frequency_hz};
 pub use third_octaves::ThirdOctaveBands;
 pub use traits::{Augment, FeatureExtractor, Objective, Propagator, RayHit, RayScene, RoomEstimator};
