@@ -27,6 +27,7 @@ mod scene;
 mod signal;
 mod spectrum;
 mod targets;
+mod theory;
 mod third_octaves;
 mod traits;
 
@@ -53,5 +54,6 @@ pub use resample::{resample, resample_response};
 pub use scene::{NamedMaterial, Receiver, Scene, Source, Triangle};
 pub use signal::{ImpulseResponse, Signal};
 pub use targets::RoomTargets;
+pub use theory::{DiffuseRoom, schroeder_frequency_hz};
 pub use third_octaves::ThirdOctaveBands;
 pub use traits::{Augment, FeatureExtractor, Objective, Propagator, RayHit, RayScene, RoomEstimator};
