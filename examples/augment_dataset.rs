@@ -37,6 +37,9 @@ struct Arguments {
     /// Clips in a shard.
     #[arg(long, default_value_t = 512)]
     shard_size: usize,
+    /// Clips (other speech, other noise) that share a response.
+    #[arg(long, default_value_t = 4)]
+    clips_per_response: usize,
     /// Make only every N-th shard, from the I-th (I from 1): `--worker 2/8`.
     #[arg(long, default_value = "1/1")]
     worker: WorkerArgument,
@@ -101,7 +104,7 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         ControlFlow::Continue(())
     };
     let rate_hz = 16_000;
-    let mut config = DatasetConfig { seed: arguments.seed, shard_clips: arguments.shard_size, ..DatasetConfig::default() };
+    let mut config = DatasetConfig { seed: arguments.seed, shard_clips: arguments.shard_size, clips_per_response: arguments.clips_per_response, ..DatasetConfig::default() };
     if let Some(counts) = &arguments.counts {
         config.clips = [counts[0], counts[1], counts[2]];
     } else if let Some(count) = arguments.count {
@@ -127,7 +130,7 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     };
     for (what, left_out) in [("speech", speech.left_out()), ("response", responses.left_out())] {
         for file in left_out {
-            bar.println(format!("left out: {what} {}: {}", file.path, file.reason));
+            bar.suspend(|| eprintln!("left out: {what} {}: {}", file.path, file.reason));
         }
     }
     let builder = DatasetBuilder::new(config, speech, responses, noise)?;
@@ -135,7 +138,7 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         let of = |dealt: &std::collections::BTreeMap<String, Partition>| {
             dealt.iter().filter(|(_, p)| **p == partition).map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(" ")
         };
-        bar.println(format!("{partition}: rooms {}", of(builder.room_partitions())));
+        bar.suspend(|| eprintln!("{partition}: rooms {}", of(builder.room_partitions())));
     }
     let start = Instant::now();
     let built = builder.build(&arguments.out, arguments.worker.0, arguments.resume, &observer)?;

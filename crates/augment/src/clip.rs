@@ -169,10 +169,6 @@ impl ClipMaker {
         self.log_mel.frames(self.samples)
     }
 
-    pub(crate) fn samples(&self) -> usize {
-        self.samples
-    }
-
     pub(crate) fn scratch(&self) -> ClipScratch {
         ClipScratch { log_mel: self.log_mel.scratch(), input: Vec::new(), output: Vec::new(), spectrum: Vec::new() }
     }

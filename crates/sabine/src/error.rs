@@ -23,7 +23,9 @@ pub enum Error {
         peak: f32,
     },
     /// A recording whose peaks are cut off.
-    #[error("{recording}: clipped ({percent:.1} % of the samples are cut off): record it again at a lower level")]
+    #[error(
+        "{recording}: clipped ({percent:.1} % of the samples are cut off): record it again at a lower level"
+    )]
     Clipped {
         /// Name of the recording.
         recording: String,
@@ -31,7 +33,9 @@ pub enum Error {
         percent: f64,
     },
     /// No path leads from the source to the receiver.
-    #[error("no path reaches receiver \"{receiver}\" from source \"{source_id}\": is one of them closed off?")]
+    #[error(
+        "no path reaches receiver \"{receiver}\" from source \"{source_id}\": is one of them closed off?"
+    )]
     NoPath {
         /// The source.
         source_id: String,

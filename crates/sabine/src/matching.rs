@@ -2,9 +2,9 @@
 
 use crate::{Error, Recording, Warning};
 use sabine_acoustics::{
-    Air, EnergyDecayCurve, Estimate, FilterBank, ImpulseResponse, Material, MeasuredRoom, Observer, OctaveBands,
-    PathSet, PerBand, Propagator, Reading, RoomEstimator, RoomParameters, RoomTargets, Signal, equalisation, report,
-    resample,
+    Air, EnergyDecayCurve, Estimate, FilterBank, ImpulseResponse, Material, MeasuredRoom, Observer,
+    OctaveBands, PathSet, PerBand, Propagator, Reading, RoomEstimator, RoomParameters, RoomTargets, Signal,
+    equalisation, report, resample,
 };
 use sabine_eqfilter::{AboveBand, EqFilter, EqFilterConfig};
 use sabine_estimator::Estimator;
@@ -222,13 +222,13 @@ fn match_targets(
             STANDARD_RATE_HZ
         }
     };
-    let renderer = PressureRenderer::new(RenderConfig { sample_rate_hz, seed: config.seed, ..RenderConfig::default() })?;
+    let renderer =
+        PressureRenderer::new(RenderConfig { sample_rate_hz, seed: config.seed, ..RenderConfig::default() })?;
     let fitter = MaterialFitter::new(config.fit.clone())?;
     let mut aim = targets.t60_s().clone();
     let mut corrections = 0;
     let (fit, response, parameters) = loop {
-        let fit =
-            fitter.fit_t60(&[&paths], &materials_before, &priors, &air, &aim, observer)?;
+        let fit = fitter.fit_t60(&[&paths], &materials_before, &priors, &air, &aim, observer)?;
         clock.lap("fit");
         let response = renderer.render(&paths, &fit.materials, &air)?;
         let parameters = RoomParameters::measure(&response, OctaveBands::T60)?;
@@ -333,7 +333,11 @@ fn eq_gains(
     Ok(PerBand::from_fn(bands, |band| {
         let gain = gains.values()[band];
         if gain.abs() > largest_db {
-            warnings.push(Warning::EqLimited { band_hz: bands.nominal_hz(band), wanted_db: gain, limit_db: largest_db });
+            warnings.push(Warning::EqLimited {
+                band_hz: bands.nominal_hz(band),
+                wanted_db: gain,
+                limit_db: largest_db,
+            });
         }
         gain.clamp(-largest_db, largest_db)
     }))

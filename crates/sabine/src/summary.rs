@@ -72,7 +72,8 @@ impl MatchSummary {
             .iter()
             .zip(before_after)
             .map(|(name, (before, after))| {
-                let at_bands = |absorption: &PerBand<f64>| absorption.resampled(t60.bands()).values().to_vec();
+                let at_bands =
+                    |absorption: &PerBand<f64>| absorption.resampled(t60.bands()).values().to_vec();
                 let change = MaterialChange {
                     before: at_bands(before.absorption()),
                     after: at_bands(after.absorption()),
