@@ -3,7 +3,6 @@
 //! Under construction: the front page follows.
 
 mod air;
-mod band_energy;
 mod atomic_file;
 mod audio;
 #[cfg(feature = "symphonia")]
@@ -21,10 +20,6 @@ mod material_library;
 mod measured_room;
 mod onset;
 mod parameters;
-mod onset;
-mod parameters;
-mod material_library;
-mod measured_room;
 mod paths;
 mod progress;
 mod resample;
@@ -47,8 +42,6 @@ pub use error::Error;
 pub use estimate::{Estimate, NoReading, Reading};
 pub use filter_bank::{FilterBank, ThirdOctaveFilterBank};
 pub use material::Material;
-pub use onset::Onset;
-pub use parameters::{BandParameters, RoomParameters};
 pub use material_library::{LibraryMaterial, library_material, material_library};
 pub use measured_room::{
     Levels, MaterialPrior, MeasuredRoom, Measurement, NewResponse, NewRoom, ResponseEntry, TimeZero,

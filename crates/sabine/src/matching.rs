@@ -3,7 +3,7 @@
 use crate::{Error, Recording, Warning};
 use sabine_acoustics::{
     Air, EnergyDecayCurve, Estimate, FilterBank, ImpulseResponse, Material, MeasuredRoom, Observer,
-    OctaveBands, PathSet, PerBand, Propagator, Reading, RoomEstimator, RoomParameters, RoomTargets, Signal,
+    OctaveBands, PerBand, Propagator, Reading, RoomEstimator, RoomParameters, RoomTargets, Signal,
     equalisation, report, resample,
 };
 use sabine_eqfilter::{AboveBand, EqFilter, EqFilterConfig};
