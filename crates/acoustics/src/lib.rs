@@ -4,6 +4,11 @@
 
 mod air;
 mod band_energy;
+mod atomic_file;
+mod audio;
+#[cfg(feature = "symphonia")]
+mod audio_symphonia;
+mod band_energy;
 mod bands;
 mod decay_fit;
 mod energy;
@@ -12,10 +17,17 @@ mod error;
 mod estimate;
 mod filter_bank;
 mod material;
+mod material_library;
+mod measured_room;
 mod onset;
 mod parameters;
+mod onset;
+mod parameters;
+mod material_library;
+mod measured_room;
 mod paths;
 mod progress;
+mod resample;
 mod scene;
 mod signal;
 mod spectrum;
@@ -25,6 +37,8 @@ mod third_octaves;
 mod traits;
 
 pub use air::Air;
+pub use atomic_file::write_atomically;
+pub use audio::{AudioInfo, Channel, SampleFormat, encode_wav, probe_wav, read_audio, write_wav};
 pub use bands::{OctaveBands, PerBand};
 pub use decay_fit::{DecayFit, Slope};
 pub use energy::{EnergyDecayCurve, EnergyResponse};
@@ -35,8 +49,15 @@ pub use filter_bank::{FilterBank, ThirdOctaveFilterBank};
 pub use material::Material;
 pub use onset::Onset;
 pub use parameters::{BandParameters, RoomParameters};
+pub use material_library::{LibraryMaterial, library_material, material_library};
+pub use measured_room::{
+    Levels, MaterialPrior, MeasuredRoom, Measurement, NewResponse, NewRoom, ResponseEntry, TimeZero,
+};
+pub use onset::Onset;
+pub use parameters::{BandParameters, RoomParameters};
 pub use paths::{Contribution, PathSet, Reflection};
 pub use progress::{Observer, report};
+pub use resample::{resample, resample_response};
 pub use scene::{NamedMaterial, Receiver, Scene, Source, Triangle};
 pub use signal::{ImpulseResponse, Signal};
 pub use targets::RoomTargets;
