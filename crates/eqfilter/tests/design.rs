@@ -50,7 +50,11 @@ fn alternating_15_db_is_met_in_every_octave_at_every_rate() {
             for (b, (_, wanted_db)) in wanted.iter().enumerate() {
                 let found = octave_gain_db(filter.taps(), bands.exact_hz(b), rate_hz);
                 let hz = bands.nominal_hz(b);
-                assert!((found - wanted_db).abs() < 0.1, "{rate_hz} Hz, {hz} Hz: {found} != {wanted_db}, {:?}", filter.realised_db().values()[b]);
+                assert!(
+                    (found - wanted_db).abs() < 0.1,
+                    "{rate_hz} Hz, {hz} Hz: {found} != {wanted_db}, {:?}",
+                    filter.realised_db().values()[b]
+                );
             }
         }
     }
