@@ -13,6 +13,7 @@ mod history;
 mod objective;
 mod single_paths;
 mod uncertainty;
+mod variables;
 
 pub use bounded::{Minimum, minimise};
 pub use config::{AbsorptionPrior, FitConfig, SlopeObjective};
@@ -22,3 +23,4 @@ pub use fit::{
 };
 pub use fitter::MaterialFitter;
 pub use objective::SlopeEvaluation;
+pub use variables::{ForArgmin, Logit, RegularisedSlope};
