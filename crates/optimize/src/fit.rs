@@ -78,7 +78,7 @@ pub enum UnreachableReason {
         /// The target, in seconds.
         target_s: f64,
     },
-    /// No energy arrives in the band, or all at once.
+    /// No energy arrives in the band, or all at once: its decay cannot be read.
     NoEnergy,
 }
 

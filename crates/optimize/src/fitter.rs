@@ -175,7 +175,9 @@ impl MaterialFitter {
 
     /// Why the target of a band is not met; `None` where it is.
     fn unreachable(&self, band: &Band<'_>, found: &Fitted, limit_s: f64) -> Option<UnreachableReason> {
-        let Some(residual) = found.residual else { return Some(UnreachableReason::NoEnergy) };
+        let Some(residual) = found.residual.filter(|_| found.t60_s.is_ok()) else {
+            return Some(UnreachableReason::NoEnergy);
+        };
         if residual.abs() <= self.config.target_tolerance {
             return None;
         }
