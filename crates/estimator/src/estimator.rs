@@ -205,14 +205,9 @@ impl Estimator {
     }
 
     fn novelty(&self, window: &[f32]) -> f64 {
-        let calibration = &self.model.calibration;
         let mut statistics = Vec::new();
         spectrum(window, self.model.layout.frames, &mut statistics);
-        let squares = statistics
-            .iter()
-            .zip(calibration.statistic_mean.iter().zip(&calibration.statistic_deviation))
-            .map(|(v, (mean, deviation))| ((f64::from(*v) - mean) / deviation).powi(2));
-        (squares.sum::<f64>() / statistics.len() as f64).sqrt()
+        self.model.calibration.novelty(&statistics)
     }
 
     /// One answer from many: the mean weighted by precision and `weights`, label by label.
