@@ -1,7 +1,7 @@
 //! Makes a reverberant recording out of dry speech, a measured impulse response and noise, at a stated signal-to-noise ratio.
 
 use clap::Parser;
-use sabine::acoustics::{Channel, Signal, WavFormat, read_audio, resample, wav_bytes};
+use sabine::acoustics::{Channel, Signal, SampleFormat, encode_wav, read_audio, resample};
 use sabine::eqfilter::convolve;
 use sabine_examples::OutputFolder;
 use std::error::Error;
@@ -64,7 +64,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error + Send + Sync>> {
     let folder = arguments.out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let name = arguments.out.file_name().ok_or("--out: not a file name")?.to_string_lossy();
     let mut out = OutputFolder::create(folder)?;
-    out.write(&name, &wav_bytes(&Signal::new(wet, arguments.rate)?, WavFormat::Pcm16)?)?;
+    out.write(&name, &encode_wav(&Signal::new(wet, arguments.rate)?, SampleFormat::Int16)?)?;
     out.finish()?;
     Ok(())
 }

@@ -5,9 +5,9 @@
 mod report;
 
 use clap::Parser;
-use sabine::acoustics::{Channel, MeasuredRoom, OutputFolder, Signal, WavFormat, read_audio, wav_bytes};
+use sabine::acoustics::{Channel, MeasuredRoom, SampleFormat, Signal, encode_wav, read_audio};
 use sabine::{MatchConfig, MatchInput, MatchSummary, Recording, RoomMatch, match_room, materials_toml};
-use sabine_examples::Bar;
+use sabine_examples::{Bar, OutputFolder};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -81,7 +81,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error + Send + Sync>> {
     bar.finish();
 
     let summary = MatchSummary::new(&matched);
-    write_results(&mut out, &input, &matched, &summary)?;
+    write_results(&mut out, &input, &room_path.display().to_string(), &matched, &summary)?;
     out.finish()?;
     print_summary(&summary, &arguments.out);
     Ok(())
@@ -90,17 +90,18 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error + Send + Sync>> {
 fn write_results(
     out: &mut OutputFolder,
     input: &MatchInput<'_>,
+    room_name: &str,
     matched: &RoomMatch,
     summary: &MatchSummary,
 ) -> Result<(), Box<dyn Error + Send + Sync>> {
     let response = Signal::from(matched.response.clone());
     let filter = Signal::new(matched.eq_filter.taps().to_vec(), matched.eq_filter.sample_rate_hz())?;
-    out.write("matched.wav", &wav_bytes(&matched.matched, WavFormat::Pcm24)?)?;
-    out.write("impulse_response.wav", &wav_bytes(&response, WavFormat::Float32)?)?;
-    out.write("eq_filter.wav", &wav_bytes(&filter, WavFormat::Float32)?)?;
+    out.write("matched.wav", &encode_wav(&matched.matched, SampleFormat::Int24)?)?;
+    out.write("impulse_response.wav", &encode_wav(&response, SampleFormat::Float32)?)?;
+    out.write("eq_filter.wav", &encode_wav(&filter, SampleFormat::Float32)?)?;
     out.write("materials.toml", materials_toml(matched)?.as_bytes())?;
     out.write("match.json", summary.to_json()?.as_bytes())?;
-    out.write("report.html", report::html(input, matched, summary)?.as_bytes())?;
+    out.write("report.html", report::html(input, room_name, matched, summary)?.as_bytes())?;
     Ok(())
 }
 

@@ -1,6 +1,6 @@
 //! The page that a person would rather look at than read.
 
-use sabine::acoustics::{EnergyDecayCurve, PerBand, Reading, Signal, WavFormat, resample, wav_bytes};
+use sabine::acoustics::{EnergyDecayCurve, PerBand, Reading, Signal, SampleFormat, encode_wav, resample};
 use sabine::{DECAY_STEP_S, MatchInput, MatchSummary, RoomMatch};
 use sabine_examples::{Chart, Look, Page, Scale, Series, escape, spectrogram_png};
 use std::error::Error;
@@ -11,13 +11,13 @@ type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
 const NORMAL_90: f64 = 1.645;
 
 /// The report as one HTML file.
-pub fn html(input: &MatchInput<'_>, matched: &RoomMatch, summary: &MatchSummary) -> Result<String> {
+pub fn html(input: &MatchInput<'_>, room_name: &str, matched: &RoomMatch, summary: &MatchSummary) -> Result<String> {
     let mut page = Page::new("Your room, matched");
     page.paragraph(&format!(
         "From {} of speech in {} the room's sound was estimated, the materials of its model ({}) were fitted, and {} was placed at \"{}\" and heard at \"{}\".",
         seconds(input.speech.signal.duration_s()),
         file_name(input.speech.name),
-        file_name(&input.room.directory().display().to_string()),
+        file_name(room_name),
         file_name(input.dry.name),
         input.source,
         input.receiver,
@@ -240,5 +240,5 @@ fn file_name(path: &str) -> String {
 /// Players need no more than 16 bits, and no more than 24 kHz keeps the page small.
 fn player_wav(sound: &Signal) -> Result<Vec<u8>> {
     let small = if sound.sample_rate_hz() > 24_000 { resample(sound, 24_000)? } else { sound.clone() };
-    Ok(wav_bytes(&small, WavFormat::Pcm16)?)
+    Ok(encode_wav(&small, SampleFormat::Int16)?)
 }

@@ -52,11 +52,11 @@ impl Prepared {
     /// The unfiltered response as one band.
     pub(crate) fn full_band(&self) -> Result<BandEnergy, NoReading> {
         let onset = self.onset.clone()?;
-        let direct = self.direct(onset).iter().map(|x| x * x).sum();
+        let direct: f64 = self.direct(onset).iter().map(|x| x * x).sum();
         let energy = self.samples.iter().map(|x| x * x).collect();
         let bandwidth_hz = 0.5 * f64::from(self.sample_rate_hz);
         let bandwidths_hz = (bandwidth_hz, bandwidth_hz);
-        Ok(BandEnergy::new(energy, self.last, self.sample_rate_hz, onset, bandwidths_hz, direct))
+        Ok(BandEnergy::new(energy, self.last, self.sample_rate_hz, onset, bandwidths_hz, (direct, direct)))
     }
 
     /// The response split by masks; the outer result is that of the onset, the inner that of each band.
@@ -87,7 +87,10 @@ impl Prepared {
                     sample_rate_hz,
                     onset,
                     (mask.statistical_bandwidth_hz(limit_hz), mask.energy_bandwidth_hz(limit_hz)),
-                    direct.energy(mask.support_hz(), gain),
+                    (
+                        direct.product(&direct, mask.support_hz(), gain),
+                        direct.product(&spectrum, mask.support_hz(), gain),
+                    ),
                 ))
             })
             .collect()
@@ -122,6 +125,8 @@ pub(crate) struct BandEnergy {
     pub(crate) energy_bandwidth_hz: f64,
     /// Energy within 2.5 ms of the peak of the unfiltered response.
     pub(crate) direct: f64,
+    /// Sum of the products of the direct sound and the whole, both in the band.
+    pub(crate) direct_in_all: f64,
     pub(crate) fit: Result<DecayFit, NoReading>,
 }
 
@@ -132,7 +137,7 @@ impl BandEnergy {
         sample_rate_hz: u32,
         onset: Onset,
         (statistical_bandwidth_hz, energy_bandwidth_hz): (f64, f64),
-        direct: f64,
+        (direct, direct_in_all): (f64, f64),
     ) -> Self {
         let rate = f64::from(sample_rate_hz);
         let step_s = 1.0 / rate;
@@ -163,6 +168,7 @@ impl BandEnergy {
             statistical_bandwidth_hz,
             energy_bandwidth_hz,
             direct,
+            direct_in_all,
             fit,
         }
     }

@@ -12,9 +12,15 @@ use crate::{Estimate, NoReading};
 
 /// ln(10^6): the power falls by 60 dB in this many time constants.
 const LN_MILLION: f64 = 13.815_510_557_964_274;
-/// Bins between the start and the knee, and after the knee.
-const DECAY_BINS: usize = 96;
+/// Width of the first and of the widest bin as shares of the time to the knee, and how much each is wider than the last:
+/// narrow ones where a steep first slope may hide, about sixty in all.
+const FIRST_BIN: f64 = 0.005;
+const WIDEST_BIN: f64 = 0.04;
+const BIN_GROWTH: f64 = 1.035;
+/// Bins after the knee, where only noise is left.
 const FLOOR_BINS: usize = 24;
+/// Fewest bins that a confined fit may rest on.
+const LEAST_BINS: usize = 16;
 /// Most iterations of Fisher scoring.
 const ITERATIONS: usize = 60;
 /// Most slopes that are looked for.
@@ -24,6 +30,14 @@ const MOST_SLOPES: usize = 3;
 const SLOPE_EVIDENCE: f64 = 16.0;
 /// Least ratio of the decay times of two slopes.
 const LEAST_RATIO: f64 = 1.3;
+/// Least fall that shows of the slowest of several slopes, in dB: less might be a floor that drifts.
+const LEAST_VISIBLE_FALL_DB: f64 = 12.0;
+/// Least fall of any of several slopes from the start to the end of the response, in dB, for the same reason.
+const LEAST_FALL_DB: f64 = 20.0;
+/// Dispersion above which the decay is not what the model says, and the fall from the start, in dB, to which the fit then
+/// confines itself: the range from which a reverberation time is defined, -5 to -35 dB, and 10 dB beyond.
+const LARGEST_DISPERSION: f64 = 2.0;
+const CONFINED_FALL_DB: f64 = 45.0;
 /// Power of the decay over the noise below which nothing is fitted, in dB.
 const LEAST_RANGE_DB: f64 = 10.0;
 
@@ -89,12 +103,18 @@ impl DecayFit {
             });
         }
         let floor = NoiseFloor::find(samples, step_s, bandwidth_hz)?;
-        let bins = bins(samples, step_s, bandwidth_hz, floor.knee_s);
-        let scale = bins.iter().fold(0.0_f64, |most, bin| most.max(bin.power));
-        let mut best = Model::single(&floor, scale).maximise(&bins);
-        while best.slopes() < MOST_SLOPES {
-            let Some(next) = best.with_one_more_slope(&bins, bandwidth_hz) else { break };
-            best = next;
+        let mut bins = bins(samples, step_s, bandwidth_hz, floor.knee_s);
+        let longest_s = 60.0 / LEAST_FALL_DB * samples.len() as f64 * step_s;
+        let limits = Limits { bandwidth_hz, longest_s };
+        let mut best = Model::single(&floor, &bins).best(&bins, &limits);
+        if best.dispersion(&bins) > LARGEST_DISPERSION {
+            // Decays of real rooms bend: what is far below the range of interest must not decide. The noise is known by now.
+            let confined_s = best.time_of_fall(CONFINED_FALL_DB);
+            let kept = bins.iter().take_while(|bin| bin.to_s <= confined_s).count();
+            if kept >= LEAST_BINS && kept < bins.len() {
+                bins.truncate(kept);
+                best = best.single_again(&bins).best(&bins, &limits);
+            }
         }
         let dispersion = best.dispersion(&bins);
         let covariance = best.covariance(&bins, dispersion).ok_or(NoReading::NoDecay)?;
@@ -260,101 +280,152 @@ fn log_line(power: &[f64], from: usize, to: usize, block_s: f64) -> Option<(f64,
     slope.is_finite().then(|| ((y1 - slope * t1) / n, -slope))
 }
 
-/// Narrow bins up to a little beyond the knee, wide ones after it.
+/// Growing bins up to a little beyond the knee, wide ones after it.
 fn bins(samples: &[f64], step_s: f64, bandwidth_hz: f64, knee_s: f64) -> Vec<Bin> {
     let knee = ((1.2 * knee_s / step_s) as usize).clamp(1, samples.len());
-    let least = (1.0 / (bandwidth_hz * step_s)).ceil().max(1.0) as usize;
-    let fine = (knee / DECAY_BINS).max(least);
-    let coarse = ((samples.len() - knee) / FLOOR_BINS).max(fine);
-    let mut bins = Vec::with_capacity(DECAY_BINS + FLOOR_BINS + 2);
+    let least = (1.0 / (bandwidth_hz * step_s)).max(1.0);
+    let floor = ((samples.len() - knee) as f64 / FLOOR_BINS as f64).max(WIDEST_BIN * knee as f64);
+    let mut width = FIRST_BIN * knee as f64;
+    let mut bins = Vec::with_capacity(128);
     let mut from = 0;
     while from < samples.len() {
-        let width = if from < knee { fine } else { coarse };
-        let to = (from + width).min(samples.len());
+        let wanted = if from < knee { width.min(WIDEST_BIN * knee as f64) } else { floor };
+        let to = (from + wanted.max(least).ceil() as usize).min(samples.len());
         let power = samples[from..to].iter().sum::<f64>() / (to - from) as f64;
         let (from_s, to_s) = (from as f64 * step_s, to as f64 * step_s);
         bins.push(Bin { from_s, to_s, power, shape: bandwidth_hz * (to_s - from_s) });
+        width *= BIN_GROWTH;
         from = to;
     }
     bins
 }
 
-/// The model: for each slope ln(power at time zero) and ln(rate), then ln(noise power).
+/// Mean of exp(-rate t) over each bin, and the derivative of that mean by ln(rate).
+fn mean_decay(bins: &[Bin], rate: f64, mut each: impl FnMut(usize, f64, f64)) {
+    // The end of a bin is the start of the next.
+    let mut e0 = bins.first().map_or(1.0, |bin| (-rate * bin.from_s).exp());
+    for (i, bin) in bins.iter().enumerate() {
+        let width = bin.to_s - bin.from_s;
+        let e1 = (-rate * bin.to_s).exp();
+        let mean = if rate * width > 1e-6 { (e0 - e1) / (rate * width) } else { e0 };
+        each(i, mean, (e1 * bin.to_s - e0 * bin.from_s) / width - mean);
+        e0 = e1;
+    }
+}
+
+/// The model at a point: for each slope ln(power at time zero) and ln(rate), then ln(noise power).
 #[derive(Clone, Debug)]
 struct Model {
     parameters: Vec<f64>,
+    /// Expected power of each bin.
+    expected: Vec<f64>,
+    /// Its logarithmic derivative by each parameter, bin after bin.
+    derivatives: Vec<f64>,
+    /// Twice the negative log-likelihood, up to a constant of the data.
     deviance: f64,
-    /// Noise weaker than this share of the loudest bin counts as none.
+    /// Logarithm of a noise that counts as none.
     least_noise: f64,
+    /// True if the noise is not to be fitted.
+    noise_is_known: bool,
+}
+
+/// What limits the slopes that may be added.
+struct Limits {
+    bandwidth_hz: f64,
+    longest_s: f64,
 }
 
 impl Model {
-    fn single(floor: &NoiseFloor, scale: f64) -> Self {
-        let least_noise = 1e-16 * scale;
+    /// The likeliest model of as many slopes as the data ask for.
+    fn best(self, bins: &[Bin], limits: &Limits) -> Self {
+        let mut best = self.maximise(bins);
+        while best.slopes() < MOST_SLOPES {
+            let Some(next) = best.with_one_more_slope(bins, limits) else { break };
+            best = next;
+        }
+        best
+    }
+
+    /// Where a fit of one slope to other bins may start, with the noise of this model held.
+    fn single_again(&self, bins: &[Bin]) -> Self {
+        let n = self.parameters.len();
+        let strongest = self.parameters[..n - 1]
+            .chunks_exact(2)
+            .max_by(|a, b| a[0].total_cmp(&b[0]))
+            .map_or_else(|| self.parameters[..2].to_vec(), <[f64]>::to_vec);
+        let parameters = vec![strongest[0], strongest[1], self.parameters[n - 1]];
+        Self { noise_is_known: true, ..Self::at(parameters, bins, self.least_noise) }
+    }
+
+    /// When the decays together have fallen by so many dB.
+    fn time_of_fall(&self, fall_db: f64) -> f64 {
+        let n = self.parameters.len();
+        let power = |t: f64| -> f64 {
+            self.parameters[..n - 1].chunks_exact(2).map(|pair| (pair[0] - t * pair[1].exp()).exp()).sum()
+        };
+        let target = power(0.0) * 10f64.powf(-0.1 * fall_db);
+        let slowest = self.parameters[1..n - 1].iter().step_by(2).copied().fold(f64::MAX, f64::min).exp();
+        bisect(0.0, fall_db / 60.0 * LN_MILLION / slowest, |t| power(t) - target)
+    }
+
+    fn single(floor: &NoiseFloor, bins: &[Bin]) -> Self {
+        let loudest = bins.iter().fold(f64::MIN_POSITIVE, |most, bin| most.max(bin.power));
+        let least_noise = (1e-16 * loudest).ln();
         let parameters = vec![
-            floor.start_power.max(least_noise).ln(),
+            floor.start_power.ln().max(least_noise),
             floor.rate_per_s.ln(),
-            floor.power.max(least_noise).ln(),
+            floor.power.ln().max(least_noise),
         ];
-        Self { parameters, deviance: f64::INFINITY, least_noise }
+        Self::at(parameters, bins, least_noise)
+    }
+
+    fn at(mut parameters: Vec<f64>, bins: &[Bin], least_noise: f64) -> Self {
+        let n = parameters.len();
+        parameters[n - 1] = parameters[n - 1].max(least_noise);
+        let noise = parameters[n - 1].exp();
+        let mut expected = vec![noise; bins.len()];
+        let mut derivatives = vec![noise; bins.len() * n];
+        for k in 0..n / 2 {
+            let power = parameters[2 * k].exp();
+            mean_decay(bins, parameters[2 * k + 1].exp(), |i, mean, by_rate| {
+                expected[i] += power * mean;
+                derivatives[i * n + 2 * k] = power * mean;
+                derivatives[i * n + 2 * k + 1] = power * by_rate;
+            });
+        }
+        let mut deviance = 0.0;
+        for (i, bin) in bins.iter().enumerate() {
+            derivatives[i * n..(i + 1) * n].iter_mut().for_each(|d| *d /= expected[i]);
+            deviance += 2.0 * bin.shape * (bin.power / expected[i] + expected[i].ln());
+        }
+        Self { parameters, expected, derivatives, deviance, least_noise, noise_is_known: false }
+    }
+
+    fn moved(&self, parameters: Vec<f64>, bins: &[Bin]) -> Self {
+        Self { noise_is_known: self.noise_is_known, ..Self::at(parameters, bins, self.least_noise) }
     }
 
     fn slopes(&self) -> usize {
         self.parameters.len() / 2
     }
 
-    /// Expected power in a bin and its derivatives by each parameter.
-    fn expect(parameters: &[f64], bin: &Bin, derivatives: &mut [f64]) -> f64 {
-        let width = bin.to_s - bin.from_s;
-        let mut total = 0.0;
-        for k in 0..parameters.len() / 2 {
-            let (power, rate) = (parameters[2 * k].exp(), parameters[2 * k + 1].exp());
-            let (e0, e1) = ((-rate * bin.from_s).exp(), (-rate * bin.to_s).exp());
-            let mean = if rate * width > 1e-6 {
-                (e0 - e1) / (rate * width)
-            } else {
-                (-rate * 0.5 * (bin.from_s + bin.to_s)).exp()
-            };
-            derivatives[2 * k] = power * mean;
-            derivatives[2 * k + 1] = power * ((e1 * bin.to_s - e0 * bin.from_s) / width - mean);
-            total += power * mean;
-        }
-        let noise = parameters[parameters.len() - 1].exp();
-        derivatives[parameters.len() - 1] = noise;
-        total + noise
-    }
-
-    /// Twice the negative log-likelihood, up to a constant of the data.
-    fn deviance(parameters: &[f64], bins: &[Bin]) -> f64 {
-        let mut derivatives = vec![0.0; parameters.len()];
-        bins.iter()
-            .map(|bin| {
-                let expected = Self::expect(parameters, bin, &mut derivatives);
-                2.0 * bin.shape * (bin.power / expected + expected.ln())
-            })
-            .sum()
-    }
-
     /// Score and Fisher information.
     fn score(&self, bins: &[Bin]) -> (Vec<f64>, Vec<f64>) {
         let n = self.parameters.len();
         let (mut score, mut information) = (vec![0.0; n], vec![0.0; n * n]);
-        let mut derivatives = vec![0.0; n];
-        for bin in bins {
-            let expected = Self::expect(&self.parameters, bin, &mut derivatives);
-            let residual = bin.shape * (bin.power / expected - 1.0) / expected;
-            let weight = bin.shape / (expected * expected);
-            for i in 0..n {
-                score[i] += residual * derivatives[i];
-                for j in 0..=i {
-                    information[i * n + j] += weight * derivatives[i] * derivatives[j];
+        for (i, bin) in bins.iter().enumerate() {
+            let derivatives = &self.derivatives[i * n..(i + 1) * n];
+            let residual = bin.shape * (bin.power / self.expected[i] - 1.0);
+            for (a, &by_a) in derivatives.iter().enumerate() {
+                score[a] += residual * by_a;
+                for (b, &by_b) in derivatives.iter().enumerate() {
+                    information[a * n + b] += bin.shape * by_a * by_b;
                 }
             }
         }
-        for i in 0..n {
-            for j in 0..i {
-                information[j * n + i] = information[i * n + j];
-            }
+        if self.noise_is_known {
+            score[n - 1] = 0.0;
+            leave_out(&mut information, n, n - 1);
         }
         (score, information)
     }
@@ -362,31 +433,26 @@ impl Model {
     /// Fisher scoring with Levenberg's damping.
     fn maximise(mut self, bins: &[Bin]) -> Self {
         let n = self.parameters.len();
-        let mut damping = 1e-3;
-        self.deviance = Self::deviance(&self.parameters, bins);
+        let mut damping = 1e-4;
+        let (mut score, mut information) = self.score(bins);
         for _ in 0..ITERATIONS {
-            let (score, information) = self.score(bins);
             let mut damped = information.clone();
             for i in 0..n {
                 damped[i * n + i] += damping * information[i * n + i] + 1e-9;
             }
-            let Some(mut step) = solve(&damped, &score) else { break };
-            for x in &mut step {
-                *x = x.clamp(-1.0, 1.0);
-            }
-            let mut tried: Vec<f64> = self.parameters.iter().zip(&step).map(|(p, s)| p + s).collect();
-            tried[n - 1] = tried[n - 1].max(self.least_noise.ln());
-            let deviance = Self::deviance(&tried, bins);
-            if deviance <= self.deviance {
-                let gain = self.deviance - deviance;
-                self.parameters = tried;
-                self.deviance = deviance;
-                damping = (damping * 0.2).max(1e-9);
-                if gain < 1e-5 {
+            let Some(step) = solve(&damped, &score) else { break };
+            let parameters = self.parameters.iter().zip(&step).map(|(p, s)| p + s.clamp(-1.0, 1.0)).collect();
+            let tried = self.moved(parameters, bins);
+            if tried.deviance <= self.deviance {
+                let gain = self.deviance - tried.deviance;
+                self = tried;
+                if gain < 1e-4 {
                     break;
                 }
+                (score, information) = self.score(bins);
+                damping = (damping * 0.2).max(1e-9);
             } else {
-                damping *= 8.0;
+                damping = (8.0 * damping).max(1e-3);
                 if damping > 1e8 {
                     break;
                 }
@@ -396,47 +462,86 @@ impl Model {
     }
 
     /// The model with one more slope, if the data ask for it.
-    fn with_one_more_slope(&self, bins: &[Bin], bandwidth_hz: f64) -> Option<Self> {
-        let n = self.parameters.len();
+    fn with_one_more_slope(&self, bins: &[Bin], limits: &Limits) -> Option<Self> {
         let end_s = bins.last()?.to_s;
-        let slowest = self.parameters[1..n - 1].iter().step_by(2).copied().fold(f64::MAX, f64::min).exp();
-        let total: f64 = self.parameters[..n - 1].iter().step_by(2).map(|p| p.exp()).sum();
-        let mut best: Option<Self> = None;
-        for (ratio, level) in [(0.4, 0.1), (0.4, 0.003), (0.15, 0.001), (3.0, 1.0)] {
-            let mut parameters = self.parameters[..n - 1].to_vec();
-            parameters.extend([(total * level).ln(), (slowest * ratio).ln(), self.parameters[n - 1]]);
-            let tried = Self { parameters, ..self.clone() }.maximise(bins);
-            if best.as_ref().is_none_or(|best| tried.deviance < best.deviance) {
-                best = Some(tried);
-            }
+        let dispersion = self.dispersion(bins).max(1.0);
+        let needed = SLOPE_EVIDENCE.max(2.0 * (limits.bandwidth_hz * end_s).ln());
+        let (evidence, start) = self.most_wanted_slope(bins)?;
+        // The score test anticipates the gain; only a promising slope is worth a fit.
+        if evidence < 0.25 * needed {
+            return None;
         }
-        let dispersion = self.dispersion(bins).min(best.as_ref()?.dispersion(bins)).max(1.0);
-        let independent = bandwidth_hz * end_s;
-        let needed = SLOPE_EVIDENCE.max(2.0 * independent.ln());
-        best.filter(|best| {
-            (self.deviance - best.deviance) / dispersion > needed && best.is_physical(end_s, bandwidth_hz)
-        })
+        let tried = self.moved(start, bins).maximise(bins);
+        let dispersion = dispersion.min(tried.dispersion(bins).max(1.0));
+        ((self.deviance - tried.deviance) / dispersion > needed && tried.is_physical(end_s, limits))
+            .then_some(tried)
     }
 
-    /// Slopes far enough apart, each long enough to be seen and falling within the response.
-    fn is_physical(&self, end_s: f64, bandwidth_hz: f64) -> bool {
-        let mut times: Vec<f64> = self.parameters[1..self.parameters.len() - 1]
-            .iter()
-            .step_by(2)
-            .map(|rate| LN_MILLION / rate.exp())
-            .collect();
-        times.sort_by(f64::total_cmp);
-        times.windows(2).all(|pair| pair[1] > LEAST_RATIO * pair[0])
-            && times.iter().all(|&t| t < 6.0 * end_s && bandwidth_hz * t > 8.0)
+    /// Rao's score test of one more slope of a given rate, over a range of rates: the largest statistic (chi-squared with
+    /// one degree of freedom if there is no such slope) and where a fit should start.
+    fn most_wanted_slope(&self, bins: &[Bin]) -> Option<(f64, Vec<f64>)> {
+        let n = self.parameters.len();
+        let (_, mut information) = self.score(bins);
+        for i in 0..n {
+            information[i * n + i] *= 1.0 + 1e-9;
+            information[i * n + i] += 1e-9;
+        }
+        let rates = self.parameters[1..n - 1].iter().step_by(2).map(|rate| rate.exp());
+        let (slowest, fastest) =
+            rates.fold((f64::MAX, 0.0_f64), |(low, high), rate| (low.min(rate), high.max(rate)));
+        let (low, high) = (slowest / 10.0, fastest * 10.0);
+        let mut best: Option<(f64, Vec<f64>)> = None;
+        for i in 0..16 {
+            let rate = low * (high / low).powf(f64::from(i) / 15.0);
+            let (mut score, mut own) = (0.0, 0.0);
+            let mut shared = vec![0.0; n];
+            mean_decay(bins, rate, |i, mean, _| {
+                let by_power = mean / self.expected[i];
+                let weight = bins[i].shape * by_power;
+                score += weight * (bins[i].power / self.expected[i] - 1.0);
+                own += weight * by_power;
+                for (sum, derivative) in shared.iter_mut().zip(&self.derivatives[i * n..(i + 1) * n]) {
+                    *sum += weight * derivative;
+                }
+            });
+            let explained: f64 = solve(&information, &shared)?.iter().zip(&shared).map(|(a, b)| a * b).sum();
+            let free = own - explained;
+            if score <= 0.0 || free <= 1e-9 * own {
+                continue;
+            }
+            let statistic = score * score / free;
+            if best.as_ref().is_none_or(|(most, _)| statistic > *most) {
+                let mut start = self.parameters[..n - 1].to_vec();
+                start.extend([(score / free).ln(), rate.ln(), self.parameters[n - 1]]);
+                best = Some((statistic, start));
+            }
+        }
+        best
+    }
+
+    /// Slopes far enough apart, each long enough to be seen, the slowest distinct from a drifting floor.
+    fn is_physical(&self, end_s: f64, limits: &Limits) -> bool {
+        let n = self.parameters.len();
+        let mut slopes: Vec<(f64, f64)> =
+            self.parameters[..n - 1].chunks_exact(2).map(|pair| (pair[0], pair[1].exp())).collect();
+        slopes.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let apart = slopes.windows(2).all(|pair| pair[0].1 > LEAST_RATIO * pair[1].1);
+        let times_s = slopes.iter().map(|(_, rate)| LN_MILLION / rate);
+        let unsmeared =
+            times_s.clone().all(|t60_s| limits.bandwidth_hz * t60_s > 8.0 && t60_s < limits.longest_s);
+        let [.., (fast_log, fast), (slow_log, slow)] = slopes[..] else { return apart && unsmeared };
+        // From where the last two cross to where the slowest meets the noise, or the end.
+        let crossing_s = ((fast_log - slow_log) / (fast - slow)).max(0.0);
+        let knee_s = ((slow_log - self.parameters[n - 1]) / slow).min(end_s);
+        let fall_db = 60.0 * slow / LN_MILLION * (knee_s - crossing_s);
+        apart && unsmeared && fall_db > LEAST_VISIBLE_FALL_DB
     }
 
     /// Pearson's chi-squared per degree of freedom, over groups of bins that hold at least eight independent values each.
     fn dispersion(&self, bins: &[Bin]) -> f64 {
-        let mut derivatives = vec![0.0; self.parameters.len()];
         let (mut chi_squared, mut groups) = (0.0, 0.0);
         let (mut shape, mut sum) = (0.0, 0.0);
-        for bin in bins {
-            let expected = Self::expect(&self.parameters, bin, &mut derivatives);
+        for (bin, expected) in bins.iter().zip(&self.expected) {
             shape += bin.shape;
             sum += bin.shape * (bin.power / expected - 1.0);
             if shape >= 8.0 {
@@ -455,11 +560,7 @@ impl Model {
         let (_, mut information) = self.score(bins);
         let floor = n * n - 1;
         if information[floor] < 1e-3 {
-            for i in 0..n {
-                information[i * n + n - 1] = 0.0;
-                information[(n - 1) * n + i] = 0.0;
-            }
-            information[floor] = 1.0;
+            leave_out(&mut information, n, n - 1);
         }
         let mut covariance = vec![0.0; n * n];
         for i in 0..n {
@@ -493,7 +594,7 @@ impl Model {
         slopes.sort_by(|a, b| a.t60_s.value.total_cmp(&b.t60_s.value));
         DecayFit {
             slopes,
-            noise_power: if noise > 1.01 * self.least_noise { noise } else { 0.0 },
+            noise_power: if noise.ln() > self.least_noise + 0.01 { noise } else { 0.0 },
             start_s,
             end_s,
             dispersion,
@@ -501,6 +602,15 @@ impl Model {
             covariance,
         }
     }
+}
+
+/// Takes a parameter out of an information matrix of order `n`.
+fn leave_out(information: &mut [f64], n: usize, parameter: usize) {
+    for i in 0..n {
+        information[i * n + parameter] = 0.0;
+        information[parameter * n + i] = 0.0;
+    }
+    information[parameter * n + parameter] = 1.0;
 }
 
 /// Solves a symmetric positive definite system by Cholesky's method; none if it is not.

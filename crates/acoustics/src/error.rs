@@ -93,6 +93,118 @@ pub enum Error {
         /// The cause.
         source: std::io::Error,
     },
+    /// Something wrong in a field of a file: the cause says what.
+    #[error("{}: {field}: {source}", path.display())]
+    InFile {
+        /// The file.
+        path: PathBuf,
+        /// The field, as a person would look for it: `materials.wall.absorption`, `line 12`, `samples`.
+        field: String,
+        /// What is wrong with it.
+        source: Box<Error>,
+    },
+    /// A file that is no WAV. Other formats need the feature `symphonia`.
+    #[error("{}: not a WAV file (FLAC, Ogg and others need the feature `symphonia`)", path.display())]
+    NotWav {
+        /// The file.
+        path: PathBuf,
+    },
+    /// An audio file whose format cannot be decoded.
+    #[error("{}: {source}", path.display())]
+    AudioFormat {
+        /// The file.
+        path: PathBuf,
+        /// The decoder's cause.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// An audio file that ends before the samples that its header promises.
+    #[error("{}: truncated: the header promises {promised_bytes} bytes of samples, the file has {file_bytes} in all", path.display())]
+    Truncated {
+        /// The file.
+        path: PathBuf,
+        /// Bytes of samples that the header promises.
+        promised_bytes: u64,
+        /// Length of the file.
+        file_bytes: u64,
+    },
+    /// A file of several channels where one was expected.
+    #[error("{}: {channels} channels; choose one, or their mean", path.display())]
+    ManyChannels {
+        /// The file.
+        path: PathBuf,
+        /// Number of channels in the file.
+        channels: usize,
+    },
+    /// A list of the wrong length.
+    #[error("{found} values; there must be {expected}")]
+    Length {
+        /// Number wanted.
+        expected: usize,
+        /// Number found.
+        found: usize,
+    },
+    /// TOML that cannot be read: a slip in its grammar, an unknown or missing key, or a value of the wrong type.
+    #[error("{}: {source}", path.display())]
+    Toml {
+        /// The file.
+        path: PathBuf,
+        /// Where and what.
+        source: Box<toml::de::Error>,
+    },
+    /// A line of an OBJ file that cannot be understood.
+    #[error("cannot read `{text}` as {expected}")]
+    ObjSyntax {
+        /// What was expected.
+        expected: &'static str,
+        /// The offending word.
+        text: String,
+    },
+    /// A face before the first `usemtl`, so that its material is unknown.
+    #[error("a face without material: there is no `usemtl` before it")]
+    NoMaterial,
+    /// A polygon that cannot be cut into triangles, because its outline crosses itself.
+    #[error("the outline of this polygon crosses itself")]
+    CrossedPolygon,
+    /// A material of the mesh without a table in the room file.
+    #[error("the mesh {} uses the material `{material}`, for which there is no table", mesh.display())]
+    MaterialWithoutTable {
+        /// The material's name in the mesh.
+        material: String,
+        /// The mesh.
+        mesh: PathBuf,
+    },
+    /// A table for a material that no face of the mesh has.
+    #[error("no face of the mesh {} has this material", mesh.display())]
+    TableWithoutMaterial {
+        /// The mesh.
+        mesh: PathBuf,
+    },
+    /// Two things of one name.
+    #[error("`{id}` is there twice")]
+    DuplicateId {
+        /// The name.
+        id: String,
+    },
+    /// A name that nothing has.
+    #[error("there is no `{id}`")]
+    UnknownId {
+        /// The name.
+        id: String,
+    },
+    /// A response that ends before the direct sound can arrive.
+    #[error("{duration_s:.4} s long, but the direct sound arrives after {direct_s:.4} s")]
+    ShorterThanDirectSound {
+        /// Length of the response, in seconds.
+        duration_s: f64,
+        /// Time of flight from source to receiver, in seconds.
+        direct_s: f64,
+    },
+    /// A material that the library does not hold.
+    #[error("the material library has no `{name}`")]
+    UnknownMaterial {
+        /// The name asked for.
+        name: String,
+    },
     /// An implementation of one of the traits failed.
     #[error("{what}: {source}")]
     Implementation {
@@ -104,6 +216,11 @@ pub enum Error {
 }
 
 impl Error {
+    /// Names the file and the field in which this error arose.
+    pub(crate) fn in_file(self, path: impl Into<PathBuf>, field: impl Into<String>) -> Self {
+        Self::InFile { path: path.into(), field: field.into(), source: Box::new(self) }
+    }
+
     /// Wraps the error of a trait's implementation.
     pub fn implementation(
         what: &'static str,

@@ -68,6 +68,14 @@ pub enum NoReading {
         /// The least that is trusted.
         needed: f64,
     },
+    /// The response leaves the quantity too uncertain to be of use.
+    #[error("the standard error is {relative_error:.2} of the value; more than {largest:.2} is no answer")]
+    Uncertain {
+        /// Standard error divided by the value.
+        relative_error: f64,
+        /// The most that is an answer.
+        largest: f64,
+    },
     /// The level does not fall, or the fit did not settle.
     #[error("the level does not decay")]
     NoDecay,

@@ -107,7 +107,7 @@ fn peak(samples: &[f32]) -> f32 {
     samples.iter().fold(0.0, |peak, s| peak.max(s.abs()))
 }
 
-fn check_samples(what: &'static str, samples: &[f32], sample_rate_hz: u32) -> Result<(), Error> {
+pub(crate) fn check_samples(what: &'static str, samples: &[f32], sample_rate_hz: u32) -> Result<(), Error> {
     if samples.is_empty() {
         return Err(Error::Empty { what });
     }

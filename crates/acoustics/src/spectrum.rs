@@ -55,16 +55,17 @@ impl Spectrum {
         output
     }
 
-    /// Energy (sum of squared samples) of the signal filtered by a gain.
-    pub(crate) fn energy(&self, support_hz: (f64, f64), gain: impl Fn(f64) -> f64) -> f64 {
+    /// Sum of the products of the samples of two signals of one length, both filtered by a gain: with itself, the energy.
+    pub(crate) fn product(&self, other: &Self, support_hz: (f64, f64), gain: impl Fn(f64) -> f64) -> f64 {
+        debug_assert_eq!(self.transform_len, other.transform_len);
         let sum: f64 = self
             .range(support_hz)
             .map(|i| {
                 // Every bin stands for itself and its mirror image, but for the two ends.
                 let ends = i == 0 || 2 * i == self.transform_len;
-                (if ends { 1.0 } else { 2.0 })
-                    * self.bins[i].norm_sqr()
-                    * gain(i as f64 * self.bin_hz).powi(2)
+                let (a, b) = (self.bins[i], other.bins[i]);
+                let product = (a.re * b.re + a.im * b.im) * gain(i as f64 * self.bin_hz).powi(2);
+                if ends { product } else { 2.0 * product }
             })
             .sum();
         sum / self.transform_len as f64
@@ -101,7 +102,7 @@ mod tests {
         let spectrum = Spectrum::new(&samples, 8000, 0.5);
         let all = (0.0, f64::INFINITY);
         let direct: f64 = samples.iter().map(|x| x * x).sum();
-        assert!((spectrum.energy(all, |_| 1.0) / direct - 1.0).abs() < 1e-12);
+        assert!((spectrum.product(&spectrum, all, |_| 1.0) / direct - 1.0).abs() < 1e-12);
         for (x, y) in samples.iter().zip(spectrum.filtered(all, |_| 1.0)) {
             assert!((x - y).abs() < 1e-12);
         }

@@ -23,27 +23,19 @@ pub enum Error {
         peak: f32,
     },
     /// A recording whose peaks are cut off.
-    #[error("{recording}: clipped ({percent:.1} % of the samples are cut off): record it again at a lower level")]
+    #[error(
+        "{recording}: clipped ({percent:.1} % of the samples are cut off): record it again at a lower level"
+    )]
     Clipped {
         /// Name of the recording.
         recording: String,
         /// Share of samples in flat tops, in percent.
         percent: f64,
     },
-    /// An identifier that the room does not have.
-    #[error("{room}: there is no {kind} \"{id}\"; there are: {known}", known = known.join(", "))]
-    UnknownId {
-        /// The room's folder.
-        room: String,
-        /// "source" or "receiver".
-        kind: &'static str,
-        /// The identifier asked for.
-        id: String,
-        /// Those that exist.
-        known: Vec<String>,
-    },
     /// No path leads from the source to the receiver.
-    #[error("no path reaches receiver \"{receiver}\" from source \"{source_id}\": is one of them closed off?")]
+    #[error(
+        "no path reaches receiver \"{receiver}\" from source \"{source_id}\": is one of them closed off?"
+    )]
     NoPath {
         /// The source.
         source_id: String,

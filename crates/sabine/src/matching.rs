@@ -2,14 +2,14 @@
 
 use crate::{Error, Recording, Warning};
 use sabine_acoustics::{
-    Air, EnergyDecayCurve, Estimate, FilterBank, ImpulseResponse, Material, MeasuredRoom, Observer, OctaveBands,
-    PathSet, PerBand, Propagator, Reading, RoomEstimator, RoomParameters, RoomTargets, Signal, equalisation, report,
-    resample,
+    Air, EnergyDecayCurve, Estimate, FilterBank, ImpulseResponse, Material, MeasuredRoom, Observer,
+    OctaveBands, PerBand, Propagator, Reading, RoomEstimator, RoomParameters, RoomTargets, Signal,
+    equalisation, report, resample,
 };
 use sabine_eqfilter::{AboveBand, EqFilter, EqFilterConfig};
 use sabine_estimator::Estimator;
 use sabine_optimize::{AbsorptionPrior, FitConfig, MaterialFit, MaterialFitter};
-use sabine_propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
+use sabine_propagate::{MeshReport, PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use std::time::Instant;
 
 /// What to match: a recording, the room it was made in, and the sound to place there.
@@ -100,6 +100,8 @@ const FULL_SCALE: f32 = 0.95;
 const CORRECTIONS: usize = 2;
 /// The rendered response is close enough to its target when every reachable octave is this near.
 const CLOSE: f64 = 0.02;
+/// A reachable target missed by more than this is worth a warning: one just-noticeable difference (ISO 3382-1, Annex A).
+const MISSED: f64 = 0.05;
 /// Lowest rate of the matched sound in Hz: the 8 kHz octave ends at 11.2 kHz.
 const LOWEST_RATE_HZ: u32 = 32_000;
 /// Rate that replaces lower ones, in Hz.
@@ -117,16 +119,32 @@ pub fn match_room(
     config: &MatchConfig,
     observer: &dyn Observer,
 ) -> Result<RoomMatch, Error> {
+    let mut clock = Clock::start();
+    let mut warnings = input.check()?;
+    report(observer, "listening", 0, 1)?;
     let estimator = Estimator::pretrained()?;
+    let (from_hz, to_hz) = (input.speech.signal.sample_rate_hz(), estimator.sample_rate_hz());
+    if from_hz != to_hz {
+        warnings.push(Warning::SpeechResampled { from_hz, to_hz });
+    }
+    let heard = estimator.estimate_detailed(&resample(input.speech.signal, to_hz)?)?;
+    warnings.extend(heard.warnings.into_iter().map(Warning::Speech));
+    report(observer, "listening", 1, 1)?;
+    clock.lap("estimate");
     let tracer = |duration_s: f64| -> Result<Box<dyn Propagator>, Error> {
         let settings = TracerConfig { duration_s, seed: config.seed, ..config.tracer.clone() };
         Ok(Box::new(PathTracer::new(settings)?))
     };
-    match_room_with(&estimator, &tracer, input, config, observer)
+    let source = input.room.source(input.source)?;
+    let mesh = MeshReport::inspect(input.room.scene(), source.position_m)?;
+    if !mesh.open_edges_m.is_empty() {
+        warnings.push(Warning::OpenMesh { edges: mesh.open_edges_m.len(), escape_rate: mesh.escape_rate });
+    }
+    match_targets(heard.targets, warnings, clock, &tracer, input, config, observer)
 }
 
-/// Matches a room with an estimator and a tracer of one's own; `tracer` is asked for one that looks for paths of up to the
-/// given duration in seconds.
+/// Matches a room with an estimator and a tracer of one's own; the estimator hears the recording at its own sample rate,
+/// and `tracer` is asked for one that looks for paths of up to the given duration in seconds.
 ///
 /// # Errors
 /// As [`match_room`], and those of the estimator and the tracer.
@@ -138,33 +156,54 @@ pub fn match_room_with(
     observer: &dyn Observer,
 ) -> Result<RoomMatch, Error> {
     let mut clock = Clock::start();
-    let mut warnings = Vec::new();
-    let room = input.room;
-    let (source, receiver) = input.find_positions()?;
-    let clipped = input.speech.check()?;
-    if clipped > 0.0 {
-        warnings.push(Warning::SlightlyClipped { percent: 100.0 * clipped });
-    }
-    input.dry.check_not_silent()?;
-    if room.air_assumed() {
-        warnings.push(Warning::AirAssumed);
-    }
-
+    let warnings = input.check()?;
     report(observer, "listening", 0, 1)?;
     let targets = estimator.estimate(input.speech.signal)?;
     report(observer, "listening", 1, 1)?;
     clock.lap("estimate");
+    match_targets(targets, warnings, clock, tracer, input, config, observer)
+}
 
+impl MatchInput<'_> {
+    /// Refuses what cannot be judged and collects what should be known.
+    fn check(&self) -> Result<Vec<Warning>, Error> {
+        let mut warnings = Vec::new();
+        let clipped = self.speech.check()?;
+        if clipped > 0.0 {
+            warnings.push(Warning::SlightlyClipped { percent: 100.0 * clipped });
+        }
+        self.dry.check_not_silent()?;
+        self.room.source(self.source)?;
+        self.room.receiver(self.receiver)?;
+        if self.room.air_assumed() {
+            warnings.push(Warning::AirAssumed);
+        }
+        Ok(warnings)
+    }
+}
+
+/// Everything after listening.
+fn match_targets(
+    targets: RoomTargets,
+    mut warnings: Vec<Warning>,
+    mut clock: Clock,
+    tracer: &dyn Fn(f64) -> Result<Box<dyn Propagator>, Error>,
+    input: &MatchInput<'_>,
+    config: &MatchConfig,
+    observer: &dyn Observer,
+) -> Result<RoomMatch, Error> {
+    let room = input.room;
+    let (source, receiver) = (room.source(input.source)?, room.receiver(input.receiver)?);
     let bands = OctaveBands::SIMULATION;
     let air = room.air();
     let materials_before: Vec<Material> =
         room.scene().materials().iter().map(|named| named.material.resampled(bands)).collect();
-    let priors: Vec<AbsorptionPrior> = room
-        .absorption_priors()
+    let priors: Vec<AbsorptionPrior> = materials_before
         .iter()
-        .map(|p| AbsorptionPrior {
-            mean: p.mean.resampled(bands),
-            standard_deviation: p.standard_deviation.resampled(bands),
+        .zip(room.priors())
+        .map(|(material, prior)| AbsorptionPrior {
+            mean: material.absorption().clone(),
+            standard_deviation: prior.absorption_sd.resampled(bands),
         })
         .collect();
     let scene = room.scene().with_materials(materials_before.clone())?;
@@ -183,13 +222,13 @@ pub fn match_room_with(
             STANDARD_RATE_HZ
         }
     };
-    let renderer = PressureRenderer::new(RenderConfig { sample_rate_hz, seed: config.seed, ..RenderConfig::default() })?;
+    let renderer =
+        PressureRenderer::new(RenderConfig { sample_rate_hz, seed: config.seed, ..RenderConfig::default() })?;
     let fitter = MaterialFitter::new(config.fit.clone())?;
     let mut aim = targets.t60_s().clone();
     let mut corrections = 0;
     let (fit, response, parameters) = loop {
-        let fit =
-            fitter.fit_t60(&[&paths], &materials_before, &priors, &air, &aim, observer)?;
+        let fit = fitter.fit_t60(&[&paths], &materials_before, &priors, &air, &aim, observer)?;
         clock.lap("fit");
         let response = renderer.render(&paths, &fit.materials, &air)?;
         let parameters = RoomParameters::measure(&response, OctaveBands::T60)?;
@@ -201,6 +240,7 @@ pub fn match_room_with(
             _ => break (fit, response, parameters),
         }
     };
+    warn_of_misses(targets.t60_s(), &parameters.t30_s, &fit, &mut warnings);
     warnings.extend(fit.unreachable.iter().map(|u| Warning::Unreachable(u.clone())));
     let eq_simulated_db = equalisation(&response, OctaveBands::EQ)?
         .map(|reading| reading.as_ref().map_or(f64::NAN, |estimate| estimate.value));
@@ -233,25 +273,6 @@ pub fn match_room_with(
     })
 }
 
-impl<'a> MatchInput<'a> {
-    fn find_positions(&self) -> Result<(&'a Source, &'a Receiver), Error> {
-        let unknown = |kind, id: &str, known| Error::UnknownId {
-            room: self.room.directory().display().to_string(),
-            kind,
-            id: id.to_owned(),
-            known,
-        };
-        let (sources, receivers) = (self.room.sources(), self.room.receivers());
-        let source = sources.iter().find(|s| s.id == self.source).ok_or_else(|| {
-            unknown("source", self.source, sources.iter().map(|s| s.id.clone()).collect())
-        })?;
-        let receiver = receivers.iter().find(|r| r.id == self.receiver).ok_or_else(|| {
-            unknown("receiver", self.receiver, receivers.iter().map(|r| r.id.clone()).collect())
-        })?;
-        Ok((source, receiver))
-    }
-}
-
 /// Aims that make up for what the rendered response still misses, or nothing if it is close enough.
 ///
 /// The fit works on path energies; the rendered response is read through octave filters, which let a slowly decaying band
@@ -279,6 +300,25 @@ fn corrected(
     off.then_some(next)
 }
 
+/// Octaves whose rendered decay is not the one asked for although nothing stands in its way, or cannot be read.
+fn warn_of_misses(
+    target: &PerBand<Estimate>,
+    reached: &PerBand<Reading>,
+    fit: &MaterialFit,
+    warnings: &mut Vec<Warning>,
+) {
+    for ((band_hz, target), reached) in target.iter().zip(reached.values()) {
+        let stuck = fit.unreachable.iter().any(|u| u.band_hz == band_hz);
+        match reached {
+            Err(reason) => warnings.push(Warning::NotRead { band_hz, reason: reason.clone() }),
+            Ok(reached) if !stuck && (reached.value / target.value - 1.0).abs() > MISSED => {
+                warnings.push(Warning::Missed { band_hz, target_s: target.value, reached_s: reached.value });
+            }
+            Ok(_) => {}
+        }
+    }
+}
+
 /// What the filter must add to the simulation, kept within what is sensible.
 fn eq_gains(
     target_db: &PerBand<Estimate>,
@@ -293,7 +333,11 @@ fn eq_gains(
     Ok(PerBand::from_fn(bands, |band| {
         let gain = gains.values()[band];
         if gain.abs() > largest_db {
-            warnings.push(Warning::EqLimited { band_hz: bands.nominal_hz(band), wanted_db: gain, limit_db: largest_db });
+            warnings.push(Warning::EqLimited {
+                band_hz: bands.nominal_hz(band),
+                wanted_db: gain,
+                limit_db: largest_db,
+            });
         }
         gain.clamp(-largest_db, largest_db)
     }))

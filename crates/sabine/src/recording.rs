@@ -79,8 +79,9 @@ mod tests {
     use super::*;
 
     fn tone(gain: f32, seconds: f32) -> Signal {
-        let samples =
-            (0..(seconds * 16e3) as usize).map(|i| (gain * (i as f32 * 0.05).sin()).clamp(-1.0, 1.0)).collect();
+        let samples = (0..(seconds * 16e3) as usize)
+            .map(|i| (gain * (i as f32 * 0.05).sin()).clamp(-1.0, 1.0))
+            .collect();
         Signal::new(samples, 16_000).unwrap()
     }
 
@@ -96,7 +97,9 @@ mod tests {
 
     #[test]
     fn short_and_silent_recordings_are_named() {
-        assert!(matches!(check(&tone(0.5, 0.9)), Err(Error::TooShort { recording, .. }) if recording == "test.wav"));
+        assert!(
+            matches!(check(&tone(0.5, 0.9)), Err(Error::TooShort { recording, .. }) if recording == "test.wav")
+        );
         assert!(matches!(check(&tone(1e-5, 2.0)), Err(Error::Silent { .. })));
     }
 }

@@ -72,7 +72,8 @@ impl MatchSummary {
             .iter()
             .zip(before_after)
             .map(|(name, (before, after))| {
-                let at_bands = |absorption: &PerBand<f64>| absorption.resampled(t60.bands()).values().to_vec();
+                let at_bands =
+                    |absorption: &PerBand<f64>| absorption.resampled(t60.bands()).values().to_vec();
                 let change = MaterialChange {
                     before: at_bands(before.absorption()),
                     after: at_bands(after.absorption()),
@@ -80,6 +81,7 @@ impl MatchSummary {
                 (name.clone(), change)
             })
             .collect();
+        let names: Vec<&str> = matched.material_names.iter().map(String::as_str).collect();
         Self {
             bands_hz: t60.bands().iter_hz().collect(),
             t60_target_s: t60.values().iter().map(|t| t.value).collect(),
@@ -101,7 +103,7 @@ impl MatchSummary {
             eq_sd_db: eq.iter().map(|(_, e)| e.standard_error).collect(),
             eq_simulated_db: simulated.iter().map(|(_, e)| Some(**e).filter(|e| e.is_finite())).collect(),
             materials,
-            not_determined: matched.fit.not_determined.iter().map(ToString::to_string).collect(),
+            not_determined: matched.fit.not_determined.iter().map(|u| u.describe(&names)).collect(),
             eq_filter_delay_s: matched.eq_filter.delay_s(),
             level_db: matched.level_db,
             sample_rate_hz: matched.matched.sample_rate_hz(),

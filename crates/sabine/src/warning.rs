@@ -14,7 +14,7 @@ pub enum Warning {
     },
     /// What the estimator says of the recording.
     #[error("recording: {0}")]
-    Speech(String),
+    Speech(sabine_estimator::Warning),
     /// The room file says nothing about the air.
     #[error("the room file has no [air]: 20 C, 50 % and 101.325 kPa are assumed")]
     AirAssumed,
@@ -66,6 +66,11 @@ pub enum Warning {
         limit_db: f64,
     },
     /// The mesh is not quite closed.
-    #[error("room model: {0}")]
-    Mesh(String),
+    #[error("the room model has {edges} open edges; {:.2} % of the rays escape through them", 100.0 * escape_rate)]
+    OpenMesh {
+        /// Edges with one triangle only.
+        edges: usize,
+        /// Share of rays from the source that meet nothing.
+        escape_rate: f64,
+    },
 }

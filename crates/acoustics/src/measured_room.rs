@@ -1,0 +1,438 @@
+//! A room as it was measured: mesh, materials as far as they are known, places and responses, from a folder.
+
+mod file;
+mod obj;
+mod polygon;
+mod write;
+
+pub use write::{NewResponse, NewRoom};
+
+use crate::audio::{Channel, probe_wav, read_audio};
+use crate::error::check_range;
+use crate::{
+    Air, Error, ImpulseResponse, Material, NamedMaterial, OctaveBands, PerBand, Receiver, Scene, Source,
+};
+use file::{AirTable, MaterialTable, PlaceTable, ResponseTable, RoomFile};
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, HashSet};
+use std::path::{Path, PathBuf};
+
+/// When a response's first sample was taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum TimeZero {
+    /// At the instant of emission.
+    Emission,
+    /// Unknown, but the same latency for all responses.
+    Common,
+    /// Unknown for each response.
+    PerResponse,
+}
+
+/// What the responses' levels mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Levels {
+    /// Calibrated: the direct sound at 1 m has amplitude 1.
+    Absolute,
+    /// One unknown gain for all responses.
+    Common,
+    /// An unknown gain for each response.
+    PerResponse,
+}
+
+/// What the measurement says about time and level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Measurement {
+    /// When the first sample was taken.
+    pub time_zero: TimeZero,
+    /// What levels mean.
+    pub levels: Levels,
+}
+
+/// How much is known of a material's absorption before anything is fitted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaterialPrior {
+    /// The room file's table, or `None` where the absorption is unknown and to be fitted; the scene then holds
+    /// [`MaterialPrior::UNKNOWN_ABSORPTION`] in its place.
+    pub absorption: Option<PerBand<f64>>,
+    /// How far the table is trusted: one standard deviation, 0.0001 to 1.
+    pub absorption_sd: PerBand<f64>,
+}
+
+impl MaterialPrior {
+    /// Stands in for an unknown absorption: about the mean of the surfaces in [`crate::material_library`].
+    pub const UNKNOWN_ABSORPTION: f64 = 0.2;
+    /// Standard deviation of an unknown absorption: about that of the surfaces in [`crate::material_library`].
+    pub const UNKNOWN_ABSORPTION_SD: f64 = 0.25;
+    /// Standard deviation of a table that does not state one (the format's default).
+    pub const TABLE_SD: f64 = 0.1;
+}
+
+/// Scattering of a material that does not state it (the format's default).
+const DEFAULT_SCATTERING: f64 = 0.1;
+
+/// A measured response: where it lies and between which places it was taken. Its samples are read by
+/// [`MeasuredRoom::load_response`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ResponseEntry {
+    /// Index of the source.
+    pub source: usize,
+    /// Index of the receiver.
+    pub receiver: usize,
+    /// The WAV file.
+    pub path: PathBuf,
+    /// The air when it was taken.
+    pub air: Air,
+    /// The measuring session, where the file names one.
+    pub session: Option<String>,
+    /// Its sample rate.
+    pub sample_rate_hz: u32,
+    /// Its length in seconds.
+    pub duration_s: f64,
+}
+
+/// A room on disk: `room.toml`, its mesh and its responses, checked.
+///
+/// ```
+/// use sabine_acoustics::{Levels, MeasuredRoom, TimeZero};
+/// let folder = tempfile::tempdir()?;
+/// let text = |name: &str, text: &str| std::fs::write(folder.path().join(name), text);
+/// text("room.toml", r#"
+///     room = { mesh = "room.obj" }
+///     bands = { centres_hz = [500, 1000] }
+///     materials.wall = { absorption = [0.10, 0.12] }
+///     materials.floor = {}
+/// "#)?;
+/// text("room.obj", "v 0 0 0\nv 4 0 0\nv 0 4 0\nv 0 0 4\nusemtl floor\nf 1 2 3\nusemtl wall\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
+/// let room = MeasuredRoom::read(folder.path())?;
+/// assert!((room.scene().volume_m3() - 32.0 / 3.0).abs() < 1e-9);
+/// assert_eq!(room.scene().materials()[1].name, "wall");
+/// assert_eq!(room.priors()[0].absorption, None); // the floor is to be fitted
+/// assert!(room.air_assumed());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeasuredRoom {
+    file: PathBuf,
+    scene: Scene,
+    faces_without_area: usize,
+    priors: Vec<MaterialPrior>,
+    air: Air,
+    air_assumed: bool,
+    measurement: Measurement,
+    sources: Vec<Source>,
+    receivers: Vec<Receiver>,
+    responses: Vec<ResponseEntry>,
+}
+
+impl MeasuredRoom {
+    /// Reads `room.toml` and the mesh of a folder, and the headers of its responses.
+    ///
+    /// Materials stand in the order in which the mesh first uses them, in the bands of the file. What takes rays to find out
+    /// (a place outside the mesh, a mesh that leaks) is for the tracer to say.
+    ///
+    /// # Errors
+    /// [`Error::Io`] and [`Error::Toml`] (grammar, unknown or missing keys, wrong types);
+    /// [`Error::MaterialWithoutTable`]; [`Error::InFile`] naming file and field, with the cause [`Error::TableWithoutMaterial`],
+    /// [`Error::BandCount`], [`Error::Length`], [`Error::OutOfRange`], [`Error::UnknownBand`], [`Error::BandOrder`],
+    /// [`Error::DuplicateId`], [`Error::UnknownId`], [`Error::Empty`], [`Error::ObjSyntax`], [`Error::NoMaterial`] or
+    /// [`Error::CrossedPolygon`]; for the responses what [`probe_wav`] gives and, where sample 0 is the emission,
+    /// [`Error::ShorterThanDirectSound`].
+    pub fn read(folder: impl AsRef<Path>) -> Result<Self, Error> {
+        let folder = folder.as_ref();
+        let path = folder.join("room.toml");
+        let file: RoomFile = toml::from_str(&read_text(&path)?)
+            .map_err(|source| Error::Toml { path: path.clone(), source: Box::new(source) })?;
+        let mesh_path = folder.join(&file.room.mesh);
+        let mesh = read_text(&mesh_path)?;
+        let mut room = Self::assemble(&path, &file, &mesh_path, &mesh)?;
+        for (i, table) in file.responses.iter().enumerate() {
+            let entry = room.entry(&file, i, table, folder)?;
+            room.responses.push(entry);
+        }
+        Ok(room)
+    }
+
+    /// Everything but the responses.
+    fn assemble(path: &Path, file: &RoomFile, mesh_path: &Path, mesh: &str) -> Result<Self, Error> {
+        let bands = bands(&file.bands.centres_hz).map_err(|e| e.in_file(path, "bands.centres_hz"))?;
+        let mesh = obj::parse_obj(mesh_path, mesh)?;
+        if let Some(name) = file.materials.keys().find(|name| !mesh.materials.contains(name)) {
+            let error = Error::TableWithoutMaterial { mesh: mesh_path.to_owned() };
+            return Err(error.in_file(path, format!("materials.{name}")));
+        }
+        let (materials, priors) = materials(path, bands, &file.materials, &mesh.materials, mesh_path)?;
+        let scene = Scene::new(mesh.vertices, mesh.triangles, materials)
+            .map_err(|error| error.in_file(mesh_path, "mesh"))?;
+        let air = match &file.air {
+            Some(AirTable { temperature_c, relative_humidity_percent, pressure_kpa }) => {
+                Air::new(*temperature_c, *relative_humidity_percent, *pressure_kpa)
+                    .map_err(|error| error.in_file(path, "air"))?
+            }
+            None => Air::default(),
+        };
+        let measurement = match &file.measurement {
+            Some(table) => Measurement { time_zero: table.time_zero, levels: table.levels },
+            None if file.responses.is_empty() => {
+                Measurement { time_zero: TimeZero::PerResponse, levels: Levels::PerResponse }
+            }
+            None => {
+                let error =
+                    Error::Empty { what: "the table that says what the responses' times and levels mean" };
+                return Err(error.in_file(path, "measurement"));
+            }
+        };
+        let sources = places(path, "sources", &file.sources)?
+            .into_iter()
+            .map(|Receiver { id, position_m, axis }| Source { id, position_m, axis })
+            .collect();
+        let receivers = places(path, "receivers", &file.receivers)?;
+        Ok(Self {
+            file: path.to_owned(),
+            scene,
+            faces_without_area: mesh.faces_without_area,
+            priors,
+            air,
+            air_assumed: file.air.is_none(),
+            measurement,
+            sources,
+            receivers,
+            responses: Vec::new(),
+        })
+    }
+
+    fn entry(
+        &self,
+        file: &RoomFile,
+        index: usize,
+        table: &ResponseTable,
+        folder: &Path,
+    ) -> Result<ResponseEntry, Error> {
+        let field = |name: &str| format!("responses[{index}].{name}");
+        let in_file = |name: &'static str| move |error: Error| error.in_file(&self.file, field(name));
+        let (source, receiver, air) = self.ends(table).map_err(|(name, error)| in_file(name)(error))?;
+        if file.responses[..index].iter().any(|other| other.file == table.file) {
+            let id = table.file.display().to_string();
+            return Err(in_file("file")(Error::DuplicateId { id }));
+        }
+        let path = folder.join(&table.file);
+        let info = probe_wav(&path)?;
+        if info.channels != 1 {
+            return Err(Error::ManyChannels { path, channels: info.channels });
+        }
+        let duration_s = info.frames as f64 / f64::from(info.sample_rate_hz.max(1));
+        let entry = ResponseEntry {
+            source,
+            receiver,
+            path,
+            air,
+            session: table.session.clone(),
+            sample_rate_hz: info.sample_rate_hz,
+            duration_s,
+        };
+        self.check_length(&entry)?;
+        Ok(entry)
+    }
+
+    /// Source, receiver and air of a response, or the offending field.
+    fn ends(&self, table: &ResponseTable) -> Result<(usize, usize, Air), (&'static str, Error)> {
+        let source = self.source_index(&table.source).map_err(|e| ("source", e))?;
+        let receiver = self.receiver_index(&table.receiver).map_err(|e| ("receiver", e))?;
+        let temperature_c = table.temperature_c.unwrap_or(self.air.temperature_c());
+        let humidity = table.relative_humidity_percent.unwrap_or(self.air.relative_humidity_percent());
+        let air = Air::new(temperature_c, humidity, self.air.pressure_kpa()).map_err(|e| match e {
+            Error::OutOfRange { field, .. } => (field, e),
+            other => ("temperature_c", other),
+        })?;
+        Ok((source, receiver, air))
+    }
+
+    /// A response whose clock starts at the emission must last until the direct sound has come.
+    fn check_length(&self, entry: &ResponseEntry) -> Result<(), Error> {
+        if self.measurement.time_zero != TimeZero::Emission {
+            return Ok(());
+        }
+        let (from, to) = (self.sources[entry.source].position_m, self.receivers[entry.receiver].position_m);
+        let distance_m = (0..3).map(|k| (from[k] - to[k]).powi(2)).sum::<f64>().sqrt();
+        let direct_s = distance_m / entry.air.speed_of_sound_m_s();
+        if entry.duration_s > direct_s {
+            return Ok(());
+        }
+        let error = Error::ShorterThanDirectSound { duration_s: entry.duration_s, direct_s };
+        Err(error.in_file(&entry.path, "samples"))
+    }
+
+    /// Mesh and materials, in the bands of the file.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Faces of the mesh file that are lines or points: left out, since nothing can be reflected by them.
+    pub fn faces_without_area(&self) -> usize {
+        self.faces_without_area
+    }
+
+    /// How well each material of the scene is known, in the same order.
+    pub fn priors(&self) -> &[MaterialPrior] {
+        &self.priors
+    }
+
+    /// The bands of the material tables.
+    pub fn bands(&self) -> OctaveBands {
+        self.scene.materials()[0].material.bands()
+    }
+
+    /// The air, unless a response says otherwise.
+    pub fn air(&self) -> Air {
+        self.air
+    }
+
+    /// Whether the file is silent about the air, so that 20 C, 50 % and 101.325 kPa are assumed: worth a word in a report.
+    pub fn air_assumed(&self) -> bool {
+        self.air_assumed
+    }
+
+    /// What times and levels of the responses mean.
+    pub fn measurement(&self) -> Measurement {
+        self.measurement
+    }
+
+    /// Sources.
+    pub fn sources(&self) -> &[Source] {
+        &self.sources
+    }
+
+    /// Receivers.
+    pub fn receivers(&self) -> &[Receiver] {
+        &self.receivers
+    }
+
+    /// Measured responses.
+    pub fn responses(&self) -> &[ResponseEntry] {
+        &self.responses
+    }
+
+    /// The source of this name.
+    ///
+    /// # Errors
+    /// [`Error::InFile`] with the cause [`Error::UnknownId`].
+    pub fn source(&self, id: &str) -> Result<&Source, Error> {
+        let index = self.source_index(id).map_err(|error| error.in_file(&self.file, "sources"))?;
+        Ok(&self.sources[index])
+    }
+
+    /// The receiver of this name.
+    ///
+    /// # Errors
+    /// [`Error::InFile`] with the cause [`Error::UnknownId`].
+    pub fn receiver(&self, id: &str) -> Result<&Receiver, Error> {
+        let index = self.receiver_index(id).map_err(|error| error.in_file(&self.file, "receivers"))?;
+        Ok(&self.receivers[index])
+    }
+
+    /// Reads the samples of a response, as they stand in its file.
+    ///
+    /// # Errors
+    /// [`Error::Index`] if there is no such response; else as [`read_audio`].
+    pub fn load_response(&self, index: usize) -> Result<ImpulseResponse, Error> {
+        let count = self.responses.len();
+        let entry = self.responses.get(index).ok_or(Error::Index { what: "response", index, count })?;
+        Ok(read_audio(&entry.path, Channel::Mono)?.into())
+    }
+
+    fn source_index(&self, id: &str) -> Result<usize, Error> {
+        self.sources.iter().position(|s| s.id == id).ok_or_else(|| Error::UnknownId { id: id.to_owned() })
+    }
+
+    fn receiver_index(&self, id: &str) -> Result<usize, Error> {
+        self.receivers.iter().position(|r| r.id == id).ok_or_else(|| Error::UnknownId { id: id.to_owned() })
+    }
+}
+
+fn read_text(path: &Path) -> Result<String, Error> {
+    let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
+    // Names may be in any old encoding; numbers and keywords are ASCII.
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+fn bands(centres_hz: &[f64]) -> Result<OctaveBands, Error> {
+    for &centre in centres_hz {
+        check_range("centre (Hz)", centre, 62.0, 16_500.0, "an octave centre from 62.5 to 16000")?;
+    }
+    OctaveBands::from_centres_hz(centres_hz)
+}
+
+fn materials(
+    path: &Path,
+    bands: OctaveBands,
+    tables: &BTreeMap<String, MaterialTable>,
+    names: &[String],
+    mesh: &Path,
+) -> Result<(Vec<NamedMaterial>, Vec<MaterialPrior>), Error> {
+    let one = |name: &String| {
+        let table = tables
+            .get(name)
+            .ok_or_else(|| Error::MaterialWithoutTable { material: name.clone(), mesh: mesh.to_owned() })?;
+        let column = |field: &'static str, values: &Option<Vec<f64>>, low: f64, range: &'static str| {
+            let checked = |values: &Vec<f64>| {
+                values.iter().try_for_each(|&v| check_range(field, v, low, 1.0, range))?;
+                PerBand::new(bands, values.clone())
+            };
+            values
+                .as_ref()
+                .map(checked)
+                .transpose()
+                .map_err(|error| error.in_file(path, format!("materials.{name}.{field}")))
+        };
+        let absorption = column("absorption", &table.absorption, 0.0, "between 0 and 1")?;
+        let sd = column("absorption_sd", &table.absorption_sd, 1e-4, "between 0.0001 and 1")?;
+        let scattering = column("scattering", &table.scattering, 0.0, "between 0 and 1")?;
+        let uniform = |value| PerBand::uniform(bands, value);
+        let (mean, default_sd) = match &absorption {
+            Some(table) => (table.clone(), MaterialPrior::TABLE_SD),
+            None => (uniform(MaterialPrior::UNKNOWN_ABSORPTION), MaterialPrior::UNKNOWN_ABSORPTION_SD),
+        };
+        let material = Material::new(mean, scattering.unwrap_or_else(|| uniform(DEFAULT_SCATTERING)))
+            .map_err(|error| error.in_file(path, format!("materials.{name}")))?;
+        let prior = MaterialPrior { absorption, absorption_sd: sd.unwrap_or_else(|| uniform(default_sd)) };
+        Ok((NamedMaterial { name: name.clone(), material }, prior))
+    };
+    let both: Result<Vec<_>, Error> = names.iter().map(one).collect();
+    Ok(both?.into_iter().unzip())
+}
+
+/// Sources or receivers: the file says the same of both.
+fn places(path: &Path, kind: &str, tables: &[PlaceTable]) -> Result<Vec<Receiver>, Error> {
+    let mut ids = HashSet::new();
+    let mut places = Vec::with_capacity(tables.len());
+    for (i, table) in tables.iter().enumerate() {
+        let in_field = |error: Error, name: &str| error.in_file(path, format!("{kind}[{i}].{name}"));
+        if !ids.insert(&table.id) {
+            return Err(in_field(Error::DuplicateId { id: table.id.clone() }, "id"));
+        }
+        let position_m = position(&table.position_m).map_err(|e| in_field(e, "position_m"))?;
+        let axis = table.orientation.as_deref().map(direction).transpose();
+        let axis = axis.map_err(|e| in_field(e, "orientation"))?;
+        places.push(Receiver { id: table.id.clone(), position_m, axis });
+    }
+    Ok(places)
+}
+
+fn position(values: &[f64]) -> Result<[f64; 3], Error> {
+    let position =
+        <[f64; 3]>::try_from(values).map_err(|_| Error::Length { expected: 3, found: values.len() })?;
+    for coordinate in position {
+        check_range("position (m)", coordinate, -1e5, 1e5, "finite and within 100 km")?;
+    }
+    Ok(position)
+}
+
+fn direction(values: &[f64]) -> Result<[f64; 3], Error> {
+    let axis = position(values)?;
+    let length = axis.iter().map(|c| c * c).sum::<f64>().sqrt();
+    check_range("length of the unit vector", length, 0.99, 1.01, "1")?;
+    Ok(axis.map(|c| c / length))
+}

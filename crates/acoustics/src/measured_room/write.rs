@@ -1,0 +1,154 @@
+//! Writing a measured room.
+
+use super::file::{
+    AirTable, BandsTable, MaterialTable, MeasurementTable, PlaceTable, ResponseTable, RoomFile, RoomTable,
+};
+use super::{MaterialPrior, MeasuredRoom, Measurement};
+use crate::audio::{SampleFormat, write_wav};
+use crate::{Air, Error, ImpulseResponse, Receiver, Scene, Source};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// A room to be written to disk.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NewRoom {
+    /// Mesh and materials; their scattering is written as it stands.
+    pub scene: Scene,
+    /// Absorption as the file is to state it (or not), for each material of the scene.
+    pub priors: Vec<MaterialPrior>,
+    /// The air, if the file is to state it.
+    pub air: Option<Air>,
+    /// What times and levels mean.
+    pub measurement: Measurement,
+    /// Sources.
+    pub sources: Vec<Source>,
+    /// Receivers.
+    pub receivers: Vec<Receiver>,
+    /// Responses.
+    pub responses: Vec<NewResponse>,
+}
+
+/// A response to be written to disk.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NewResponse {
+    /// Source, by name.
+    pub source: String,
+    /// Receiver, by name.
+    pub receiver: String,
+    /// File name below `ir/`, without its ending.
+    pub name: String,
+    /// The air, where it differs from the room's; its pressure is the room's.
+    pub air: Option<Air>,
+    /// The measuring session.
+    pub session: Option<String>,
+    /// The samples, written in 32-bit floating point.
+    pub samples: ImpulseResponse,
+}
+
+impl NewRoom {
+    /// Writes the room as a new folder, and reads it back. The folder appears when it is complete, or not at all; it must not
+    /// exist before, or be empty.
+    ///
+    /// # Errors
+    /// As [`MeasuredRoom::read`]; [`Error::MaterialCount`] unless there is a prior for each material; [`Error::Io`] if
+    /// something cannot be written.
+    pub fn write(&self, folder: impl AsRef<Path>) -> Result<MeasuredRoom, Error> {
+        let folder = folder.as_ref();
+        if self.priors.len() != self.scene.materials().len() {
+            let (expected, found) = (self.scene.materials().len(), self.priors.len());
+            return Err(Error::MaterialCount { expected, found });
+        }
+        let mut name = folder.file_name().unwrap_or_default().to_owned();
+        name.push(format!(".{}.tmp", std::process::id()));
+        let draft = folder.with_file_name(name);
+        let written = self.fill(&draft).and_then(|()| {
+            std::fs::rename(&draft, folder).map_err(|source| Error::Io { path: folder.to_owned(), source })
+        });
+        if let Err(error) = written {
+            // The error that counts is the first.
+            let _ = std::fs::remove_dir_all(&draft);
+            return Err(error);
+        }
+        MeasuredRoom::read(folder)
+    }
+
+    fn fill(&self, draft: &Path) -> Result<(), Error> {
+        let io = |path: &Path| {
+            let path = path.to_owned();
+            move |source| Error::Io { path, source }
+        };
+        let ir = draft.join("ir");
+        std::fs::create_dir_all(&ir).map_err(io(&ir))?;
+        for response in &self.responses {
+            let path = ir.join(format!("{}.wav", response.name));
+            let (samples, rate) = (response.samples.samples(), response.samples.sample_rate_hz());
+            write_wav(&path, samples, rate, SampleFormat::Float32)?;
+        }
+        let mesh = draft.join("room.obj");
+        std::fs::write(&mesh, self.obj()).map_err(io(&mesh))?;
+        let path = draft.join("room.toml");
+        let text =
+            toml::to_string(&self.tables()).map_err(|error| Error::implementation("room.toml", error))?;
+        std::fs::write(&path, text).map_err(io(&path))?;
+        // What cannot be read back is refused before the folder gets its name.
+        MeasuredRoom::read(draft).map(|_| ())
+    }
+
+    fn obj(&self) -> String {
+        let mut text = String::from("# metres, z up\n");
+        for [x, y, z] in self.scene.vertices() {
+            // Writing to a String cannot fail.
+            let _ = writeln!(text, "v {x} {y} {z}");
+        }
+        for (index, named) in self.scene.materials().iter().enumerate() {
+            let _ = writeln!(text, "usemtl {}", named.name);
+            for triangle in self.scene.triangles().iter().filter(|t| t.material as usize == index) {
+                let [a, b, c] = triangle.vertices.map(|v| v + 1);
+                let _ = writeln!(text, "f {a} {b} {c}");
+            }
+        }
+        text
+    }
+
+    fn tables(&self) -> RoomFile {
+        let material = |(named, prior): (&crate::NamedMaterial, &MaterialPrior)| {
+            let values = |column: &crate::PerBand<f64>| Some(column.values().to_vec());
+            let table = MaterialTable {
+                absorption: prior.absorption.as_ref().and_then(values),
+                absorption_sd: values(&prior.absorption_sd),
+                scattering: values(named.material.scattering()),
+            };
+            (named.name.clone(), table)
+        };
+        let place = |id: &String, position: [f64; 3], axis: Option<[f64; 3]>| PlaceTable {
+            id: id.clone(),
+            position_m: position.to_vec(),
+            orientation: axis.map(|a| a.to_vec()),
+        };
+        let response = |response: &NewResponse| ResponseTable {
+            source: response.source.clone(),
+            receiver: response.receiver.clone(),
+            file: PathBuf::from("ir").join(format!("{}.wav", response.name)),
+            temperature_c: response.air.map(|air| air.temperature_c()),
+            relative_humidity_percent: response.air.map(|air| air.relative_humidity_percent()),
+            session: response.session.clone(),
+        };
+        RoomFile {
+            room: RoomTable { mesh: "room.obj".into() },
+            air: self.air.map(|air| AirTable {
+                temperature_c: air.temperature_c(),
+                relative_humidity_percent: air.relative_humidity_percent(),
+                pressure_kpa: air.pressure_kpa(),
+            }),
+            measurement: Some(MeasurementTable {
+                time_zero: self.measurement.time_zero,
+                levels: self.measurement.levels,
+            }),
+            bands: BandsTable { centres_hz: self.scene.materials()[0].material.bands().iter_hz().collect() },
+            materials: self.scene.materials().iter().zip(&self.priors).map(material).collect(),
+            sources: self.sources.iter().map(|s| place(&s.id, s.position_m, s.axis)).collect(),
+            receivers: self.receivers.iter().map(|r| place(&r.id, r.position_m, r.axis)).collect(),
+            responses: self.responses.iter().map(response).collect(),
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! How the equalisation of real responses spreads.
+
+use crate::error::Error;
+use crate::labels::Labels;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+use sabine_acoustics::{OctaveBands, PerBand};
+
+/// Mean and standard deviation per octave of the equalisation of a collection of responses, 62.5 Hz to 4 kHz, dB re 1 kHz
+/// ([`OctaveBands::EQ`]).
+#[derive(Clone, Debug, PartialEq)]
+pub struct EqStatistics {
+    mean_db: PerBand<f64>,
+    standard_deviation_db: PerBand<f64>,
+    responses: usize,
+}
+
+impl EqStatistics {
+    /// The statistics of the measured responses in `docs/validation/augment.md` (between rooms, every room weighing the
+    /// same): published collections of ten rooms with their loudspeakers and microphones.
+    pub fn measured() -> Self {
+        let bands = OctaveBands::EQ;
+        let values = |v: [f64; 7]| PerBand::from_fn(bands, |i| v[i]);
+        Self {
+            mean_db: values(MEASURED_MEAN_DB),
+            standard_deviation_db: values(MEASURED_SD_DB),
+            responses: MEASURED_RESPONSES,
+        }
+    }
+
+    /// Fits a normal distribution per octave to labels of responses grouped by room, every room weighing the same. Missing
+    /// readings are left out.
+    ///
+    /// # Errors
+    /// [`Error::TooFew`] where an octave has fewer than two rooms with a reading.
+    pub fn fit<'a>(rooms: impl IntoIterator<Item = &'a [Labels]>) -> Result<Self, Error> {
+        let bands = OctaveBands::EQ;
+        let rooms: Vec<&[Labels]> = rooms.into_iter().collect();
+        let responses = rooms.iter().map(|r| r.len()).sum();
+        let (mut mean, mut deviation) = (Vec::new(), Vec::new());
+        for band in 0..bands.len() {
+            let per_room: Vec<f64> = rooms
+                .iter()
+                .filter_map(|room| {
+                    let read: Vec<f64> =
+                        room.iter().filter_map(|l| l.eq_db().values()[band].as_ref().ok()).map(|e| e.value).collect();
+                    (!read.is_empty()).then(|| read.iter().sum::<f64>() / read.len() as f64)
+                })
+                .collect();
+            if per_room.len() < 2 {
+                return Err(Error::TooFew {
+                    what: "rooms",
+                    purpose: "the spread of the equalisation",
+                    needed: 2,
+                    found: per_room.len(),
+                });
+            }
+            let n = per_room.len() as f64;
+            let m = per_room.iter().sum::<f64>() / n;
+            mean.push(m);
+            deviation.push((per_room.iter().map(|v| (v - m).powi(2)).sum::<f64>() / (n - 1.0)).sqrt());
+        }
+        Ok(Self {
+            mean_db: PerBand::new(bands, mean)?,
+            standard_deviation_db: PerBand::new(bands, deviation)?,
+            responses,
+        })
+    }
+
+    /// Mean per octave in dB re 1 kHz.
+    pub fn mean_db(&self) -> &PerBand<f64> {
+        &self.mean_db
+    }
+
+    /// Standard deviation per octave in dB; 0 at 1 kHz.
+    pub fn standard_deviation_db(&self) -> &PerBand<f64> {
+        &self.standard_deviation_db
+    }
+
+    /// Number of responses behind the statistics.
+    pub fn responses(&self) -> usize {
+        self.responses
+    }
+
+    /// Levels drawn independently per octave with the standard deviation times `inflation` (Tang et al. 2020, 3.3),
+    /// within two and a half standard deviations.
+    pub(crate) fn draw_db(&self, rng: &mut Pcg64, inflation: f64) -> PerBand<f64> {
+        PerBand::from_fn(self.mean_db.bands(), |band| {
+            let normal: f64 = StandardNormal.sample(rng);
+            self.mean_db.values()[band]
+                + inflation * self.standard_deviation_db.values()[band] * normal.clamp(-2.5, 2.5)
+        })
+    }
+}
+
+/// Mean over rooms at 62.5 Hz to 4 kHz, dB re 1 kHz.
+const MEASURED_MEAN_DB: [f64; 7] = [-8.0, -2.8, -0.8, -0.8, 0.0, -0.6, -3.0];
+/// Standard deviation between rooms, dB.
+const MEASURED_SD_DB: [f64; 7] = [9.0, 5.0, 4.6, 2.7, 0.0, 3.2, 4.4];
+/// Responses behind them.
+const MEASURED_RESPONSES: usize = 197;

@@ -1,0 +1,232 @@
+//! The same room, more or less absorbent.
+
+use crate::direct::Direct;
+use crate::error::{Error, check, check_span};
+use crate::seed::{derive, generator};
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+use sabine_acoustics::{Augment, DecayFit, FilterBank, ImpulseResponse, NoReading, OctaveBands};
+
+/// ln(10^6): power falls by 60 dB in this many time constants.
+const LN_MILLION: f64 = 13.815_510_557_964_274;
+/// The recorded tail is kept to where it stands this far above its noise, dB: there the noise adds 0.4 dB.
+const NOISE_MARGIN_DB: f64 = 10.0;
+/// Share of an octave's width that a split band of Gaussian noise effectively has (integral of g^4 squared over that of g^8
+/// for the crossovers of [`FilterBank`], about).
+const EFFECTIVE_WIDTH: f64 = 0.8;
+/// Octaves (of eight) in which a decay must be found.
+const LEAST_OCTAVES: usize = 4;
+
+/// Settings of [`T60Augment`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct T60Config {
+    /// Range of the full-band reverberation time to draw from, in seconds, within 0.05 to 10. Default 0.1 to 1.5
+    /// (Bryan 2020).
+    pub t60_s: (f64, f64),
+    /// Length of the cross-fade from the recorded tail to noise, in seconds, 0.005 to 0.5. Default 0.05.
+    pub crossfade_s: f64,
+    /// The longest response made, in seconds, 0.1 to 20. Default 2.5.
+    pub longest_s: f64,
+}
+
+impl Default for T60Config {
+    fn default() -> Self {
+        Self { t60_s: (0.1, 1.5), crossfade_s: 0.05, longest_s: 2.5 }
+    }
+}
+
+/// Stretches or shortens the decay of every octave by the same factor, so that the full band gets a drawn reverberation
+/// time while the spectral shape stays; the direct sound, 2.5 ms on either side of the largest sample, stays as it is.
+///
+/// In each octave a decay plus noise is fitted. Where the recording sinks into its noise it is cross-faded into Gaussian
+/// noise that goes on decaying; then the late part is multiplied by the ratio of the decay wanted to the decay found (for a
+/// single slope, exp(-(t - t0)(tau - tau') / (tau tau')); Bryan 2020). What is added to the response is the difference that
+/// this makes, so that where nothing changes nothing is touched.
+///
+/// An octave in which no decay can be read takes the factor of the nearest octave that has one, and no noise.
+#[derive(Clone, Debug)]
+pub struct T60Augment {
+    config: T60Config,
+}
+
+impl T60Augment {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`Error::Setting`].
+    pub fn new(config: T60Config) -> Result<Self, Error> {
+        check_span("t60_s", config.t60_s, 0.05, 10.0, "a rising range within 0.05 to 10 s")?;
+        check("crossfade_s", config.crossfade_s, 0.005, 0.5, "between 5 and 500 ms")?;
+        check("longest_s", config.longest_s, 0.1, 20.0, "between 0.1 and 20 s")?;
+        Ok(Self { config })
+    }
+
+    /// The response with a full-band reverberation time of `target_s`; `seed` draws the noise.
+    ///
+    /// # Errors
+    /// [`Error::NoDirectSound`] and the like for a response that cannot be split, [`Error::NoDecay`] where the decay cannot
+    /// be read.
+    pub fn to_s(&self, response: &ImpulseResponse, target_s: f64, seed: u64) -> Result<ImpulseResponse, Error> {
+        let factor = target_s / self.full_band_s(response)?;
+        self.by_factor(response, factor, seed)
+    }
+
+    /// The full-band reverberation time that [`T60Augment::to_s`] changes, in seconds.
+    ///
+    /// # Errors
+    /// As [`T60Augment::to_s`].
+    pub fn full_band_s(&self, response: &ImpulseResponse) -> Result<f64, Error> {
+        let direct = Direct::find(response)?;
+        let rate = f64::from(response.sample_rate_hz());
+        let start_s = direct.end as f64 / rate;
+        let fit = fit(response.samples(), rate, start_s, 0.5 * rate)
+            .map_err(|reason| Error::NoDecay { centre_hz: 1000.0, reason })?;
+        Ok(fit.t60_s().value)
+    }
+
+    /// The response with the reverberation time of every octave times `factor`.
+    ///
+    /// # Errors
+    /// As [`T60Augment::to_s`].
+    pub fn by_factor(&self, response: &ImpulseResponse, factor: f64, seed: u64) -> Result<ImpulseResponse, Error> {
+        check("factor", factor, 1e-3, 1e3, "between 0.001 and 1000")?;
+        let direct = Direct::find(response)?;
+        let rate_hz = response.sample_rate_hz();
+        let rate = f64::from(rate_hz);
+        let bands = octaves_below(0.5 * rate)?;
+        let bank = FilterBank::new(bands, rate_hz)?;
+        let mut late = response.samples().to_vec();
+        late[..direct.end].fill(0.0);
+        let parts = bank.split(&late);
+        let start_s = direct.end as f64 / rate;
+        let fits: Vec<Result<DecayFit, NoReading>> = (0..bands.len())
+            .map(|band| {
+                let (low_hz, high_hz) = bands.edges_hz(band);
+                let width_hz = EFFECTIVE_WIDTH * (high_hz.min(0.5 * rate) - low_hz);
+                // Past the smearing of the filter, about one over the bandwidth.
+                fit(&parts.values()[band], rate, start_s + 1.0 / width_hz, width_hz)
+            })
+            .collect();
+        let readable = fits.iter().filter(|f| f.is_ok()).count();
+        if readable < LEAST_OCTAVES {
+            let (centre_hz, reason) = bands
+                .iter_hz()
+                .zip(&fits)
+                .find_map(|(hz, f)| f.as_ref().err().map(|reason| (hz, reason.clone())))
+                .unwrap_or((1000.0, NoReading::NoDecay));
+            return Err(Error::NoDecay { centre_hz, reason });
+        }
+        let longest_s =
+            fits.iter().flatten().map(|f| f.t60_s().value).fold(0.0, f64::max) * factor;
+        let wanted = ((start_s + longest_s).min(self.config.longest_s) * rate) as usize;
+        // A shorter decay needs no fewer samples; a longer one needs more.
+        let length = wanted.max(late.len());
+        let mut sum: Vec<f64> = response.samples().iter().map(|&s| f64::from(s)).collect();
+        sum.resize(length, 0.0);
+        let white: Vec<f32> = {
+            let rng = &mut generator(seed);
+            (0..length).map(|_| StandardNormal.sample(rng)).collect()
+        };
+        let noises = bank.split(&white);
+        for (band, found) in fits.iter().enumerate() {
+            let own = found.is_ok();
+            let nearest = (0..fits.len())
+                .filter_map(|other| fits[other].as_ref().ok().map(|f| (band.abs_diff(other), f)))
+                .min_by_key(|(far, _)| *far);
+            let Some((_, fit)) = nearest else { continue };
+            let change = Change::new(fit, factor, self.config.crossfade_s, own);
+            change.apply(&parts.values()[band], &noises.values()[band], direct.end, rate, &mut sum);
+        }
+        let samples = sum.into_iter().map(|s| s as f32).collect();
+        Ok(ImpulseResponse::new(samples, rate_hz)?)
+    }
+}
+
+impl Augment for T60Augment {
+    fn augment(&self, response: &ImpulseResponse, seed: u64) -> Result<ImpulseResponse, sabine_acoustics::Error> {
+        let (low, high) = self.config.t60_s;
+        let target_s = generator(seed).random_range(low..=high);
+        Ok(self.to_s(response, target_s, derive(seed, 1))?)
+    }
+}
+
+/// What happens to one octave.
+struct Change<'a> {
+    fit: &'a DecayFit,
+    factor: f64,
+    /// Begin and end of the cross-fade to noise, s; none where the recording goes on to its end.
+    crossfade_s: Option<(f64, f64)>,
+}
+
+impl<'a> Change<'a> {
+    fn new(fit: &'a DecayFit, factor: f64, crossfade_s: f64, own: bool) -> Self {
+        // The fit falls with time: halve the interval until the decay stands the margin above the noise.
+        let margin = 10f64.powf(NOISE_MARGIN_DB / 10.0);
+        let crossfade_s = own.then(|| {
+            let (mut low, mut high) = (fit.start_s(), fit.knee_s());
+            for _ in 0..50 {
+                let middle = 0.5 * (low + high);
+                if fit.decay_power_at(middle) > margin * fit.noise_power() { low = middle } else { high = middle }
+            }
+            ((low - crossfade_s).max(fit.start_s()), low)
+        });
+        Self { fit, factor, crossfade_s }
+    }
+
+    /// Power of the decay wanted at a time.
+    fn wanted_power_at(&self, time_s: f64) -> f64 {
+        let start_s = self.fit.start_s();
+        // Times count from the start of the fit, where both decays have the same power.
+        self.fit
+            .slopes()
+            .iter()
+            .map(|s| s.power * (-(time_s - start_s) * LN_MILLION / (self.factor * s.t60_s.value)).exp())
+            .sum()
+    }
+
+    /// Adds to `sum` what changes in this octave after `from`.
+    fn apply(&self, part: &[f32], noise: &[f32], from: usize, rate: f64, sum: &mut [f64]) {
+        // At the end of the direct sound the gain is one.
+        let at_start = self.gain(from as f64 / rate);
+        let noise_power = noise.iter().map(|&n| f64::from(n).powi(2)).sum::<f64>() / noise.len().max(1) as f64;
+        let silent = 1e-14 * self.fit.decay_power_at(self.fit.start_s());
+        for (i, total) in sum.iter_mut().enumerate().skip(from) {
+            let t = i as f64 / rate;
+            let recorded = part.get(i).map_or(0.0, |&s| f64::from(s));
+            let fade = match self.crossfade_s {
+                Some((begin, end)) => ((t - begin) / (end - begin).max(1e-9)).clamp(0.0, 1.0),
+                None => 0.0,
+            };
+            // Recording and noise are uncorrelated: their powers add up to one.
+            let angle = std::f64::consts::FRAC_PI_2 * fade;
+            let mut changed = 0.0;
+            if fade < 1.0 {
+                changed += angle.cos() * recorded * self.gain(t) / at_start;
+            }
+            if fade > 0.0 {
+                let wanted = self.wanted_power_at(t) / (at_start * at_start);
+                if wanted > silent {
+                    changed += angle.sin() * f64::from(noise[i]) * (wanted / noise_power).sqrt();
+                }
+            }
+            *total += changed - recorded;
+        }
+    }
+
+    /// Ratio of the decay wanted to the decay found, in amplitude.
+    fn gain(&self, time_s: f64) -> f64 {
+        (self.wanted_power_at(time_s) / self.fit.decay_power_at(time_s)).sqrt()
+    }
+}
+
+fn fit(samples: &[f32], rate: f64, start_s: f64, bandwidth_hz: f64) -> Result<DecayFit, NoReading> {
+    let energy: Vec<f64> = samples.iter().map(|&s| f64::from(s).powi(2)).collect();
+    DecayFit::fit(&energy, 1.0 / rate, start_s, bandwidth_hz)
+}
+
+/// 62.5 Hz up to the last octave that begins well below a frequency.
+fn octaves_below(limit_hz: f64) -> Result<OctaveBands, Error> {
+    let all = OctaveBands::new(62.5, 16_000.0)?;
+    let count = (0..all.len()).take_while(|&b| all.edges_hz(b).0 < 0.9 * limit_hz).count().max(1);
+    Ok(OctaveBands::new(62.5, all.nominal_hz(count - 1))?)
+}
