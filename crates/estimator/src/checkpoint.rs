@@ -5,10 +5,12 @@ use crate::config::NetworkConfig;
 use crate::parameters::Parameters;
 use crate::trainer::{EpochRecord, TrainConfig};
 use crate::{Error, WeightsFault};
+use sabine_acoustics::write_atomically;
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
+use std::io::Write;
 use std::path::Path;
 
 const FIELD: &str = "sabine-checkpoint-1";
@@ -71,7 +73,7 @@ impl Checkpoint {
             .map_err(|source| fault(WeightsFault::Container { source }))?;
         let bytes = safetensors::serialize(views, Some(HashMap::from([(FIELD.to_owned(), header)])))
             .map_err(|source| fault(WeightsFault::Container { source }))?;
-        write_whole(path, &bytes)
+        Ok(write_atomically(path, |file| file.write_all(&bytes))?)
     }
 
     /// Reads a checkpoint of the same training.
@@ -137,22 +139,4 @@ fn difference(a: &TrainConfig, b: &TrainConfig) -> Option<&'static str> {
     .into_iter()
     .find(|(_, differs)| *differs)
     .map(|(field, _)| field)
-}
-
-/// Writes a file under a temporary name beside it and renames it.
-pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(".part");
-    let temporary = path.with_file_name(name);
-    let write = || -> std::io::Result<()> {
-        let mut file = std::fs::File::create(&temporary)?;
-        std::io::Write::write_all(&mut file, bytes)?;
-        file.sync_all()?;
-        std::fs::rename(&temporary, path)
-    };
-    write().map_err(|source| {
-        // Best effort: the first error is the one that matters.
-        let _ = std::fs::remove_file(&temporary);
-        Error::Io { path: path.to_owned(), source }
-    })
 }

@@ -167,6 +167,11 @@ impl<'a> Trainer<'a> {
         Ok(Self { config, dataset, layout, normalisation, labels, folder: folder.map(Path::to_owned) })
     }
 
+    /// The settings, with the outputs that follow from the loss.
+    pub fn config(&self) -> &TrainConfig {
+        &self.config
+    }
+
     /// Trains from the beginning, or from the checkpoint in the folder if `resume`; the result is the same either way.
     ///
     /// # Errors
