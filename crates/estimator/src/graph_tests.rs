@@ -248,28 +248,3 @@ fn threads_do_not_change_a_bit() {
     assert_eq!(one, run(2));
     assert_eq!(one, run(5));
 }
-
-#[test]
-#[ignore]
-fn timing() {
-    let config = NetworkConfig { outputs: 13, ..NetworkConfig::small() };
-    let parameters = Parameters::random(&config, 5).unwrap();
-    let inputs = noise(64 * config.mels * config.frames, 6);
-    for threads in [1, 2] {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| {
-            let mut graph = Graph::new(&parameters).unwrap();
-            for _ in 0..3 {
-                let t = std::time::Instant::now();
-                let out = graph.forward(|x| x.clone_from(&inputs), None).unwrap();
-                let tf = t.elapsed();
-                let gradients = out.sqr().unwrap().sum_all().unwrap().backward().unwrap();
-                let tt = t.elapsed();
-                println!("{threads} threads: forward {tf:?} total {tt:?} {:.0}/s", 64.0 / tt.as_secs_f64());
-            }
-            let n = Network::new(&parameters);
-            let t = std::time::Instant::now();
-            for _ in 0..4 { n.infer_batch(&inputs); }
-            println!("infer {:.0}/s", 256.0 / t.elapsed().as_secs_f64());
-        });
-    }
-}

@@ -6,6 +6,13 @@ use std::fmt;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Warning {
+    /// The recording was brought to the sample rate of the network.
+    Resampled {
+        /// Its sample rate in Hz.
+        from_hz: u32,
+        /// That of the network in Hz.
+        to_hz: u32,
+    },
     /// The recording is shorter than a window; it was repeated to fill one.
     Short {
         /// Its length in seconds.
@@ -53,6 +60,7 @@ pub enum Warning {
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Resampled { from_hz, to_hz } => write!(f, "resampled from {from_hz} to {to_hz} Hz"),
             Self::Short { duration_s, window_s } => {
                 write!(f, "the recording lasts {duration_s:.1} s; it was repeated to fill a window of {window_s:.1} s")
             }
