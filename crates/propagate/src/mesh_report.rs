@@ -54,8 +54,11 @@ impl MeshReport {
         let (mut degenerate_triangles, mut duplicate_triangles) = (Vec::new(), Vec::new());
         for (i, triangle) in scene.triangles().iter().enumerate() {
             let [a, b, c] = triangle.vertices.map(|v| welded[v as usize]);
-            if mesh.surfaces.triangles[i].is_degenerate() || a == b || b == c || c == a {
+            if mesh.surfaces.triangles[i].is_degenerate() {
                 degenerate_triangles.push(i);
+            }
+            // A needle along an edge may close it, where it joins three points of a line.
+            if a == b || b == c || c == a {
                 continue;
             }
             let mut corners = [a, b, c];

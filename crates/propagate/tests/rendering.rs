@@ -1,5 +1,6 @@
 //! The rendered response, measured: octave filters in the time domain, which share no code with the renderer.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
+#![allow(clippy::needless_range_loop)] // a band indexes several things
 
 use sabine_acoustics::*;
 use sabine_propagate::*;
@@ -220,7 +221,7 @@ fn a_flat_reflection_is_an_impulse_at_any_rate() {
         let mut paths = PathSet::new(1, 40.0 * length_m);
         paths.push(path(length_m, 2.0 * 0.25f64.ln(), PathSet::DIRECT, None));
         let config = RenderConfig { sample_rate_hz: rate, ..Default::default() };
-        let response = render(&paths, &[dry.clone()], config);
+        let response = render(&paths, std::slice::from_ref(&dry), config);
         assert_eq!(response.samples().len(), 16_000);
         for (i, &s) in response.samples().iter().enumerate() {
             let expected = if i == 400 { 0.25 } else { 0.0 };
