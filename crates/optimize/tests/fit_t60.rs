@@ -1,5 +1,8 @@
 //! The fit to reverberation times, against Eyring's formula in rooms that obey it.
 
+// A test that cannot be set up should fail.
+#![allow(clippy::unwrap_used)]
+
 mod ergodic;
 
 use ergodic::Ergodic;
@@ -152,12 +155,12 @@ fn standard_errors_cover() {
         let targets = PerBand::new(OctaveBands::T60, measured.collect()).unwrap();
         let priors: Vec<_> = prior.iter().map(|&(m, s)| AbsorptionPrior::uniform(OCTAVES, m, s)).collect();
         let fit = fit_with(FitConfig::default(), &room.trace(trial), &priors, &targets);
-        for i in 0..7 {
-            for k in 0..3 {
+        for (i, truth) in truth.iter().enumerate() {
+            for (k, truth) in truth.iter().enumerate() {
                 let found = fit.materials[k].absorption().values()[i + 1];
                 let error = fit.absorption_standard_error[k].values()[i + 1];
                 assert!(error > 0.0 && error.is_finite());
-                square += ((found - truth[i][k]) / error).powi(2);
+                square += ((found - truth) / error).powi(2);
                 count += 1.0;
             }
         }

@@ -1,5 +1,8 @@
 //! Gradients against central differences, solvers against each other.
 
+// A test that cannot be set up should fail.
+#![allow(clippy::unwrap_used)]
+
 mod ergodic;
 
 use argmin::core::Executor;

@@ -1,5 +1,8 @@
 //! The case of `docs/explanation/objective.md`, worked there by hand.
 
+// A test that cannot be set up should fail.
+#![allow(clippy::unwrap_used)]
+
 use sabine_acoustics::{Air, Contribution, Material, Objective, OctaveBands, PathSet, Reflection};
 use sabine_optimize::{FitConfig, SlopeEvaluation, SlopeObjective};
 
