@@ -1,11 +1,11 @@
 //! Errors by room, and how wide an interval has to be.
 
+use crate::Error;
 use crate::config::NetworkConfig;
 use crate::dataset::{Dataset, Partition};
 use crate::labels::{LABEL_COUNT, T60_COUNT};
 use crate::model::{Calibration, Model};
 use crate::network::{Network, Scratch, spectrum};
-use crate::Error;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -85,8 +85,11 @@ pub(crate) fn score(model: &Model, dataset: &Dataset, clips: &[usize]) -> Result
     }
     let mut errors = Vec::new();
     for k in 0..LABEL_COUNT {
-        let means: Vec<(f64, f64)> =
-            rooms.values().filter(|r| r[k][2] > 0.0).map(|r| (r[k][0] / r[k][2], r[k][1] / r[k][2])).collect();
+        let means: Vec<(f64, f64)> = rooms
+            .values()
+            .filter(|r| r[k][2] > 0.0)
+            .map(|r| (r[k][0] / r[k][2], r[k][1] / r[k][2]))
+            .collect();
         let n = means.len() as f64;
         if !means.is_empty() {
             let (ours, guess) = means.iter().fold((0.0, 0.0), |sum, m| (sum.0 + m.0 / n, sum.1 + m.1 / n));

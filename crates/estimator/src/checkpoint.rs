@@ -38,7 +38,13 @@ impl Checkpoint {
     /// The beginning of a training.
     pub fn start(config: &TrainConfig) -> Result<Self, Error> {
         let parameters = Parameters::random(&config.network, config.seed)?;
-        Ok(Self { best: parameters.clone(), parameters, best_epoch: 0, adam: Adam::default(), history: Vec::new() })
+        Ok(Self {
+            best: parameters.clone(),
+            parameters,
+            best_epoch: 0,
+            adam: Adam::default(),
+            history: Vec::new(),
+        })
     }
 
     /// Writes to a temporary name and renames, so that there is always a whole checkpoint.
@@ -96,7 +102,8 @@ impl Checkpoint {
             let mut found = BTreeMap::new();
             for (name, tensor) in tensors.iter() {
                 if let Some(name) = name.strip_prefix(kind).and_then(|name| name.strip_prefix('.')) {
-                    let floats = tensor.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+                    let floats =
+                        tensor.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
                     found.insert(name.to_owned(), floats.collect());
                 }
             }

@@ -234,7 +234,11 @@ impl Dataset {
         let clip = |i: usize| Clip {
             partition: entry.partition,
             labels: std::array::from_fn(|k| {
-                if k < T60_COUNT { float(t60, i * T60_COUNT + k) } else { float(eq, i * EQ_COUNT + k - T60_COUNT) }
+                if k < T60_COUNT {
+                    float(t60, i * T60_COUNT + k)
+                } else {
+                    float(eq, i * EQ_COUNT + k - T60_COUNT)
+                }
             }),
             snr_db: float(snr, i),
             drr_db: float(drr, i),

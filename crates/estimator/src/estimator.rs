@@ -1,12 +1,12 @@
 //! From a recording to the targets of a room.
 
+use crate::Error;
 use crate::labels::{LABEL_COUNT, T60_COUNT, label_hz, per_band};
 use crate::layout::Normalisation;
 use crate::model::Model;
 use crate::network::{Network, Scratch, spectrum};
 use crate::warning::Warning;
 use crate::windows::{Loudness, clipped_share, first_frames};
-use crate::Error;
 use ndarray::{ArrayView2, Axis, Slice};
 use rayon::prelude::*;
 use sabine_acoustics::{FeatureExtractor, RoomEstimator, RoomTargets, Signal, resample};
@@ -155,7 +155,11 @@ impl Estimator {
     }
 
     /// Joins the windows of a spectrogram in dB `[mel, frame]`.
-    fn judge(&self, spectrogram_db: ArrayView2<'_, f32>, mut warnings: Vec<Warning>) -> Result<DetailedEstimate, Error> {
+    fn judge(
+        &self,
+        spectrogram_db: ArrayView2<'_, f32>,
+        mut warnings: Vec<Warning>,
+    ) -> Result<DetailedEstimate, Error> {
         let layout = &self.model.layout;
         let firsts = first_frames(spectrogram_db.ncols(), layout.frames);
         let heard: Vec<(Loudness, WindowOutput)> = firsts

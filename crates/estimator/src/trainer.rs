@@ -332,7 +332,9 @@ impl<'a> Trainer<'a> {
     /// the same way, on any number of threads.
     fn rng(&self, step: u64, purpose: u64) -> Pcg64Mcg {
         let mut seed = [0; 16];
-        let mix = self.config.seed ^ step.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ purpose.wrapping_mul(0xD1B5_4A32_D192_ED03);
+        let mix = self.config.seed
+            ^ step.wrapping_mul(0x9E37_79B9_7F4A_7C15)
+            ^ purpose.wrapping_mul(0xD1B5_4A32_D192_ED03);
         seed[..8].copy_from_slice(&mix.to_le_bytes());
         seed[8..].copy_from_slice(&(step << 20 | purpose).to_le_bytes());
         Pcg64Mcg::from_seed(seed)
@@ -351,7 +353,8 @@ fn label_scale(t60: T60Scale, dataset: &Dataset) -> Result<LabelScale, Error> {
             .filter(|v| !v.is_nan())
             .collect();
         if values.is_empty() {
-            let fault = DatasetFault::NoLabels { partition: Partition::Train.name(), label: label_name(label) };
+            let fault =
+                DatasetFault::NoLabels { partition: Partition::Train.name(), label: label_name(label) };
             return Err(Error::dataset("data set", fault));
         }
         let mean = values.iter().sum::<f64>() / values.len() as f64;
