@@ -31,7 +31,7 @@ pub struct DatasetConfig {
     pub shard_clips: usize,
     /// Clips that share a response (with other speech and noise), 1 to 64. Default 4.
     pub clips_per_response: usize,
-    /// Fraction of the responses that are measured ones, in each partition; the others are simulated. Default 0.35, 0.5, 1:
+    /// Fraction of the responses that are measured ones, in each partition; the others are simulated. Default 0.3, 0.5, 1:
     /// the test is real.
     pub measured_fraction: [f64; 3],
     /// How clips are made.
@@ -51,7 +51,7 @@ impl Default for DatasetConfig {
             clips: [56_500, 19_500, 18_500],
             shard_clips: 512,
             clips_per_response: 4,
-            measured_fraction: [0.35, 0.5, 1.0],
+            measured_fraction: [0.3, 0.5, 1.0],
             clip: ClipConfig::default(),
             synthetic: SyntheticRoomConfig::default(),
             rooms: PartitionConfig::default(),
@@ -98,6 +98,7 @@ pub struct DatasetBuilder {
     plan_sha256: String,
     maker: ClipMaker,
     synthetic: SyntheticRooms,
+    chain: Chain,
     speech: SpeechCorpus,
     responses: ResponseCorpus,
     noise: NoiseCorpus,
@@ -175,8 +176,8 @@ impl DatasetBuilder {
         } else {
             config.rooms.deal("room", "three partitions", &responses.rooms(), derive(config.seed, 12))?
         };
-        let noises = if noise.tracks.len() < 3 {
-            // Too few to deal out: only computed noise is heard then, unless there is none to keep apart.
+        let noises = if noise.tracks.is_empty() {
+            // All noise is computed then.
             BTreeMap::new()
         } else {
             PartitionConfig::default().deal("noise", "three partitions", &noise.names(), derive(config.seed, 13))?
@@ -191,6 +192,8 @@ impl DatasetBuilder {
         for (name, samples) in &noise.tracks {
             content.insert(format!("noise {name}"), hash_samples(samples));
         }
+        check_copies(&responses, &speech, &rooms, &speakers)?;
+        let chain = Chain::for_training(maker.sample_rate_hz())?;
         let plan = Plan {
             format: DATASET_FORMAT.to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -201,7 +204,7 @@ impl DatasetBuilder {
             measured_fraction: config.measured_fraction,
             clip: config.clip.clone(),
             synthetic: format!("{:?}", config.synthetic),
-            chain: Chain::for_training(maker.sample_rate_hz())?.describe(),
+            chain: chain.describe(),
             rooms,
             speakers,
             noise: noises,
@@ -209,7 +212,7 @@ impl DatasetBuilder {
         };
         let text = serde_json::to_vec(&plan).map_err(|source| Error::Json { path: PathBuf::from("plan.json"), source })?;
         let plan_sha256 = hash_bytes(&text);
-        Ok(Self { config, plan, plan_sha256, maker, synthetic, speech, responses, noise, refused: AtomicU64::new(0) })
+        Ok(Self { config, plan, plan_sha256, maker, synthetic, chain, speech, responses, noise, refused: AtomicU64::new(0) })
     }
 
     /// Partition of each measured room.
@@ -433,9 +436,8 @@ impl DatasetBuilder {
         if partition == Partition::Test {
             return Ok((measured.response.clone(), index, measured.labels.clone()));
         }
-        let chain = Chain::for_training(self.maker.sample_rate_hz())?;
         for attempt in 0..8 {
-            match chain.augment(&measured.response, derive(seed, 100 + attempt)) {
+            match self.chain.augment(&measured.response, derive(seed, 100 + attempt)) {
                 Ok(response) => {
                     let labels = Labels::measure(&response)?;
                     return Ok((response, index, labels));
@@ -484,6 +486,27 @@ impl DatasetBuilder {
         }
         Ok(content)
     }
+}
+
+/// The same sound under two names must not come into two partitions.
+fn check_copies(
+    responses: &ResponseCorpus,
+    speech: &SpeechCorpus,
+    rooms: &BTreeMap<String, Partition>,
+    speakers: &BTreeMap<String, Partition>,
+) -> Result<(), Error> {
+    let of_rooms = responses.responses.iter().map(|r| ("room", &r.room, r.response.samples(), rooms.get(&r.room)));
+    let of_speakers =
+        speech.utterances.iter().map(|u| ("speaker", &u.speaker, &u.speech.samples[..], speakers.get(&u.speaker)));
+    let mut seen: BTreeMap<String, Partition> = BTreeMap::new();
+    for (what, name, samples, partition) in of_rooms.chain(of_speakers) {
+        let Some(&second) = partition else { continue };
+        match seen.insert(hash_samples(samples), second) {
+            Some(first) if first != second => return Err(Error::Leak { what, name: name.clone(), first, second }),
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 fn hash_samples(samples: &[f32]) -> String {

@@ -84,7 +84,7 @@ pub enum Error {
         /// How many there are.
         found: usize,
     },
-    /// A room or speaker in two partitions.
+    /// A room or speaker (or the same sound under another name) in two partitions.
     #[error("leak: {what} {name:?} is both in {first} and in {second}")]
     Leak {
         /// `room` or `speaker`.
