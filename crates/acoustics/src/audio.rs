@@ -99,26 +99,45 @@ pub fn write_wav(
 ) -> Result<(), Error> {
     let path = path.as_ref();
     check_writable(samples, sample_rate_hz, format).map_err(|error| error.in_file(path, "samples"))?;
+    write_atomically(path, |file| encode(file, samples, sample_rate_hz, format))
+}
+
+/// The bytes of a mono WAV file, for whoever does not want a file of its own.
+///
+/// # Errors
+/// [`Error::OutOfRange`] for a sample beyond full scale in an integer format.
+pub fn encode_wav(signal: &Signal, format: SampleFormat) -> Result<Vec<u8>, Error> {
+    check_writable(signal.samples(), signal.sample_rate_hz(), format)?;
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    encode(&mut bytes, signal.samples(), signal.sample_rate_hz(), format)
+        .map_err(|source| Error::implementation("WAV encoder", source))?;
+    Ok(bytes.into_inner())
+}
+
+fn encode(
+    file: impl std::io::Write + std::io::Seek,
+    samples: &[f32],
+    sample_rate_hz: u32,
+    format: SampleFormat,
+) -> std::io::Result<()> {
     let (bits_per_sample, sample_format) = match format {
         SampleFormat::Int16 => (16, hound::SampleFormat::Int),
         SampleFormat::Int24 => (24, hound::SampleFormat::Int),
         SampleFormat::Float32 => (32, hound::SampleFormat::Float),
     };
     let spec = hound::WavSpec { channels: 1, sample_rate: sample_rate_hz, bits_per_sample, sample_format };
-    write_atomically(path, |file| {
-        let mut writer = hound::WavWriter::new(file, spec).map_err(into_io)?;
-        match sample_format {
-            hound::SampleFormat::Float => samples.iter().try_for_each(|&s| writer.write_sample(s)),
-            hound::SampleFormat::Int => {
-                let full = f32::from(bits_per_sample - 1).exp2();
-                // A sample of exactly 1 has no code of its own: the largest one is a part in 2^15 below it.
-                let code = |s: f32| (s * full).round().min(full - 1.0) as i32;
-                samples.iter().try_for_each(|&s| writer.write_sample(code(s)))
-            }
+    let mut writer = hound::WavWriter::new(file, spec).map_err(into_io)?;
+    match sample_format {
+        hound::SampleFormat::Float => samples.iter().try_for_each(|&s| writer.write_sample(s)),
+        hound::SampleFormat::Int => {
+            let full = f32::from(bits_per_sample - 1).exp2();
+            // A sample of exactly 1 has no code of its own: the largest one is a part in 2^15 below it.
+            let code = |s: f32| (s * full).round().min(full - 1.0) as i32;
+            samples.iter().try_for_each(|&s| writer.write_sample(code(s)))
         }
-        .map_err(into_io)?;
-        writer.finalize().map_err(into_io)
-    })
+    }
+    .map_err(into_io)?;
+    writer.finalize().map_err(into_io)
 }
 
 fn check_writable(samples: &[f32], sample_rate_hz: u32, format: SampleFormat) -> Result<(), Error> {

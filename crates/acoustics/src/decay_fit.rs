@@ -116,6 +116,9 @@ impl DecayFit {
                 best = best.single_again(&bins).best(&bins, &limits);
             }
         }
+        if !best.is_needed(&bins) {
+            return Err(NoReading::NoDecay);
+        }
         let dispersion = best.dispersion(&bins);
         let covariance = best.covariance(&bins, dispersion).ok_or(NoReading::NoDecay)?;
         let fit = best.finish(covariance, dispersion, first as f64 * step_s, energy.len() as f64 * step_s);
@@ -323,10 +326,16 @@ struct Model {
     derivatives: Vec<f64>,
     /// Twice the negative log-likelihood, up to a constant of the data.
     deviance: f64,
-    /// Logarithm of a noise that counts as none.
-    least_noise: f64,
+    bounds: Bounds,
     /// True if the noise is not to be fitted.
     noise_is_known: bool,
+}
+
+/// Logarithms of a noise that counts as none, and of the power from which no decay starts.
+#[derive(Clone, Copy, Debug)]
+struct Bounds {
+    least_noise: f64,
+    most_power: f64,
 }
 
 /// What limits the slopes that may be added.
@@ -354,7 +363,7 @@ impl Model {
             .max_by(|a, b| a[0].total_cmp(&b[0]))
             .map_or_else(|| self.parameters[..2].to_vec(), <[f64]>::to_vec);
         let parameters = vec![strongest[0], strongest[1], self.parameters[n - 1]];
-        Self { noise_is_known: true, ..Self::at(parameters, bins, self.least_noise) }
+        Self { noise_is_known: true, ..Self::at(parameters, bins, self.bounds) }
     }
 
     /// When the decays together have fallen by so many dB.
@@ -370,18 +379,18 @@ impl Model {
 
     fn single(floor: &NoiseFloor, bins: &[Bin]) -> Self {
         let loudest = bins.iter().fold(f64::MIN_POSITIVE, |most, bin| most.max(bin.power));
-        let least_noise = (1e-16 * loudest).ln();
-        let parameters = vec![
-            floor.start_power.ln().max(least_noise),
-            floor.rate_per_s.ln(),
-            floor.power.ln().max(least_noise),
-        ];
-        Self::at(parameters, bins, least_noise)
+        // A decay may start well above the mean of its first bin, but not by more than 30 dB.
+        let bounds = Bounds { least_noise: (1e-16 * loudest).ln(), most_power: (1e3 * loudest).ln() };
+        let start = floor.start_power.ln().max(bounds.least_noise);
+        Self::at(vec![start, floor.rate_per_s.ln(), floor.power.ln()], bins, bounds)
     }
 
-    fn at(mut parameters: Vec<f64>, bins: &[Bin], least_noise: f64) -> Self {
+    fn at(mut parameters: Vec<f64>, bins: &[Bin], bounds: Bounds) -> Self {
         let n = parameters.len();
-        parameters[n - 1] = parameters[n - 1].max(least_noise);
+        parameters[n - 1] = parameters[n - 1].max(bounds.least_noise);
+        for power in parameters[..n - 1].iter_mut().step_by(2) {
+            *power = power.min(bounds.most_power);
+        }
         let noise = parameters[n - 1].exp();
         let mut expected = vec![noise; bins.len()];
         let mut derivatives = vec![noise; bins.len() * n];
@@ -398,11 +407,19 @@ impl Model {
             derivatives[i * n..(i + 1) * n].iter_mut().for_each(|d| *d /= expected[i]);
             deviance += 2.0 * bin.shape * (bin.power / expected[i] + expected[i].ln());
         }
-        Self { parameters, expected, derivatives, deviance, least_noise, noise_is_known: false }
+        Self { parameters, expected, derivatives, deviance, bounds, noise_is_known: false }
+    }
+
+    /// True if the data speak for a decay against noise alone.
+    fn is_needed(&self, bins: &[Bin]) -> bool {
+        let shape: f64 = bins.iter().map(|bin| bin.shape).sum();
+        let mean = bins.iter().map(|bin| bin.shape * bin.power).sum::<f64>() / shape;
+        let alone: f64 = bins.iter().map(|bin| 2.0 * bin.shape * (bin.power / mean + mean.ln())).sum();
+        (alone - self.deviance) / self.dispersion(bins).max(1.0) > SLOPE_EVIDENCE
     }
 
     fn moved(&self, parameters: Vec<f64>, bins: &[Bin]) -> Self {
-        Self { noise_is_known: self.noise_is_known, ..Self::at(parameters, bins, self.least_noise) }
+        Self { noise_is_known: self.noise_is_known, ..Self::at(parameters, bins, self.bounds) }
     }
 
     fn slopes(&self) -> usize {
@@ -594,7 +611,7 @@ impl Model {
         slopes.sort_by(|a, b| a.t60_s.value.total_cmp(&b.t60_s.value));
         DecayFit {
             slopes,
-            noise_power: if noise.ln() > self.least_noise + 0.01 { noise } else { 0.0 },
+            noise_power: if noise.ln() > self.bounds.least_noise + 0.01 { noise } else { 0.0 },
             start_s,
             end_s,
             dispersion,

@@ -47,7 +47,7 @@ impl EqFilterConfig {
                 return Err(Error::AboveOverlaps { from_hz: above.from_band_hz, band_hz: highest_hz });
             }
         }
-        if bands.edges_hz(0).0 >= rate / 2.0 {
+        if bands.exact_hz(0) >= rate / 2.0 {
             return Err(Error::NothingBelowNyquist { band_hz: bands.nominal_hz(0), sample_rate_hz });
         }
         Ok((self.delay_s * rate).round() as usize)

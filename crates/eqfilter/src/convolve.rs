@@ -1,6 +1,6 @@
 //! Convolution of whole signals.
 
-use crate::designer::fast_length;
+use crate::grid::fast_length;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
 

@@ -1,24 +1,33 @@
 //! The linear-phase design that corrects for its own smoothing.
 
-use crate::error::check_range;
-use crate::octave::{support_hz, upper_share, weight};
-use crate::solve::solve_levels;
+use crate::grid::{Grid, kaiser_half};
+use crate::octave::active_bands;
+use crate::solve::{Problem, solve};
 use crate::{EqFilter, EqFilterConfig, Error};
-use realfft::RealFftPlanner;
-use realfft::num_complex::Complex;
 use sabine_acoustics::{OctaveBands, PerBand};
 
-/// Half the width, in octaves, of the step from one band's level to the next.
-const STEP_OVERLAP: f64 = 0.15;
-/// Shape of the Kaiser window on the taps.
-const KAISER_BETA: f64 = 4.0;
+/// Parts that an octave is made of.
+const PARTS_PER_OCTAVE: i32 = 5;
 
 /// Designs linear-phase filters for one set of bands, sample rate and delay; planned once, run many times.
 ///
-/// A filter is a sum of one windowed low-, band- or high-pass for each octave. The power that it passes in each octave is then a
-/// quadratic form in the levels of these parts, so the levels that *realise* the wanted gains, after all smoothing by the
-/// finite length, solve a few small equations (damped Newton steps in dB). Where no levels do, the solution is nearest
-/// in least squares, and [`EqFilter::realised_db`] says what it gives.
+/// A filter is a sum of narrow windowed band-passes, five to an octave. The power that it passes in an octave is then a quadratic
+/// form in the amplitudes of these parts, and the amplitudes that *realise* the wanted gains, after all smoothing by the
+/// finite length, solve one small equation for each octave. The design starts from gains joined by straight lines in
+/// dB over the logarithm of frequency and makes the least smooth change to them that solves the equations (Newton steps, three as
+/// a rule). Where nothing does, it comes near, and [`EqFilter::realised_db`] says what it gives.
+///
+/// ```
+/// use sabine_acoustics::{OctaveBands, PerBand};
+/// use sabine_eqfilter::{EqDesigner, EqFilterConfig};
+/// let designer = EqDesigner::new(OctaveBands::T60, 48_000, EqFilterConfig::default())?;
+/// for tilt_db in [-3.0, 0.0, 3.0] {
+///     let gains = PerBand::from_fn(designer.bands(), |band| tilt_db * band as f64);
+///     let filter = designer.design(&gains)?;
+///     assert!((filter.realised_db().at_hz(125.0).unwrap().unwrap() - 0.0).abs() < 0.01);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct EqDesigner {
     bands: OctaveBands,
@@ -26,12 +35,13 @@ pub struct EqDesigner {
     config: EqFilterConfig,
     /// Samples on either side of the middle tap.
     half: usize,
-    /// Right half, middle tap first, of each part: one for each band below half the sample rate, then the one above.
-    parts: Vec<Vec<f64>>,
-    /// Number of bands below half the sample rate.
+    /// Centre of each part, in octaves above the lowest band; rising.
+    centres_octaves: Vec<f64>,
+    /// Number of bands whose gain is set.
     active: usize,
-    /// For each active band: the quadratic form of its mean power gain in the amplitudes of the parts, row by row.
-    power: Vec<Vec<f64>>,
+    /// Right half, middle tap first, of each part; the last is the part above the bands if there is one.
+    parts: Vec<Vec<f64>>,
+    problem: Problem,
 }
 
 impl EqDesigner {
@@ -39,31 +49,43 @@ impl EqDesigner {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a setting out of its range, [`Error::AboveOverlaps`] if `config.above` starts at a band that
-    /// is among `bands`, [`Error::NothingBelowNyquist`] if no band is, [`Error::Acoustics`] for an unknown octave.
+    /// is among `bands`, [`Error::NothingBelowNyquist`] if no band's centre lies below half the sample rate,
+    /// [`Error::Acoustics`] for an unknown octave.
     pub fn new(bands: OctaveBands, sample_rate_hz: u32, config: EqFilterConfig) -> Result<Self, Error> {
         let half = config.check(bands, sample_rate_hz)?;
-        let nyquist_hz = f64::from(sample_rate_hz) / 2.0;
-        let active = (0..bands.len()).take_while(|&b| bands.edges_hz(b).0 < nyquist_hz).count();
-        // Frequencies at which one part gives way to the next.
-        let mut edges_hz: Vec<f64> = (1..active).map(|b| bands.edges_hz(b).0).collect();
+        let active = active_bands(bands, sample_rate_hz);
+        let (lowest_hz, nyquist_hz) = (bands.exact_hz(0), f64::from(sample_rate_hz) / 2.0);
+        let octave = bands.edges_hz(0).1 / bands.edges_hz(0).0;
+        let to_hz = |octaves: f64| lowest_hz * octave.powf(octaves);
+        // One part below the lowest octave, so that it has a slope on either side.
+        let from = -(PARTS_PER_OCTAVE / 2) - 1;
+        let to = PARTS_PER_OCTAVE * (active as i32 - 1) + PARTS_PER_OCTAVE / 2;
+        let mut centres_octaves: Vec<f64> = (from..=to)
+            .map(|i| f64::from(i) / f64::from(PARTS_PER_OCTAVE))
+            .filter(|&octaves| to_hz(octaves) < nyquist_hz)
+            .collect();
+        let free = centres_octaves.len();
         if let Some(above) = config.above {
-            let (low_hz, _) = OctaveBands::new(above.from_band_hz, above.from_band_hz)?.edges_hz(0);
-            if low_hz < nyquist_hz {
-                edges_hz.push(low_hz);
+            let from_hz = OctaveBands::new(above.from_band_hz, above.from_band_hz)?.exact_hz(0);
+            // It begins where the lowest part of its lowest octave would lie.
+            let octaves = (from_hz / lowest_hz).ln() / octave.ln() - 2.0 / f64::from(PARTS_PER_OCTAVE);
+            if to_hz(octaves) < nyquist_hz {
+                centres_octaves.push(octaves);
             }
         }
-        // |H|^2 of a filter of 2 half + 1 taps has 4 half + 1 lags, so this grid samples it without loss.
-        let grid = Grid::new(fast_length(4 * half), sample_rate_hz);
+        let centres_hz: Vec<f64> = centres_octaves.iter().map(|&octaves| to_hz(octaves)).collect();
+        let grid = Grid::new(half, sample_rate_hz);
         let window = kaiser_half(half);
-        let (mut parts, mut responses) = (Vec::new(), Vec::new());
-        for part in 0..=edges_hz.len() {
-            let below = part.checked_sub(1).map(|i| edges_hz[i]);
-            let (taps, response) = grid.part(below, edges_hz.get(part).copied(), &window);
-            parts.push(taps);
-            responses.push(response);
-        }
+        let (parts, responses): (Vec<_>, Vec<_>) =
+            (0..centres_hz.len()).map(|i| grid.part(&centres_hz, i, &window)).unzip();
         let power = (0..active).map(|b| grid.power_form(bands, b, &responses)).collect();
-        Ok(Self { bands, sample_rate_hz, config, half, parts, active, power })
+        let problem = Problem::new(power, &centres_octaves, free);
+        Ok(Self { bands, sample_rate_hz, config, half, centres_octaves, active, parts, problem })
+    }
+
+    /// Whether it was planned for these.
+    pub(crate) fn is_for(&self, bands: OctaveBands, sample_rate_hz: u32, config: EqFilterConfig) -> bool {
+        self.bands == bands && self.sample_rate_hz == sample_rate_hz && self.config == config
     }
 
     /// The bands that it takes gains for.
@@ -76,7 +98,7 @@ impl EqDesigner {
         2 * self.half + 1
     }
 
-    /// The filter whose octave-band gains are these, in dB. Gains of bands that lie wholly above half the sample rate have
+    /// The filter whose octave-band gains are these, in dB. Gains of bands whose centre lies above half the sample rate have
     /// no effect.
     ///
     /// # Errors
@@ -91,8 +113,17 @@ impl EqDesigner {
             });
         }
         check_gains(gains_db)?;
-        let fixed_db = (self.parts.len() > self.active).then(|| self.config.above.map_or(0.0, |a| a.gain_db));
-        let solution = solve_levels(&self.power, &gains_db.values()[..self.active], fixed_db);
+        let wanted_db = &gains_db.values()[..self.active];
+        let start_db: Vec<f64> = self
+            .centres_octaves
+            .iter()
+            .enumerate()
+            .map(|(i, &octaves)| match self.config.above {
+                Some(above) if i >= self.problem.free() => above.gain_db,
+                _ => between(wanted_db, octaves),
+            })
+            .collect();
+        let solution = solve(&self.problem, wanted_db, &start_db);
         let mut right = vec![0.0; self.half + 1];
         for (part, &amplitude) in self.parts.iter().zip(&solution.amplitudes) {
             for (sum, &tap) in right.iter_mut().zip(part) {
@@ -105,122 +136,18 @@ impl EqDesigner {
     }
 }
 
+/// Values at 0, 1, 2, ... joined by straight lines, level beyond them.
+fn between(values: &[f64], at: f64) -> f64 {
+    let at = at.clamp(0.0, (values.len() - 1) as f64);
+    let before = at as usize;
+    let next = (before + 1).min(values.len() - 1);
+    values[before] + (values[next] - values[before]) * (at - before as f64)
+}
+
 /// Checks each gain.
 pub(crate) fn check_gains(gains_db: &PerBand<f64>) -> Result<(), Error> {
-    for (band_hz, &gain_db) in gains_db.iter() {
-        check_range("gain (dB)", gain_db, -120.0, 120.0, "").map_err(|_| Error::Gain { band_hz, gain_db })?;
+    match gains_db.iter().find(|(_, gain_db)| !(-120.0..=120.0).contains(*gain_db)) {
+        Some((band_hz, &gain_db)) => Err(Error::Gain { band_hz, gain_db }),
+        None => Ok(()),
     }
-    Ok(())
-}
-
-/// The frequency grid of a plan, and the transforms on it.
-struct Grid {
-    length: usize,
-    bin_hz: f64,
-    forward: std::sync::Arc<dyn realfft::RealToComplex<f64>>,
-    backward: std::sync::Arc<dyn realfft::ComplexToReal<f64>>,
-}
-
-impl Grid {
-    fn new(length: usize, sample_rate_hz: u32) -> Self {
-        let mut planner = RealFftPlanner::new();
-        Self {
-            length,
-            bin_hz: f64::from(sample_rate_hz) / length as f64,
-            forward: planner.plan_fft_forward(length),
-            backward: planner.plan_fft_inverse(length),
-        }
-    }
-
-    /// Right half of the taps of a part that passes what lies between two edges (`None`: no edge), and its zero-phase response.
-    fn part(&self, below_hz: Option<f64>, above_hz: Option<f64>, window: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let bins = self.length / 2 + 1;
-        let mut spectrum: Vec<Complex<f64>> = (0..bins)
-            .map(|k| {
-                let hz = k as f64 * self.bin_hz;
-                let from = below_hz.map_or(1.0, |edge| upper_share(hz, edge, STEP_OVERLAP));
-                let to = above_hz.map_or(1.0, |edge| 1.0 - upper_share(hz, edge, STEP_OVERLAP));
-                Complex::new(from * to, 0.0)
-            })
-            .collect();
-        let mut time = vec![0.0; self.length];
-        let done = self.backward.process(&mut spectrum, &mut time);
-        debug_assert!(done.is_ok(), "a real spectrum of the planned length");
-        let scale = 1.0 / self.length as f64;
-        let taps: Vec<f64> = time.iter().zip(window).map(|(x, w)| x * w * scale).collect();
-        time.fill(0.0);
-        time[..taps.len()].copy_from_slice(&taps);
-        for (n, &tap) in taps.iter().enumerate().skip(1) {
-            time[self.length - n] = tap;
-        }
-        let done = self.forward.process(&mut time, &mut spectrum);
-        debug_assert!(done.is_ok(), "lengths agree by construction");
-        (taps, spectrum.iter().map(|x| x.re).collect())
-    }
-
-    /// Mean over a band of the products of the responses: the quadratic form of the band's power gain.
-    fn power_form(&self, bands: OctaveBands, band: usize, responses: &[Vec<f64>]) -> Vec<f64> {
-        let (low_hz, high_hz) = support_hz(bands, band);
-        let first = (low_hz / self.bin_hz).floor() as usize;
-        let last = ((high_hz / self.bin_hz).ceil() as usize).min(self.length / 2);
-        let weights: Vec<f64> = (first..=last).map(|k| self.bin_weight(bands, band, k)).collect();
-        let total: f64 = weights.iter().sum();
-        let n = responses.len();
-        let mut form = vec![0.0; n * n];
-        for i in 0..n {
-            let weighted: Vec<f64> =
-                responses[i][first..=last].iter().zip(&weights).map(|(r, w)| r * w / total).collect();
-            for j in 0..=i {
-                let product = weighted.iter().zip(&responses[j][first..=last]).map(|(a, b)| a * b).sum();
-                form[i * n + j] = product;
-                form[j * n + i] = product;
-            }
-        }
-        form
-    }
-
-    /// Weight of a bin when the power between bins is interpolated linearly: a triangle's mean over the weight around it. In
-    /// low octaves, which hold few bins, this counts.
-    fn bin_weight(&self, bands: OctaveBands, band: usize, bin: usize) -> f64 {
-        /// From this many bins up an octave is smooth enough for its value at the bin.
-        const FINE: usize = 64;
-        if bin > FINE {
-            return weight(bands, band, bin as f64 * self.bin_hz);
-        }
-        let nyquist = self.length as f64 / 2.0;
-        let share = |step: i32| {
-            let offset = f64::from(step) / 8.0;
-            let at = (bin as f64 + offset).max(0.0);
-            if at > nyquist { 0.0 } else { (1.0 - offset.abs()) * weight(bands, band, at * self.bin_hz) }
-        };
-        (-7..8).map(share).sum::<f64>() / 8.0
-    }
-}
-
-/// The least product of a power of two and at most one 3 that is not below `length`: such transforms are fast.
-pub(crate) fn fast_length(length: usize) -> usize {
-    let two = length.next_power_of_two();
-    if two / 4 * 3 >= length && two >= 4 { two / 4 * 3 } else { two }
-}
-
-/// Middle and right half of a Kaiser window of `2 half + 1` samples.
-pub(crate) fn kaiser_half(half: usize) -> Vec<f64> {
-    let peak = bessel_i0(KAISER_BETA);
-    let at = |n: usize| {
-        let x = n as f64 / (half as f64 + 1.0);
-        bessel_i0(KAISER_BETA * (1.0 - x * x).sqrt()) / peak
-    };
-    (0..=half).map(at).collect()
-}
-
-/// Modified Bessel function of the first kind, order 0, by its power series.
-fn bessel_i0(x: f64) -> f64 {
-    let quarter = x * x / 4.0;
-    let (mut sum, mut term, mut k) = (1.0, 1.0, 1.0);
-    while term > 1e-12 * sum {
-        term *= quarter / (k * k);
-        sum += term;
-        k += 1.0;
-    }
-    sum
 }

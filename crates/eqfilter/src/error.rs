@@ -46,8 +46,10 @@ pub enum Error {
         /// Highest band with a gain of its own, in Hz.
         band_hz: f64,
     },
-    /// Every band lies beyond half the sample rate.
-    #[error("the lowest band, {band_hz} Hz, lies beyond half the sample rate of {sample_rate_hz} Hz")]
+    /// Every band's centre lies beyond half the sample rate.
+    #[error(
+        "the centre of the lowest band, {band_hz} Hz, lies beyond half the sample rate of {sample_rate_hz} Hz"
+    )]
     NothingBelowNyquist {
         /// The lowest band in Hz.
         band_hz: f64,

@@ -1,7 +1,9 @@
 //! The filter as a value.
 
-use crate::octave::{support_hz, weight};
-use crate::{EqDesigner, EqFilterConfig, Error, convolve};
+use crate::grid::Grid;
+use crate::octave::active_bands;
+use crate::plans::planned;
+use crate::{EqFilterConfig, Error, convolve};
 use sabine_acoustics::{OctaveBands, PerBand, Signal};
 
 /// How the phase of a filter runs.
@@ -38,16 +40,17 @@ pub struct EqFilter {
 impl EqFilter {
     /// A linear-phase filter of odd length (Type I) whose gain in each octave band, smoothing included, is the one wanted.
     ///
-    /// For many designs with the same bands and sample rate, plan an [`EqDesigner`] once.
+    /// The plans of the last few bands, rates and settings are kept, so that a repeated design takes a fraction of the time of
+    /// the first. To hold a plan of your own, use [`EqDesigner`](crate::EqDesigner).
     ///
     /// # Errors
-    /// As [`EqDesigner::new`] and [`EqDesigner::design`].
+    /// As [`EqDesigner::new`](crate::EqDesigner::new) and [`EqDesigner::design`](crate::EqDesigner::design).
     pub fn design(
         gains_db: &PerBand<f64>,
         sample_rate_hz: u32,
         config: EqFilterConfig,
     ) -> Result<Self, Error> {
-        EqDesigner::new(gains_db.bands(), sample_rate_hz, config)?.design(gains_db)
+        planned(gains_db.bands(), sample_rate_hz, config)?.design(gains_db)
     }
 
     pub(crate) fn linear(
@@ -98,8 +101,8 @@ impl EqFilter {
         &self.wanted_db
     }
 
-    /// The gain of the filter in each band, in dB: its power response averaged over the octave; `None` for a band that lies
-    /// wholly above half the sample rate.
+    /// The gain of the filter in each band, in dB: its power response averaged over the octave; `None` for a band whose
+    /// centre lies above half the sample rate.
     pub fn realised_db(&self) -> &PerBand<Option<f64>> {
         &self.realised_db
     }
@@ -134,26 +137,11 @@ impl EqFilter {
     }
 }
 
-/// Mean power gain of some taps over each octave in dB, on a grid fine enough that it does not matter.
+/// Mean power gain of some taps over each octave in dB.
 pub(crate) fn band_gains_db(taps: &[f32], sample_rate_hz: u32, bands: OctaveBands) -> PerBand<Option<f64>> {
-    let rate = f64::from(sample_rate_hz);
-    PerBand::from_fn(bands, |b| {
-        if bands.edges_hz(b).0 >= rate / 2.0 {
-            return None;
-        }
-        let (low_hz, high_hz) = support_hz(bands, b);
-        let high_hz = high_hz.min(rate / 2.0);
-        // Eight points for each independent value of the response.
-        let points = ((high_hz - low_hz) / rate * taps.len() as f64 * 8.0).ceil().max(64.0) as usize;
-        let (mut sum, mut total) = (0.0, 0.0);
-        for i in 0..points {
-            let hz = low_hz + (high_hz - low_hz) * (i as f64 + 0.5) / points as f64;
-            let w = weight(bands, b, hz);
-            sum += w * power_at(taps, hz / rate);
-            total += w;
-        }
-        Some(10.0 * (sum / total).log10())
-    })
+    let active = active_bands(bands, sample_rate_hz);
+    let gains = Grid::new(taps.len() / 2, sample_rate_hz).band_gains_db(taps, bands, active);
+    PerBand::from_fn(bands, |b| gains.get(b).copied())
 }
 
 /// Power response at a frequency in cycles per sample.

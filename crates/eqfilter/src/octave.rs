@@ -1,31 +1,50 @@
-//! Smooth octave bands on a frequency grid: what the design shapes, and how a band's gain is weighed.
+//! How the power at a frequency counts in an octave: the bands by which gain is measured.
+//!
+//! They are those of [`sabine_acoustics`]'s filter bank, written here once more so that a design needs no filtering: adjacent
+//! bands cross over between their centres, sine against cosine of a smooth step, and the squares of their gains add up to one.
 
 use sabine_acoustics::OctaveBands;
+use std::f64::consts::FRAC_PI_2;
 
-/// Half the width, in octaves, of the cross-over between adjacent bands by which gain is weighed.
-const WEIGHT_OVERLAP: f64 = 0.25;
-
-/// Share of the upper of two bands that meet at `edge_hz`: 0 below the cross-over, 1 above, half a sine between, even in the
-/// logarithm of frequency.
-pub(crate) fn upper_share(hz: f64, edge_hz: f64, half_width_octaves: f64) -> f64 {
-    let u = (hz / edge_hz).log2() / half_width_octaves;
-    if u <= -1.0 {
-        0.0
-    } else if u >= 1.0 {
-        1.0
-    } else {
-        0.5 + 0.5 * (std::f64::consts::FRAC_PI_2 * u).sin()
-    }
-}
-
-/// How much the power at `hz` counts in an octave band; adjacent bands sum to one.
+/// Power gain at `hz` of an octave band, 0 to 1.
 pub(crate) fn weight(bands: OctaveBands, band: usize, hz: f64) -> f64 {
-    let (low, high) = bands.edges_hz(band);
-    upper_share(hz, low, WEIGHT_OVERLAP) * (1.0 - upper_share(hz, high, WEIGHT_OVERLAP))
+    let (low_hz, high_hz) = bands.edges_hz(band);
+    let per_octave = 1.0 / (high_hz / low_hz).ln();
+    let rise = step((hz / low_hz).ln() * per_octave + 0.5);
+    let fall = step((hz / high_hz).ln() * per_octave + 0.5);
+    ((FRAC_PI_2 * rise).sin() * (FRAC_PI_2 * fall).cos()).powi(2)
 }
 
-/// The range of frequencies in Hz outside which [`weight`] is zero.
+/// The range of frequencies in Hz outside which [`weight`] is zero: the centres of the adjacent octaves.
 pub(crate) fn support_hz(bands: OctaveBands, band: usize) -> (f64, f64) {
-    let (low, high) = bands.edges_hz(band);
-    (low * (-WEIGHT_OVERLAP).exp2(), high * WEIGHT_OVERLAP.exp2())
+    let (low_hz, high_hz) = bands.edges_hz(band);
+    let half = (high_hz / low_hz).sqrt();
+    (low_hz / half, high_hz * half)
+}
+
+/// Number of bands whose centre lies below half the sample rate: those whose gain can be set and measured.
+pub(crate) fn active_bands(bands: OctaveBands, sample_rate_hz: u32) -> usize {
+    (0..bands.len()).take_while(|&b| bands.exact_hz(b) < f64::from(sample_rate_hz) / 2.0).count()
+}
+
+/// Rises from 0 at 0 to 1 at 1 with two derivatives that vanish at both ends.
+fn step(u: f64) -> f64 {
+    let u = u.clamp(0.0, 1.0);
+    u.powi(3) * (10.0 + u * (6.0 * u - 15.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn powers_of_adjacent_bands_add_up_to_one() {
+        let bands = OctaveBands::SIMULATION;
+        for i in 0..=100 {
+            let hz = bands.exact_hz(0) * (bands.exact_hz(7) / bands.exact_hz(0)).powf(f64::from(i) / 100.0);
+            let sum: f64 = (0..bands.len()).map(|b| weight(bands, b, hz)).sum();
+            assert!((sum - 1.0).abs() < 1e-12, "{hz} Hz: {sum}");
+        }
+        assert_eq!(weight(bands, 4, support_hz(bands, 4).0), 0.0);
+    }
 }

@@ -1,103 +1,168 @@
-//! The levels of the parts that realise the wanted gain in each octave.
+//! The amplitudes of the parts that realise the wanted gain in each octave.
 
-/// Bands and parts there can be: ten octaves and the part above them.
-const MOST: usize = 11;
-/// Newton steps at most; few are needed where a solution exists.
+use crate::grid::dot;
+
+/// Octaves there can be.
+const MOST_BANDS: usize = 10;
+/// Newton steps at most; two or three are needed where a solution is near.
 const STEPS: usize = 40;
-/// Largest error in dB at which the search ends.
+/// Error in dB below which a gain is met.
 const CLOSE_DB: f64 = 1e-3;
-/// How far, in dB, a part may be moved from the gain wanted of it.
-const REACH_DB: f64 = 40.0;
+/// Share of a step that is made even if it does not help: a way out of a valley that leads nowhere.
+const LEAST_SHARE: f64 = 0.02;
+/// Distance in octaves over which changes to the parts go together.
+const SMOOTH_OCTAVES: f64 = 0.15;
+/// Share of the variance of a change that each part has for itself.
+const OWN_SHARE: f64 = 0.01;
 
-/// What [`solve_levels`] finds.
-pub(crate) struct Levels {
+/// What stays the same from design to design.
+#[derive(Clone, Debug)]
+pub(crate) struct Problem {
+    /// For each band: the quadratic form of its power gain in the amplitudes of the parts, row by row.
+    power: Vec<Vec<f64>>,
+    /// Covariance of the relative changes of the free parts, row by row: smooth changes are the likely ones.
+    smooth: Vec<f64>,
+    parts: usize,
+    free: usize,
+}
+
+impl Problem {
+    /// The parts from number `free` on keep the amplitude that they are given.
+    pub fn new(power: Vec<Vec<f64>>, centres_octaves: &[f64], free: usize) -> Self {
+        let mut smooth = vec![0.0; free * free];
+        for i in 0..free {
+            for j in 0..free {
+                let distance = (centres_octaves[i] - centres_octaves[j]) / SMOOTH_OCTAVES;
+                smooth[i * free + j] = (-0.5 * distance * distance).exp();
+            }
+            smooth[i * free + i] += OWN_SHARE;
+        }
+        Self { power, smooth, parts: centres_octaves.len(), free }
+    }
+
+    /// Number of parts whose amplitude is sought.
+    pub fn free(&self) -> usize {
+        self.free
+    }
+}
+
+/// What [`solve`] finds.
+pub(crate) struct Solution {
     /// Amplitude of each part.
     pub amplitudes: Vec<f64>,
     /// Gain of each band in dB.
     pub realised_db: Vec<f64>,
 }
 
-/// Finds the amplitudes `a` of the parts for which `10 log10(a' P_b a)` meets `wanted_db[b]` in each band, by damped
-/// Gauss-Newton steps on their levels in dB; nearest in least squares where none do. A last part, above the bands, stays at `fixed_db`.
-pub(crate) fn solve_levels(power: &[Vec<f64>], wanted_db: &[f64], fixed_db: Option<f64>) -> Levels {
-    let bands = wanted_db.len();
-    let parts = bands + usize::from(fixed_db.is_some());
-    let mut levels_db = [0.0; MOST];
-    levels_db[..bands].copy_from_slice(wanted_db);
-    if let Some(fixed) = fixed_db {
-        levels_db[bands] = fixed;
-    }
-    let mut now = evaluate(power, &levels_db, bands, parts);
-    let mut damping = 1e-3;
+/// Finds amplitudes `a`, near the start, for which `10 log10(a' P_b a)` is the wanted gain in each band `b`.
+///
+/// With the gain in amplitude f_b = sqrt(a' P_b a) / wanted_b, each step solves f + J s = 1 for the step s that is least in the
+/// norm of smooth relative changes: s = K J' (J K J')^-1 (1 - f), and is halved until it helps. The best amplitudes met are returned.
+pub(crate) fn solve(problem: &Problem, wanted_db: &[f64], start_db: &[f64]) -> Solution {
+    let (bands, free) = (wanted_db.len(), problem.free);
+    let start: Vec<f64> = start_db.iter().map(|db| 10f64.powf(db / 20.0)).collect();
+    let wanted: Vec<f64> = wanted_db.iter().map(|db| 10f64.powf(db / 20.0)).collect();
+    let mut now = State::new(bands, problem.parts);
+    now.amplitudes.copy_from_slice(&start);
+    now.evaluate(problem, &wanted);
+    let (mut tried, mut best) = (now.clone(), now.clone());
+    let mut slopes = vec![0.0; bands * free];
+    let mut directions = vec![0.0; bands * free];
+    let mut step = vec![0.0; free];
     for _ in 0..STEPS {
-        let error = |state: &State| -> [f64; MOST] {
-            std::array::from_fn(|b| if b < bands { wanted_db[b] - state.gain_db[b] } else { 0.0 })
-        };
-        let residual = error(&now);
-        let cost: f64 = residual.iter().map(|r| r * r).sum();
-        if residual.iter().all(|r| r.abs() < CLOSE_DB) || damping > 1e6 {
+        if now.gains.iter().all(|f| (20.0 * f.log10()).abs() < CLOSE_DB) {
             break;
         }
-        // (J'J + damping I) step = J' residual.
-        let (mut normal, mut step) = ([[0.0; MOST]; MOST], [0.0; MOST]);
-        for i in 0..bands {
-            for j in 0..bands {
-                normal[i][j] = (0..bands).map(|b| now.slope[b][i] * now.slope[b][j]).sum();
-            }
-            normal[i][i] += damping;
-            step[i] = (0..bands).map(|b| now.slope[b][i] * residual[b]).sum();
-        }
-        solve_in_place(&mut normal, &mut step, bands);
-        let mut tried_db = levels_db;
+        // Slopes of the gains in the relative amplitudes, and their smooth counterparts.
         for b in 0..bands {
-            tried_db[b] = (levels_db[b] + step[b]).clamp(wanted_db[b] - REACH_DB, wanted_db[b] + REACH_DB);
+            let (slope, direction) = (&mut slopes[b * free..][..free], &mut directions[b * free..][..free]);
+            for i in 0..free {
+                slope[i] =
+                    now.products[b * problem.parts + i] * start[i] / (wanted[b] * wanted[b] * now.gains[b]);
+            }
+            for (direction, row) in direction.iter_mut().zip(problem.smooth.chunks_exact(free)) {
+                *direction = dot(row, slope);
+            }
         }
-        let tried = evaluate(power, &tried_db, bands, parts);
-        if error(&tried).iter().map(|r| r * r).sum::<f64>() < cost {
-            (now, levels_db) = (tried, tried_db);
-            damping *= 0.1;
-        } else {
-            damping *= 10.0;
+        let mut normal = [[0.0; MOST_BANDS]; MOST_BANDS];
+        let mut multipliers = [0.0; MOST_BANDS];
+        for b in 0..bands {
+            for c in 0..bands {
+                normal[b][c] = dot(&slopes[b * free..][..free], &directions[c * free..][..free]);
+            }
+            multipliers[b] = 1.0 - now.gains[b];
+        }
+        let trace: f64 = (0..bands).map(|b| normal[b][b]).sum();
+        for (b, row) in normal.iter_mut().enumerate().take(bands) {
+            row[b] += 1e-6 * trace / bands as f64;
+        }
+        solve_in_place(&mut normal, &mut multipliers, bands);
+        step.fill(0.0);
+        for b in 0..bands {
+            for (s, d) in step.iter_mut().zip(&directions[b * free..][..free]) {
+                *s += multipliers[b] * d;
+            }
+        }
+        let mut share = 1.0;
+        loop {
+            for i in 0..free {
+                tried.amplitudes[i] = now.amplitudes[i] + share * step[i] * start[i];
+            }
+            tried.evaluate(problem, &wanted);
+            if tried.cost() < now.cost() || share < LEAST_SHARE {
+                break;
+            }
+            share *= 0.5;
+        }
+        std::mem::swap(&mut now, &mut tried);
+        if now.cost() < best.cost() {
+            best.clone_from(&now);
         }
     }
-    Levels { amplitudes: now.amplitude[..parts].to_vec(), realised_db: now.gain_db[..bands].to_vec() }
+    let now = best;
+    let realised_db = now.gains.iter().zip(wanted_db).map(|(f, db)| 20.0 * f.log10() + db).collect();
+    Solution { amplitudes: now.amplitudes, realised_db }
 }
 
+#[derive(Clone)]
 struct State {
-    amplitude: [f64; MOST],
-    /// Gain of each band in dB.
-    gain_db: [f64; MOST],
-    /// Change of each band's gain in dB for each dB of each part.
-    slope: [[f64; MOST]; MOST],
+    amplitudes: Vec<f64>,
+    /// `P_b a` for each band.
+    products: Vec<f64>,
+    /// Gain of each band in amplitude, relative to the one wanted.
+    gains: Vec<f64>,
 }
 
-fn evaluate(power: &[Vec<f64>], levels_db: &[f64; MOST], bands: usize, parts: usize) -> State {
-    let amplitude: [f64; MOST] =
-        std::array::from_fn(|i| if i < parts { 10f64.powf(levels_db[i] / 20.0) } else { 0.0 });
-    let mut state = State { amplitude, gain_db: [0.0; MOST], slope: [[0.0; MOST]; MOST] };
-    for (b, form) in power.iter().enumerate().take(bands) {
-        let mut total = 0.0;
-        for i in 0..parts {
-            let row = &form[i * parts..][..parts];
-            let product: f64 = row.iter().zip(&amplitude).map(|(p, a)| p * a).sum();
-            state.slope[b][i] = amplitude[i] * product;
-            total += state.slope[b][i];
-        }
-        state.gain_db[b] = 10.0 * total.log10();
-        for slope in &mut state.slope[b][..parts] {
-            *slope /= total;
+impl State {
+    fn new(bands: usize, parts: usize) -> Self {
+        Self { amplitudes: vec![0.0; parts], products: vec![0.0; bands * parts], gains: vec![0.0; bands] }
+    }
+
+    fn evaluate(&mut self, problem: &Problem, wanted: &[f64]) {
+        let n = problem.parts;
+        for (b, form) in problem.power.iter().enumerate() {
+            let products = &mut self.products[b * n..][..n];
+            for (product, row) in products.iter_mut().zip(form.chunks_exact(n)) {
+                *product = dot(row, &self.amplitudes);
+            }
+            // A quadratic form of powers is not negative but for rounding.
+            self.gains[b] = dot(products, &self.amplitudes).max(f64::MIN_POSITIVE).sqrt() / wanted[b];
         }
     }
-    state
+
+    fn cost(&self) -> f64 {
+        self.gains.iter().map(|f| (1.0 - f) * (1.0 - f)).sum()
+    }
 }
 
 /// Solves a symmetric positive definite system of `n` equations by elimination; the solution replaces the right-hand side.
-fn solve_in_place(matrix: &mut [[f64; MOST]; MOST], rhs: &mut [f64; MOST], n: usize) {
+fn solve_in_place(matrix: &mut [[f64; MOST_BANDS]; MOST_BANDS], rhs: &mut [f64; MOST_BANDS], n: usize) {
     for i in 0..n {
+        let pivot = matrix[i];
         for row in i + 1..n {
-            let factor = matrix[row][i] / matrix[i][i];
-            for column in i..n {
-                matrix[row][column] -= factor * matrix[i][column];
+            let factor = matrix[row][i] / pivot[i];
+            for (x, p) in matrix[row].iter_mut().zip(&pivot) {
+                *x -= factor * p;
             }
             rhs[row] -= factor * rhs[i];
         }

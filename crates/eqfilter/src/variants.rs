@@ -1,7 +1,8 @@
 //! Other ways to a filter: the plain window method, and minimum phase.
 
-use crate::designer::{check_gains, fast_length};
+use crate::designer::check_gains;
 use crate::filter::band_gains_db;
+use crate::grid::fast_length;
 use crate::{EqFilter, EqFilterConfig, Error, Phase};
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;

@@ -122,7 +122,7 @@ impl LogMel {
     /// Levels in dB, `[mel, frame]` row by row, written to `mels * frames` values without allocating.
     ///
     /// # Errors
-    /// [`Error::BufferLength`] if `out` has another length.
+    /// [`Error::BufferLength`] if `out` has another length or the scratch is of another `n_fft`.
     pub fn extract_into(
         &self,
         samples: &[f32],
@@ -131,6 +131,7 @@ impl LogMel {
     ) -> Result<(), Error> {
         let frames = self.stft.frames(samples.len());
         check_length("output", self.bands.len() * frames, out.len())?;
+        scratch.stft.check(&self.stft)?;
         self.extract_checked(samples, scratch, out);
         Ok(())
     }
@@ -203,8 +204,8 @@ impl FeatureExtractor for LogMel {
 #[inline]
 fn power_to_db(power: f32, floor: f32) -> f32 {
     /// 10 log10(2) and 20 / ln(10).
-    const DB_PER_OCTAVE: f32 = 3.010_299_9;
-    const DB_PER_TWO_NEPER: f32 = 8.685_889_6;
+    const DB_PER_OCTAVE: f32 = 3.010_3;
+    const DB_PER_TWO_NEPER: f32 = 8.685_89;
     /// Bits of 1/sqrt 2, the least mantissa.
     const LEAST: u32 = 0x3f35_04f3;
     let clamped = if power < floor { floor } else { power };

@@ -53,6 +53,13 @@ pub struct StftScratch {
     fft: Vec<Complex<f64>>,
 }
 
+impl StftScratch {
+    /// Checks that it was made for this transform.
+    pub(crate) fn check(&self, stft: &Stft) -> Result<(), Error> {
+        check_length("scratch", stft.n_fft(), self.frame.len())
+    }
+}
+
 impl Stft {
     /// Plans transforms of `n_fft` samples (2 to 2^20) every `hop` samples (1 to `n_fft`).
     ///
@@ -123,7 +130,7 @@ impl Stft {
     /// Spectrum of one frame of `n_fft` samples, written to `bins` values, without allocating.
     ///
     /// # Errors
-    /// [`Error::BufferLength`] if a slice has another length.
+    /// [`Error::BufferLength`] if a slice has another length or the scratch is another transform's.
     pub fn forward_into(
         &self,
         frame: &[f32],
@@ -132,6 +139,7 @@ impl Stft {
     ) -> Result<(), Error> {
         check_length("frame", self.n_fft(), frame.len())?;
         check_length("spectrum", self.bins(), out.len())?;
+        scratch.check(self)?;
         self.transform(frame, scratch);
         for (to, from) in out.iter_mut().zip(&scratch.spectrum) {
             *to = Complex::new(from.re as f32, from.im as f32);
@@ -162,7 +170,7 @@ impl Stft {
             }
             // The imaginary parts at 0 Hz and at half the sample rate say nothing about a real signal.
             scratch.spectrum[0].im = 0.0;
-            if self.n_fft() % 2 == 0 {
+            if self.n_fft().is_multiple_of(2) {
                 scratch.spectrum[self.bins() - 1].im = 0.0;
             }
             let fft = &mut scratch.fft[..self.backward.get_scratch_len()];

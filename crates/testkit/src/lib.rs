@@ -1,1 +1,44 @@
-//! Under construction.
+//! Oracles for Sabine's tests: slow, plain, and sharing no code with what they test.
+//!
+//! This crate is never published. It imports `sabine-acoustics` alone, for the vocabulary: geometry, air, filters and random
+//! walks are written here a second time, in another way than in the crates under test.
+//!
+//! - [`ShoeboxImages`]: all image sources of a box, as energy, as pressure and as a [`PathSet`](sabine_acoustics::PathSet).
+//! - [`BruteForceRays`]: every ray against every triangle.
+//! - [`Phonons`]: particles in any closed mesh, as energy with standard errors and as pressure: the truth behind the
+//!   recording in `fixtures/`.
+//! - [`assert_close`], [`assert_all_close`], [`assert_within_standard_errors`], [`read_golden`]: tolerances that say what they allow.
+//!
+//! What it does **not** do: run fast, read files of users, or follow diffraction.
+//!
+//! ```
+//! use sabine_acoustics::{Material, OctaveBands, Receiver, Scene, Source};
+//! use sabine_testkit::ShoeboxImages;
+//! let bands = OctaveBands::new(1000.0, 1000.0)?;
+//! let hard = Material::uniform(bands, 0.1, 0.0)?;
+//! let room = Scene::shoebox([10.0, 7.0, 3.0], std::array::from_fn(|_| hard.clone()))?;
+//! let (source, receiver) = (Source::omni("s", [2.0, 3.0, 1.5])?, Receiver::omni("r", [7.0, 4.0, 1.6])?);
+//! let energy = ShoeboxImages::new(2.5)?.energy_response(&room, &source, &receiver, None, 5e-3)?;
+//! // This room is not diffuse: Eyring says 1.327 s.
+//! let t30_s = energy.decay_curve(0).decay_time_s(-5.0, -35.0)?;
+//! assert!((t30_s - 2.118).abs() < 0.02, "{t30_s}");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Lengths in metres, times in seconds, energies relative to the direct sound at 1 m.
+//!
+//! Accuracy: `tests/oracles.rs` holds the oracles against closed forms and against each other. References: J. B. Allen and D. A. Berkley, JASA 65
+//! (1979) 943 (image sources); H. Kuttruff, *Room Acoustics* (particles, mean free path).
+
+mod brute_force;
+mod filter;
+mod geometry;
+mod own_air;
+mod phonons;
+mod shoebox;
+mod tolerance;
+
+pub use brute_force::BruteForceRays;
+pub use phonons::{PhononConfig, PhononEnergy, Phonons};
+pub use shoebox::{Image, ShoeboxImages};
+pub use tolerance::{assert_all_close, assert_close, assert_within_standard_errors, read_golden};

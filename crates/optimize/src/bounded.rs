@@ -1,0 +1,105 @@
+//! L-BFGS-B on any objective.
+
+use crate::Error;
+use basin::{BoxBounds, ConstraintDescription, ConstraintSet, Executor, FirstOrderState, Lbfgsb};
+use sabine_acoustics::Objective;
+use std::convert::Infallible;
+
+/// Where a minimisation ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Minimum {
+    /// The variables.
+    pub x: Vec<f64>,
+    /// The cost there.
+    pub cost: f64,
+    /// Iterations of the solver.
+    pub iterations: usize,
+}
+
+/// Minimises an objective within bounds by L-BFGS-B (Zhu et al. 1997, version 3.0) from `start`, which is moved inside them.
+///
+/// ```
+/// use sabine_acoustics::Objective;
+/// struct Parabola;
+/// impl Objective for Parabola {
+///     fn dimension(&self) -> usize { 1 }
+///     fn value_and_gradient(&self, x: &[f64], gradient: &mut [f64]) -> f64 {
+///         gradient[0] = 2.0 * (x[0] - 3.0);
+///         (x[0] - 3.0).powi(2)
+///     }
+/// }
+/// let minimum = sabine_optimize::minimise(&Parabola, &[0.0], &[0.0], &[2.0], 20)?;
+/// assert_eq!(minimum.x, [2.0]); // 3 lies beyond the bound
+/// # Ok::<(), sabine_optimize::Error>(())
+/// ```
+///
+/// # Errors
+/// [`Error::Count`] where lengths differ, [`Error::Solver`] for bounds that contradict each other.
+pub fn minimise(
+    objective: &dyn Objective,
+    start: &[f64],
+    lower: &[f64],
+    upper: &[f64],
+    max_iterations: usize,
+) -> Result<Minimum, Error> {
+    let expected = objective.dimension();
+    for (what, found) in
+        [("start", start.len()), ("lower bounds", lower.len()), ("upper bounds", upper.len())]
+    {
+        if found != expected {
+            return Err(Error::Count { what, expected, found });
+        }
+    }
+    if expected == 0 {
+        let cost = objective.value_and_gradient(&[], &mut []);
+        return Ok(Minimum { x: Vec::new(), cost, iterations: 0 });
+    }
+    let problem = Boxed { objective, lower: lower.to_vec(), upper: upper.to_vec() };
+    let result = Executor::new(problem, Lbfgsb::new(), FirstOrderState::new(start.to_vec()))
+        .max_iter(max_iterations as u64)
+        .run()
+        .map_err(|source| Error::Solver { source: Box::new(source) })?;
+    Ok(Minimum {
+        x: result.best_param().clone(),
+        cost: result.best_cost(),
+        iterations: result.iter() as usize,
+    })
+}
+
+struct Boxed<'a> {
+    objective: &'a dyn Objective,
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+}
+
+impl basin::Constraints for Boxed<'_> {
+    type Set = ConstraintSet<BoxBounds<Vec<f64>>>;
+
+    fn constraints(&self) -> <Self::Set as ConstraintDescription>::Borrowed<'_> {
+        ConstraintSet::new().with_bounds(BoxBounds::new(Some(&self.lower), Some(&self.upper)))
+    }
+}
+
+impl basin::CostFunction for Boxed<'_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+    type Error = Infallible;
+
+    fn cost(&self, x: &Vec<f64>) -> Result<f64, Infallible> {
+        Ok(self.objective.value_and_gradient(x, &mut vec![0.0; x.len()]))
+    }
+}
+
+impl basin::Gradient for Boxed<'_> {
+    type Gradient = Vec<f64>;
+
+    fn gradient(&self, x: &Vec<f64>) -> Result<Vec<f64>, Infallible> {
+        Ok(basin::Gradient::cost_and_gradient(self, x)?.1)
+    }
+
+    fn cost_and_gradient(&self, x: &Vec<f64>) -> Result<(f64, Vec<f64>), Infallible> {
+        let mut gradient = vec![0.0; x.len()];
+        let cost = self.objective.value_and_gradient(x, &mut gradient);
+        Ok((cost, gradient))
+    }
+}

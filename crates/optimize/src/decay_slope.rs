@@ -1,0 +1,75 @@
+//! The slope that ISO 3382 reads: that of the decay curve.
+
+use crate::decay::slope_with_sensitivity;
+use crate::expansion::{Bins, Expansion};
+use crate::history::History;
+use crate::objective::SlopeModel;
+use sabine_acoustics::{EnergyDecayCurve, Estimate, NoReading, Reading};
+use std::borrow::Borrow;
+
+/// Slope of the decay curves of several source-receiver pairs: -60 over the mean of their reverberation times
+/// (ISO 3382-1, 8.1: arithmetic mean over positions).
+pub(crate) struct DecaySlope<H> {
+    pairs: Vec<(H, Vec<f32>)>,
+    range_db: (f64, f64),
+}
+
+impl<H: Borrow<History>> DecaySlope<H> {
+    /// Pairs of a history and the weights of its paths in this band.
+    pub fn new(pairs: Vec<(H, Vec<f32>)>, range_db: (f64, f64)) -> Self {
+        Self { pairs, range_db }
+    }
+
+    /// The curves near an absorption: one pass over all paths.
+    pub fn expand(&self, absorption: &[f64]) -> Expansion {
+        let expand = |(history, weights): &(H, Vec<f32>)| {
+            let history = history.borrow();
+            let mut energy = vec![0.0; history.bins()];
+            let mut hits = vec![0.0; history.bins() * history.materials];
+            history.accumulate(weights, absorption, &mut energy, &mut hits);
+            for (row, e) in hits.chunks_exact_mut(history.materials).zip(&energy).filter(|(_, e)| **e > 0.0) {
+                row.iter_mut().for_each(|h| *h /= e);
+            }
+            Bins { bin_s: history.bin_s, energy, hits }
+        };
+        Expansion {
+            pairs: self.pairs.iter().map(expand).collect(),
+            about: absorption.to_vec(),
+            range_db: self.range_db,
+        }
+    }
+
+    /// Reverberation time in seconds where an expansion was made, with its Monte-Carlo standard error from the scatter between
+    /// batches of rays; why there is none, if none of the curves gives one.
+    pub fn reading(&self, expansion: &Expansion) -> Reading {
+        let mut why = NoReading::NoOnset;
+        let (mut t60_s, mut variance, mut count) = (0.0, 0.0, 0.0);
+        for ((history, weights), bins) in self.pairs.iter().zip(&expansion.pairs) {
+            let sampled = EnergyDecayCurve::from_energy(&bins.energy, bins.bin_s)
+                .decay_time_s(self.range_db.0, self.range_db.1);
+            if let Err(reason) = sampled {
+                why = reason;
+                continue;
+            }
+            let mut sensitivity = vec![0.0; bins.energy.len()];
+            let slope = slope_with_sensitivity(&bins.energy, bins.bin_s, self.range_db, &mut sensitivity);
+            let Some(slope) = slope else { continue };
+            count += 1.0;
+            t60_s += -60.0 / slope;
+            let by_slope = 60.0 / (slope * slope);
+            let spread = history.borrow().variance(weights, &expansion.about, &sensitivity);
+            variance += by_slope * by_slope * spread;
+        }
+        if count == 0.0 {
+            return Err(why);
+        }
+        Ok(Estimate::new(t60_s / count, f64::sqrt(variance) / count))
+    }
+}
+
+impl<H: Borrow<History> + Send + Sync> SlopeModel for DecaySlope<H> {
+    fn slope(&self, absorption: &[f64], gradient: &mut [f64]) -> Option<f64> {
+        // An expansion is exact where it is made.
+        self.expand(absorption).slope(absorption, gradient)
+    }
+}

@@ -1,0 +1,265 @@
+//! Fits the absorption of materials to reverberation times.
+
+use crate::decay_slope::DecaySlope;
+use crate::fit::{AtBound, MaterialFit, Unreachable, UnreachableReason, Warning};
+use crate::group::{Band, Fitted, Group};
+use crate::history::History;
+use crate::objective::check_paths;
+use crate::single_paths::SinglePathSlope;
+use crate::uncertainty::Spread;
+use crate::{AbsorptionPrior, Error, FitConfig, SlopeObjective};
+use rayon::prelude::*;
+use sabine_acoustics::{Air, Estimate, Material, NoReading, Observer, PathSet, PerBand, report};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Shortest and longest T60 that is accepted as a target, in seconds: a studio's booth and a mausoleum.
+pub(crate) const TARGET_RANGE_S: (f64, f64) = (0.02, 20.0);
+/// Name of this work to an observer.
+const STAGE: &str = "fit materials";
+/// Deviation from a prior that is worth a warning, in standard deviations.
+const FAR_FROM_PRIOR: f64 = 3.0;
+
+/// Fits materials so that the simulated decay of every band has the slope -60/T60.
+///
+/// Of all materials that meet the targets it finds those that are most probable by their priors. One target for each band
+/// cannot tell several materials apart: what the data leave open is said in the result.
+#[derive(Clone, Debug)]
+pub struct MaterialFitter {
+    config: FitConfig,
+}
+
+impl MaterialFitter {
+    /// A fitter with these settings.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a setting out of its range.
+    pub fn new(config: FitConfig) -> Result<Self, Error> {
+        config.check()?;
+        Ok(Self { config })
+    }
+
+    /// Fits to one reverberation time for each band, in seconds, the mean over the given source-receiver pairs.
+    ///
+    /// `materials` give the bands and the scattering, `priors` what is expected of their absorption (and the start of the
+    /// search; the absorption in `materials` is not used). A band of the materials for which there is no target takes that of the
+    /// nearest band which has one: 62.5 Hz that of 125 Hz, as the paper does.
+    ///
+    /// # Errors
+    /// For paths, materials, priors or targets that do not match or are out of range, paths too short for a target, and
+    /// [`sabine_acoustics::Error::Cancelled`] if the observer asks to stop. A target that cannot be reached is no error.
+    #[allow(clippy::too_many_arguments)] // each is a different thing that only the caller has
+    pub fn fit_t60(
+        &self,
+        paths: &[&PathSet],
+        materials: &[Material],
+        priors: &[AbsorptionPrior],
+        air: &Air,
+        target_t60_s: &PerBand<Estimate>,
+        observer: &dyn Observer,
+    ) -> Result<MaterialFit, Error> {
+        check_paths(paths, materials)?;
+        self.check_priors(materials, priors)?;
+        check_targets(target_t60_s)?;
+        let octaves = materials[0].bands();
+        let targets = target_t60_s.resampled(octaves);
+        let exponents = air.energy_exponent_per_m(octaves);
+        // Rigid walls leave the air alone, at the exact centre of the band as the paths are computed.
+        let limits_s = exponents.map(|m| 60.0 / (crate::decay::DB_PER_NEPER * m * air.speed_of_sound_m_s()));
+        let traced_s =
+            paths.iter().map(|p| p.max_length_m()).fold(f64::INFINITY, f64::min) / air.speed_of_sound_m_s();
+        for ((band_hz, target), limit_s) in targets.iter().zip(limits_s.values()) {
+            let needed_s = -self.config.range_db.1 / 60.0 * target.value.min(*limit_s);
+            if traced_s < needed_s {
+                return Err(Error::PathsTooShort { band_hz, target_s: target.value, needed_s, traced_s });
+            }
+        }
+
+        let histories: Vec<History> =
+            paths.par_iter().map(|p| History::new(p, air, self.config.bin_s)).collect();
+        let bands = (0..octaves.len())
+            .into_par_iter()
+            .map(|b| {
+                let pairs = histories
+                    .iter()
+                    .zip(paths)
+                    .map(|(history, paths)| {
+                        Ok((history, history.weights(paths, materials, exponents.values()[b], b)?))
+                    })
+                    .collect::<Result<Vec<_>, Error>>()?;
+                let line = match self.config.objective {
+                    SlopeObjective::DecayCurve => None,
+                    SlopeObjective::Paper => Some(SinglePathSlope::through_mean(&pairs)),
+                    SlopeObjective::Li2018 => Some(SinglePathSlope::through_first(&pairs)),
+                };
+                Ok(Band {
+                    curve: DecaySlope::new(pairs, self.config.range_db),
+                    line,
+                    target_s: targets.values()[b].value,
+                    mean: priors.iter().map(|p| p.mean.values()[b]).collect(),
+                    standard_deviation: priors.iter().map(|p| p.standard_deviation.values()[b]).collect(),
+                })
+            })
+            .collect::<Result<Vec<_>, Error>>()?;
+
+        // Smoothness ties the bands together; else each is a problem of its own.
+        let together = if self.config.smoothness > 0.0 { bands.len() } else { 1 };
+        let total = bands.len() as u64;
+        let done = AtomicU64::new(0);
+        report(observer, STAGE, 0, total)?;
+        let fitted = bands
+            .par_chunks(together)
+            .zip(targets.values().par_chunks(together))
+            .map(|(bands, targets)| {
+                let group = Group::new(bands, &self.config);
+                let solution = group.solve()?;
+                let relative_error: Vec<f64> = targets.iter().map(|t| t.standard_error / t.value).collect();
+                let spread = Spread::new(&group, bands, &solution, &relative_error, self.config.bounds);
+                let done = done.fetch_add(bands.len() as u64, Ordering::Relaxed) + bands.len() as u64;
+                report(observer, STAGE, done, total)?;
+                Ok((solution, spread))
+            })
+            .collect::<Result<Vec<_>, Error>>()?;
+
+        let hits: Vec<u64> =
+            (0..materials.len()).map(|k| histories.iter().map(|h| h.hits[k]).sum()).collect();
+        let mut fit = MaterialFit {
+            materials: Vec::new(),
+            absorption_standard_error: Vec::new(),
+            predicted_t60_s: PerBand::from_fn(octaves, |_| Err(NoReading::NoDecay)),
+            unreachable: Vec::new(),
+            at_bounds: Vec::new(),
+            not_determined: Vec::new(),
+            warnings: Vec::new(),
+            iterations: fitted.iter().map(|(s, _)| s.iterations).sum(),
+            cost: fitted.iter().map(|(s, _)| s.cost).sum(),
+        };
+        let mut predicted = Vec::new();
+        let mut absorption = vec![Vec::new(); materials.len()];
+        let mut standard_error = vec![Vec::new(); materials.len()];
+        for (b, band) in bands.iter().enumerate() {
+            let band_hz = octaves.nominal_hz(b);
+            let (solution, spread) = &fitted[b / together];
+            let here = b % together;
+            let found = &solution.bands[here];
+            let values = &found.absorption;
+            let bounded = AtBound::find(band, values, band_hz, self.config.bounds);
+            let reading = found.t60_s.clone();
+            if let Some(reason) = self.unreachable(band, found, limits_s.values()[b]) {
+                fit.unreachable.push(Unreachable { band_hz, reason });
+            }
+            for k in 0..materials.len() {
+                absorption[k].push(values[k]);
+                standard_error[k].push(spread.standard_error[here][k]);
+                let deviations = (values[k] - band.mean[k]) / band.standard_deviation[k];
+                if deviations.is_finite() && deviations.abs() > FAR_FROM_PRIOR {
+                    fit.warnings.push(Warning::FarFromPrior { material: k, band_hz, deviations });
+                }
+            }
+            // 15 dB below the range, what is missing bends its lower end by 0.14 dB.
+            let reached_s = reading.as_ref().map_or(0.0, |r| r.value);
+            let advised_s = (15.0 - self.config.range_db.1) / 60.0 * reached_s;
+            if traced_s < advised_s {
+                fit.warnings.push(Warning::ShortPaths { band_hz, traced_s, advised_s });
+            }
+            spread.name_open(here, band, band_hz, &hits, &bounded, &mut fit.not_determined);
+            fit.at_bounds.extend(bounded);
+            predicted.push(reading);
+        }
+        fit.predicted_t60_s = PerBand::new(octaves, predicted)?;
+        for ((material, absorption), error) in materials.iter().zip(absorption).zip(standard_error) {
+            fit.materials.push(material.with_absorption(PerBand::new(octaves, absorption)?)?);
+            fit.absorption_standard_error.push(PerBand::new(octaves, error)?);
+        }
+        Ok(fit)
+    }
+
+    /// Why the target of a band is not met; `None` where it is.
+    fn unreachable(&self, band: &Band<'_>, found: &Fitted, limit_s: f64) -> Option<UnreachableReason> {
+        let Some(residual) = found.residual else { return Some(UnreachableReason::NoEnergy) };
+        if residual.abs() <= self.config.target_tolerance {
+            return None;
+        }
+        let target_s = band.target_s;
+        // m = (1 + residual) m': a slope of zero or upwards never comes down.
+        let reached_s = if residual > -1.0 { target_s / (1.0 + residual) } else { f64::INFINITY };
+        if residual > 0.0 && target_s >= limit_s {
+            return Some(UnreachableReason::AirLimit { limit_s, target_s });
+        }
+        let Fitted { absorption, gradient, .. } = found;
+        let greatest = gradient.iter().fold(0.0f64, |w, g| w.max(g.abs()));
+        let matters = |k: &usize| gradient[*k].abs() > 1e-3 * greatest;
+        let mut free =
+            (0..absorption.len()).filter(|&k| band.standard_deviation[k] > 0.0).filter(matters).peekable();
+        if free.peek().is_none() {
+            return Some(UnreachableReason::AllHeld { reached_s, target_s });
+        }
+        let bound = if residual > 0.0 { self.config.bounds.0 } else { self.config.bounds.1 };
+        Some(if !free.all(|k| at_bound(absorption[k], bound)) {
+            UnreachableReason::NothingCloser { reached_s, target_s }
+        } else if residual > 0.0 {
+            UnreachableReason::AbsorptionAtLowerBound { reached_s, target_s }
+        } else {
+            UnreachableReason::AbsorptionAtUpperBound { reached_s, target_s }
+        })
+    }
+
+    fn check_priors(&self, materials: &[Material], priors: &[AbsorptionPrior]) -> Result<(), Error> {
+        if priors.len() != materials.len() {
+            return Err(Error::Count { what: "priors", expected: materials.len(), found: priors.len() });
+        }
+        let bands = materials[0].bands();
+        let (lower, upper) = self.config.bounds;
+        for (material, prior) in priors.iter().enumerate() {
+            for values in [&prior.mean, &prior.standard_deviation] {
+                if values.bands() != bands {
+                    let (left, right) = (bands, values.bands());
+                    return Err(sabine_acoustics::Error::BandMismatch { left, right }.into());
+                }
+            }
+            for ((band_hz, &mean), &sd) in prior.mean.iter().zip(prior.standard_deviation.values()) {
+                let wrong = |field, value, range| Error::Prior { material, band_hz, field, value, range };
+                if !(0.0..=1.0).contains(&mean) {
+                    return Err(wrong("mean", mean, "between 0 and 1"));
+                }
+                if !(sd >= 0.0 && sd.is_finite()) {
+                    return Err(wrong("standard_deviation", sd, "finite and not negative"));
+                }
+                if sd == 0.0 && !(lower..=upper).contains(&mean) {
+                    return Err(Error::ContradictoryPrior { material, band_hz, mean, lower, upper });
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check_targets(target_t60_s: &PerBand<Estimate>) -> Result<(), Error> {
+    let (low_s, high_s) = TARGET_RANGE_S;
+    for (band_hz, target) in target_t60_s.iter() {
+        if !(low_s..=high_s).contains(&target.value) {
+            return Err(Error::Target { band_hz, value_s: target.value, low_s, high_s });
+        }
+        if !(target.standard_error >= 0.0 && target.standard_error.is_finite()) {
+            return Err(Error::TargetError { band_hz, value_s: target.standard_error });
+        }
+    }
+    Ok(())
+}
+
+/// Whether an absorption stands at a bound, but for a rounding error.
+pub(crate) fn at_bound(absorption: f64, bound: f64) -> bool {
+    (absorption - bound).abs() < 1e-7
+}
+
+impl AtBound {
+    fn find(band: &Band<'_>, absorption: &[f64], band_hz: f64, bounds: (f64, f64)) -> Vec<Self> {
+        let free = absorption.iter().enumerate().filter(|&(k, _)| band.standard_deviation[k] > 0.0);
+        free.flat_map(|(material, &a)| {
+            [(bounds.0, false), (bounds.1, true)]
+                .into_iter()
+                .filter(move |&(bound, _)| at_bound(a, bound))
+                .map(move |(absorption, upper)| Self { material, band_hz, absorption, upper })
+        })
+        .collect()
+    }
+}

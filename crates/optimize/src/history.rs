@@ -1,0 +1,198 @@
+//! Paths between one source and one receiver, sorted by time for fast evaluation.
+
+use crate::Error;
+use sabine_acoustics::{Air, Material, PathSet, PerBand};
+
+/// What the energy of each path depends on: when it comes and how often it met each material. Shared by all bands.
+pub(crate) struct History {
+    pub materials: usize,
+    pub bin_s: f64,
+    /// Paths of bin j: `starts[j]..starts[j + 1]`.
+    pub starts: Vec<u32>,
+    /// `counts[path * materials + material]`, paths sorted by bin.
+    pub counts: Vec<u16>,
+    /// Greatest count of any material, for tables of powers.
+    pub longest: usize,
+    /// How often any path met each material.
+    pub hits: Vec<u64>,
+    /// Arrival of each path in seconds, sorted by bin only.
+    pub times_s: Vec<f64>,
+    /// Batch of each path; `PathSet::BATCHES` for an exact one.
+    pub batches: Vec<u8>,
+    /// Where in the path set each path stands.
+    order: Vec<u32>,
+}
+
+impl History {
+    pub fn new(paths: &PathSet, air: &Air, bin_s: f64) -> Self {
+        let materials = paths.materials();
+        let speed_m_s = air.speed_of_sound_m_s();
+        let bins = (paths.max_length_m() / speed_m_s / bin_s).ceil() as usize;
+        let time_s = |i: usize| f64::from(paths.lengths_m()[i]) / speed_m_s;
+        let bin_of: Vec<usize> = (0..paths.len()).map(|i| (time_s(i) / bin_s) as usize).collect();
+        // Counting sort; paths past the end are left out, as they are in an energy response.
+        let mut starts = vec![0u32; bins + 1];
+        for &bin in bin_of.iter().filter(|&&bin| bin < bins) {
+            starts[bin + 1] += 1;
+        }
+        for bin in 0..bins {
+            starts[bin + 1] += starts[bin];
+        }
+        let mut next = starts.clone();
+        let mut order = vec![0u32; starts[bins] as usize];
+        for (i, &bin) in bin_of.iter().enumerate().filter(|&(_, &bin)| bin < bins) {
+            order[next[bin] as usize] = i as u32;
+            next[bin] += 1;
+        }
+        let by_chain = paths.hit_counts();
+        let mut counts = Vec::with_capacity(order.len() * materials);
+        let mut hits = vec![0u64; materials];
+        for &i in &order {
+            let chain = paths.chains()[i as usize] as usize;
+            let row = &by_chain[chain * materials..(chain + 1) * materials];
+            counts.extend_from_slice(row);
+            hits.iter_mut().zip(row).for_each(|(h, &n)| *h += u64::from(n));
+        }
+        Self {
+            materials,
+            bin_s,
+            longest: usize::from(counts.iter().copied().max().unwrap_or(0)),
+            hits,
+            times_s: order.iter().map(|&i| time_s(i as usize)).collect(),
+            batches: order.iter().map(|&i| paths.batch(i as usize).unwrap_or(PathSet::BATCHES)).collect(),
+            starts,
+            counts,
+            order,
+        }
+    }
+
+    pub fn bins(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    pub fn len(&self) -> usize {
+        self.order.len()
+    }
+
+    /// Energy of each path in one band if no surface absorbed: distance, scattering and air alone.
+    pub fn weights(
+        &self,
+        paths: &PathSet,
+        materials: &[Material],
+        air_exponent_per_m: f64,
+        band: usize,
+    ) -> Result<Vec<f32>, Error> {
+        let rigid: Vec<Material> = materials
+            .iter()
+            .map(|m| m.with_absorption(PerBand::uniform(m.bands(), 0.0)))
+            .collect::<Result<_, _>>()?;
+        let scattering = paths.log_reflectance(&rigid, band)?;
+        let exponent = air_exponent_per_m as f32;
+        let weight = |&i: &u32| {
+            let i = i as usize;
+            let chain = paths.chains()[i] as usize;
+            (paths.log_weights()[i] + scattering[chain] - exponent * paths.lengths_m()[i]).exp()
+        };
+        Ok(self.order.iter().map(weight).collect())
+    }
+
+    /// Energy of each bin at an absorption of each material, and, where `moments` is not empty, the sum over paths of energy
+    /// times hits, `moments[bin * materials + material]`: minus its derivative by ln(1 - absorption).
+    pub fn accumulate(&self, weights: &[f32], absorption: &[f64], energy: &mut [f64], moments: &mut [f64]) {
+        match self.materials {
+            1 => self.accumulate_fixed::<1>(weights, absorption, energy, moments),
+            2 => self.accumulate_fixed::<2>(weights, absorption, energy, moments),
+            3 => self.accumulate_fixed::<3>(weights, absorption, energy, moments),
+            4 => self.accumulate_fixed::<4>(weights, absorption, energy, moments),
+            5 => self.accumulate_fixed::<5>(weights, absorption, energy, moments),
+            6 => self.accumulate_fixed::<6>(weights, absorption, energy, moments),
+            7 => self.accumulate_fixed::<7>(weights, absorption, energy, moments),
+            8 => self.accumulate_fixed::<8>(weights, absorption, energy, moments),
+            _ => self.accumulate_any(weights, absorption, energy, moments),
+        }
+    }
+
+    /// Powers of the reflected share of each material: `powers[material * stride + hits]`.
+    fn powers(&self, absorption: &[f64]) -> (Vec<f64>, usize) {
+        let stride = self.longest + 1;
+        let mut powers = vec![1.0; self.materials * stride];
+        for (row, &a) in powers.chunks_exact_mut(stride).zip(absorption) {
+            for n in 1..stride {
+                row[n] = row[n - 1] * (1.0 - a);
+            }
+        }
+        (powers, stride)
+    }
+
+    fn accumulate_fixed<const K: usize>(
+        &self,
+        weights: &[f32],
+        absorption: &[f64],
+        energy: &mut [f64],
+        moments: &mut [f64],
+    ) {
+        let (powers, stride) = self.powers(absorption);
+        for (bin, out) in energy.iter_mut().enumerate() {
+            let range = self.starts[bin] as usize..self.starts[bin + 1] as usize;
+            let (mut sum, mut moment) = (0.0, [0.0; K]);
+            let counts = self.counts[range.start * K..range.end * K].chunks_exact(K);
+            for (&weight, counts) in weights[range].iter().zip(counts) {
+                let mut e = f64::from(weight);
+                for k in 0..K {
+                    e *= powers[k * stride + usize::from(counts[k])];
+                }
+                sum += e;
+                for k in 0..K {
+                    moment[k] += e * f64::from(counts[k]);
+                }
+            }
+            *out = sum;
+            if !moments.is_empty() {
+                moments[bin * K..(bin + 1) * K].copy_from_slice(&moment);
+            }
+        }
+    }
+
+    fn accumulate_any(&self, weights: &[f32], absorption: &[f64], energy: &mut [f64], moments: &mut [f64]) {
+        let (powers, stride) = self.powers(absorption);
+        let k = self.materials;
+        moments.fill(0.0);
+        for (bin, out) in energy.iter_mut().enumerate() {
+            *out = 0.0;
+            for path in self.starts[bin] as usize..self.starts[bin + 1] as usize {
+                let counts = &self.counts[path * k..(path + 1) * k];
+                let gains = counts.iter().enumerate().map(|(m, &n)| powers[m * stride + usize::from(n)]);
+                let e = gains.fold(f64::from(weights[path]), |e, gain| e * gain);
+                *out += e;
+                if !moments.is_empty() {
+                    let row = &mut moments[bin * k..(bin + 1) * k];
+                    row.iter_mut().zip(counts).for_each(|(m, &n)| *m += e * f64::from(n));
+                }
+            }
+        }
+    }
+}
+
+impl History {
+    /// Monte-Carlo variance of a linear functional of the bins' energies, from the scatter between batches of rays.
+    pub fn variance(&self, weights: &[f32], absorption: &[f64], functional: &[f64]) -> f64 {
+        let (powers, stride) = self.powers(absorption);
+        let k = self.materials;
+        let batches = usize::from(PathSet::BATCHES);
+        // The last place is for exact paths, which do not scatter.
+        let mut parts = vec![0.0; batches + 1];
+        for (bin, factor) in functional.iter().enumerate().filter(|(_, f)| **f != 0.0) {
+            for path in self.starts[bin] as usize..self.starts[bin + 1] as usize {
+                let mut e = f64::from(weights[path]);
+                for (m, &n) in self.counts[path * k..(path + 1) * k].iter().enumerate() {
+                    e *= powers[m * stride + usize::from(n)];
+                }
+                parts[usize::from(self.batches[path])] += factor * e;
+            }
+        }
+        let parts = &parts[..batches];
+        let mean = parts.iter().sum::<f64>() / batches as f64;
+        let scatter: f64 = parts.iter().map(|p| (p - mean) * (p - mean)).sum();
+        scatter * batches as f64 / (batches as f64 - 1.0)
+    }
+}

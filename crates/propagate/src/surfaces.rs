@@ -1,0 +1,160 @@
+//! The triangles as a tracer needs them: edges, normals, materials, and the planes that they share.
+
+use crate::Error;
+use crate::vector::{Vec3, cross, dot, norm, scale, sub};
+use sabine_acoustics::Scene;
+use std::collections::HashMap;
+
+/// Triangles smaller than this have no usable normal (m2).
+const LEAST_AREA_M2: f64 = 1e-12;
+/// Overlap of neighbouring triangles, as a share of their sides: closes the gap that rounding opens along shared edges.
+const OVERLAP: f64 = 1e-8;
+/// Triangles within this distance of a common plane mirror as one (m) ...
+const COPLANAR_M: f64 = 1e-4;
+/// ... if their normals agree to this angle (rad).
+const COPLANAR_RAD: f64 = 2e-3;
+
+/// One triangle, two-sided.
+#[derive(Clone, Debug)]
+pub(crate) struct Surface {
+    pub corner: Vec3,
+    pub edge1: Vec3,
+    pub edge2: Vec3,
+    /// Unit normal; zero where the triangle is degenerate.
+    pub normal: Vec3,
+    pub area_m2: f64,
+    pub material: u32,
+    /// Index of the plane that it shares with its coplanar neighbours.
+    pub plane: u32,
+}
+
+impl Surface {
+    pub fn is_degenerate(&self) -> bool {
+        self.area_m2 < LEAST_AREA_M2
+    }
+
+    /// Distance along a unit direction to the triangle, from either side (Moeller and Trumbore 1997).
+    pub fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<f64> {
+        let p = cross(direction, self.edge2);
+        let determinant = dot(self.edge1, p);
+        // Twice the area times the cosine of incidence: rays in the plane miss.
+        if determinant.abs() <= 2e-12 * self.area_m2 {
+            return None;
+        }
+        let inverse = 1.0 / determinant;
+        let s = sub(origin, self.corner);
+        let u = dot(s, p) * inverse;
+        if !(-OVERLAP..=1.0 + OVERLAP).contains(&u) {
+            return None;
+        }
+        let q = cross(s, self.edge1);
+        let v = dot(direction, q) * inverse;
+        if v < -OVERLAP || u + v > 1.0 + OVERLAP {
+            return None;
+        }
+        let distance = dot(self.edge2, q) * inverse;
+        (distance > 0.0).then_some(distance)
+    }
+
+    pub fn corners(&self) -> [Vec3; 3] {
+        let [a, e1, e2] = [self.corner, self.edge1, self.edge2];
+        [a, [a[0] + e1[0], a[1] + e1[1], a[2] + e1[2]], [a[0] + e2[0], a[1] + e2[1], a[2] + e2[2]]]
+    }
+
+    /// The normal on the side from which `direction` comes.
+    pub fn normal_against(&self, direction: Vec3) -> Vec3 {
+        if dot(self.normal, direction) > 0.0 { scale(self.normal, -1.0) } else { self.normal }
+    }
+}
+
+/// A mirror plane: the points x with `normal . x == offset_m`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plane {
+    pub normal: Vec3,
+    pub offset_m: f64,
+}
+
+impl Plane {
+    pub fn height(&self, point: Vec3) -> f64 {
+        dot(self.normal, point) - self.offset_m
+    }
+}
+
+/// All triangles and the planes in which they lie.
+#[derive(Clone, Debug)]
+pub(crate) struct Surfaces {
+    pub triangles: Vec<Surface>,
+    pub planes: Vec<Plane>,
+}
+
+impl Surfaces {
+    pub fn new(scene: &Scene) -> Result<Self, Error> {
+        let mut triangles: Vec<Surface> = (0..scene.triangles().len())
+            .map(|i| {
+                let [a, b, c] = scene.corners_m(i);
+                let (edge1, edge2) = (sub(b, a), sub(c, a));
+                let normal = cross(edge1, edge2);
+                let length = norm(normal);
+                let area_m2 = 0.5 * length;
+                let normal = if area_m2 < LEAST_AREA_M2 { [0.0; 3] } else { scale(normal, 1.0 / length) };
+                let material = scene.triangles()[i].material;
+                Surface { corner: a, edge1, edge2, normal, area_m2, material, plane: 0 }
+            })
+            .collect();
+        if triangles.iter().all(Surface::is_degenerate) {
+            return Err(Error::NoSurface { triangles: triangles.len() });
+        }
+        let planes = merge_coplanar(&mut triangles);
+        Ok(Self { triangles, planes })
+    }
+}
+
+/// Gives each triangle its plane. Larger triangles define planes, smaller ones join them: their normals are less exact.
+fn merge_coplanar(triangles: &mut [Surface]) -> Vec<Plane> {
+    let mut order: Vec<usize> = (0..triangles.len()).filter(|&i| !triangles[i].is_degenerate()).collect();
+    order.sort_by(|&i, &j| triangles[j].area_m2.total_cmp(&triangles[i].area_m2).then(i.cmp(&j)));
+    let mut planes: Vec<Plane> = Vec::new();
+    // Planes by rounded normal, under both signs.
+    let mut by_normal: HashMap<[i32; 3], Vec<u32>> = HashMap::new();
+    let key = |normal: Vec3| normal.map(|c| (c / (2.0 * COPLANAR_RAD)).round() as i32);
+    for i in order {
+        let triangle = &triangles[i];
+        let corners = triangle.corners();
+        let [x, y, z] = key(triangle.normal);
+        let same = (0..27).find_map(|n| {
+            let near = [x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1];
+            by_normal.get(&near)?.iter().copied().find(|&p| {
+                let plane = &planes[p as usize];
+                norm(cross(plane.normal, triangle.normal)) < COPLANAR_RAD
+                    && corners.iter().all(|&c| plane.height(c).abs() < COPLANAR_M)
+            })
+        });
+        let plane = same.unwrap_or_else(|| {
+            let (normal, id) = (triangle.normal, planes.len() as u32);
+            planes.push(Plane { normal, offset_m: dot(normal, triangle.corner) });
+            by_normal.entry(key(normal)).or_default().push(id);
+            by_normal.entry(key(scale(normal, -1.0))).or_default().push(id);
+            id
+        });
+        triangles[i].plane = plane;
+    }
+    planes
+}
+
+/// Distance from a point to a triangle (Ericson 2005, Real-Time Collision Detection, 5.1.5).
+pub(crate) fn distance_to(surface: &Surface, point: Vec3) -> f64 {
+    let [a, b, c] = surface.corners();
+    let segment = |p: Vec3, q: Vec3| {
+        let (d, s) = (sub(q, p), sub(point, p));
+        let length2 = dot(d, d);
+        let t = if length2 > 0.0 { (dot(s, d) / length2).clamp(0.0, 1.0) } else { 0.0 };
+        norm(sub(s, scale(d, t)))
+    };
+    let to_edges = segment(a, b).min(segment(b, c)).min(segment(c, a));
+    if surface.is_degenerate() {
+        return to_edges;
+    }
+    let n = surface.normal;
+    let within = |p: Vec3, q: Vec3| dot(cross(sub(q, p), sub(point, p)), n) >= 0.0;
+    if within(a, b) && within(b, c) && within(c, a) { dot(n, sub(point, a)).abs() } else { to_edges }
+}

@@ -1,0 +1,389 @@
+//! The main job: from speech and a rough room to sound that belongs there.
+
+use crate::{Error, Recording, Warning};
+use sabine_acoustics::{
+    Air, EnergyDecayCurve, Estimate, FilterBank, ImpulseResponse, Material, MeasuredRoom, Observer,
+    OctaveBands, PathSet, PerBand, Propagator, Reading, RoomEstimator, RoomParameters, RoomTargets, Signal,
+    equalisation, report, resample,
+};
+use sabine_eqfilter::{AboveBand, EqFilter, EqFilterConfig};
+use sabine_estimator::Estimator;
+use sabine_optimize::{AbsorptionPrior, FitConfig, MaterialFit, MaterialFitter};
+use sabine_propagate::{MeshReport, PathTracer, PressureRenderer, RenderConfig, TracerConfig};
+use std::time::Instant;
+
+/// What to match: a recording, the room it was made in, and the sound to place there.
+#[derive(Clone, Copy, Debug)]
+pub struct MatchInput<'a> {
+    /// Reverberant speech, at least one second.
+    pub speech: Recording<'a>,
+    /// Sound without reverberation.
+    pub dry: Recording<'a>,
+    /// The room's model.
+    pub room: &'a MeasuredRoom,
+    /// Where the dry sound comes from: an identifier of the room file.
+    pub source: &'a str,
+    /// Where it is heard: an identifier of the room file.
+    pub receiver: &'a str,
+}
+
+/// Settings of [`match_room`].
+#[derive(Clone, Debug)]
+pub struct MatchConfig {
+    /// Seed of rays and noise: the same seed gives the same sound.
+    pub seed: u64,
+    /// The tracer; its duration and seed are set by the match.
+    pub tracer: TracerConfig,
+    /// The material fit.
+    pub fit: FitConfig,
+    /// The room is traced for this many times the longest target, so that the decay is complete where it is read.
+    pub duration_factor: f64,
+    /// Greatest correction by the equalisation filter in either direction, in dB; beyond it lies noise rather than sound.
+    pub largest_eq_db: f64,
+    /// Level of the bands from 8 kHz on, in dB: the speech that was listened to holds nothing there (Tang et al. 2020,
+    /// section 3.3). `None` leaves them as the simulation has them.
+    pub above_8_khz_db: Option<f64>,
+}
+
+impl Default for MatchConfig {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            tracer: TracerConfig::default(),
+            fit: FitConfig::default(),
+            duration_factor: 1.25,
+            largest_eq_db: 20.0,
+            above_8_khz_db: Some(-50.0),
+        }
+    }
+}
+
+/// The matched room.
+#[derive(Clone, Debug)]
+pub struct RoomMatch {
+    /// What the recording sounds like, per octave.
+    pub targets: RoomTargets,
+    /// Air of the room.
+    pub air: Air,
+    /// The fitted materials, and what stood in the way.
+    pub fit: MaterialFit,
+    /// Names of the materials, in the order of the fit.
+    pub material_names: Vec<String>,
+    /// The materials of the room file, on the bands of the simulation.
+    pub materials_before: Vec<Material>,
+    /// T30 read from the rendered response, per octave of the targets, in seconds.
+    pub t60_reached_s: PerBand<Reading>,
+    /// Energy decay of the rendered response in each octave of the targets, in steps of [`DECAY_STEP_S`].
+    pub decay: PerBand<EnergyDecayCurve>,
+    /// Equalisation of the rendered response before the filter, in dB relative to 1 kHz.
+    pub eq_simulated_db: PerBand<f64>,
+    /// Pressure response of the simulation with the fitted materials; the equalisation filter is not applied to it.
+    pub response: ImpulseResponse,
+    /// What the decay slopes cannot give.
+    pub eq_filter: EqFilter,
+    /// The dry sound in the room, aligned with the dry sound (the filter's own delay is taken out).
+    pub matched: Signal,
+    /// By how much `matched` was scaled to fit full scale, in dB; 0 for a source of the level of the dry sound at 1 m.
+    pub level_db: f64,
+    /// Stages with the seconds that they took, in order.
+    pub seconds: Vec<(&'static str, f64)>,
+    /// What a user should know before trusting the result.
+    pub warnings: Vec<Warning>,
+}
+
+/// Time step of [`RoomMatch::decay`], in seconds.
+pub const DECAY_STEP_S: f64 = 0.005;
+
+/// Highest magnitude of the matched sound.
+const FULL_SCALE: f32 = 0.95;
+/// How often the fit is corrected by what the rendered response shows.
+const CORRECTIONS: usize = 2;
+/// The rendered response is close enough to its target when every reachable octave is this near.
+const CLOSE: f64 = 0.02;
+/// A reachable target missed by more than this is worth a warning: one just-noticeable difference (ISO 3382-1, Annex A).
+const MISSED: f64 = 0.05;
+/// Lowest rate of the matched sound in Hz: the 8 kHz octave ends at 11.2 kHz.
+const LOWEST_RATE_HZ: u32 = 32_000;
+/// Rate that replaces lower ones, in Hz.
+const STANDARD_RATE_HZ: u32 = 48_000;
+/// Shortest and longest duration that is traced, in seconds.
+const DURATION_S: (f64, f64) = (0.3, 6.0);
+
+/// Matches a room with the pretrained estimator and the path tracer.
+///
+/// # Errors
+/// For a recording that is too short, silent or clipped, an unknown source or receiver, a room that cannot be traced, and
+/// [`sabine_acoustics::Error::Cancelled`].
+pub fn match_room(
+    input: &MatchInput<'_>,
+    config: &MatchConfig,
+    observer: &dyn Observer,
+) -> Result<RoomMatch, Error> {
+    let mut clock = Clock::start();
+    let mut warnings = input.check()?;
+    report(observer, "listening", 0, 1)?;
+    let estimator = Estimator::pretrained()?;
+    let (from_hz, to_hz) = (input.speech.signal.sample_rate_hz(), estimator.sample_rate_hz());
+    if from_hz != to_hz {
+        warnings.push(Warning::SpeechResampled { from_hz, to_hz });
+    }
+    let heard = estimator.estimate_detailed(&resample(input.speech.signal, to_hz)?)?;
+    warnings.extend(heard.warnings.into_iter().map(Warning::Speech));
+    report(observer, "listening", 1, 1)?;
+    clock.lap("estimate");
+    let tracer = |duration_s: f64| -> Result<Box<dyn Propagator>, Error> {
+        let settings = TracerConfig { duration_s, seed: config.seed, ..config.tracer.clone() };
+        Ok(Box::new(PathTracer::new(settings)?))
+    };
+    let source = input.room.source(input.source)?;
+    let mesh = MeshReport::inspect(input.room.scene(), source.position_m)?;
+    if !mesh.open_edges_m.is_empty() {
+        warnings.push(Warning::OpenMesh { edges: mesh.open_edges_m.len(), escape_rate: mesh.escape_rate });
+    }
+    match_targets(heard.targets, warnings, clock, &tracer, input, config, observer)
+}
+
+/// Matches a room with an estimator and a tracer of one's own; the estimator hears the recording at its own sample rate,
+/// and `tracer` is asked for one that looks for paths of up to the given duration in seconds.
+///
+/// # Errors
+/// As [`match_room`], and those of the estimator and the tracer.
+pub fn match_room_with(
+    estimator: &dyn RoomEstimator,
+    tracer: &dyn Fn(f64) -> Result<Box<dyn Propagator>, Error>,
+    input: &MatchInput<'_>,
+    config: &MatchConfig,
+    observer: &dyn Observer,
+) -> Result<RoomMatch, Error> {
+    let mut clock = Clock::start();
+    let warnings = input.check()?;
+    report(observer, "listening", 0, 1)?;
+    let targets = estimator.estimate(input.speech.signal)?;
+    report(observer, "listening", 1, 1)?;
+    clock.lap("estimate");
+    match_targets(targets, warnings, clock, tracer, input, config, observer)
+}
+
+impl MatchInput<'_> {
+    /// Refuses what cannot be judged and collects what should be known.
+    fn check(&self) -> Result<Vec<Warning>, Error> {
+        let mut warnings = Vec::new();
+        let clipped = self.speech.check()?;
+        if clipped > 0.0 {
+            warnings.push(Warning::SlightlyClipped { percent: 100.0 * clipped });
+        }
+        self.dry.check_not_silent()?;
+        self.room.source(self.source)?;
+        self.room.receiver(self.receiver)?;
+        if self.room.air_assumed() {
+            warnings.push(Warning::AirAssumed);
+        }
+        Ok(warnings)
+    }
+}
+
+/// Everything after listening.
+fn match_targets(
+    targets: RoomTargets,
+    mut warnings: Vec<Warning>,
+    mut clock: Clock,
+    tracer: &dyn Fn(f64) -> Result<Box<dyn Propagator>, Error>,
+    input: &MatchInput<'_>,
+    config: &MatchConfig,
+    observer: &dyn Observer,
+) -> Result<RoomMatch, Error> {
+    let room = input.room;
+    let (source, receiver) = (room.source(input.source)?, room.receiver(input.receiver)?);
+    let bands = OctaveBands::SIMULATION;
+    let air = room.air();
+    let materials_before: Vec<Material> =
+        room.scene().materials().iter().map(|named| named.material.resampled(bands)).collect();
+    let priors: Vec<AbsorptionPrior> = materials_before
+        .iter()
+        .zip(room.priors())
+        .map(|(material, prior)| AbsorptionPrior {
+            mean: material.absorption().clone(),
+            standard_deviation: prior.absorption_sd.resampled(bands),
+        })
+        .collect();
+    let scene = room.scene().with_materials(materials_before.clone())?;
+    let longest_s = targets.t60_s().values().iter().map(|t| t.value).fold(0.0, f64::max);
+    let duration_s = (config.duration_factor * longest_s).clamp(DURATION_S.0, DURATION_S.1);
+    let paths = tracer(duration_s)?.trace(&scene, source, receiver, &air, observer)?;
+    if paths.is_empty() {
+        return Err(Error::NoPath { source_id: source.id.clone(), receiver: receiver.id.clone() });
+    }
+    clock.lap("trace");
+
+    let sample_rate_hz = match input.dry.signal.sample_rate_hz() {
+        rate if rate >= LOWEST_RATE_HZ => rate,
+        from_hz => {
+            warnings.push(Warning::DryResampled { from_hz, to_hz: STANDARD_RATE_HZ });
+            STANDARD_RATE_HZ
+        }
+    };
+    let renderer =
+        PressureRenderer::new(RenderConfig { sample_rate_hz, seed: config.seed, ..RenderConfig::default() })?;
+    let fitter = MaterialFitter::new(config.fit.clone())?;
+    let mut aim = targets.t60_s().clone();
+    let mut corrections = 0;
+    let (fit, response, parameters) = loop {
+        let fit = fitter.fit_t60(&[&paths], &materials_before, &priors, &air, &aim, observer)?;
+        clock.lap("fit");
+        let response = renderer.render(&paths, &fit.materials, &air)?;
+        let parameters = RoomParameters::measure(&response, OctaveBands::T60)?;
+        clock.lap("render");
+        let next = corrected(&aim, targets.t60_s(), &parameters.t30_s, &fit);
+        corrections += 1;
+        match next {
+            Some(next) if corrections <= CORRECTIONS => aim = next,
+            _ => break (fit, response, parameters),
+        }
+    };
+    warn_of_misses(targets.t60_s(), &parameters.t30_s, &fit, &mut warnings);
+    warnings.extend(fit.unreachable.iter().map(|u| Warning::Unreachable(u.clone())));
+    let eq_simulated_db = equalisation(&response, OctaveBands::EQ)?
+        .map(|reading| reading.as_ref().map_or(f64::NAN, |estimate| estimate.value));
+    let eq_filter = {
+        let above = config.above_8_khz_db.map(|gain_db| AboveBand { from_band_hz: 8000.0, gain_db });
+        let gains_db = eq_gains(targets.eq_db(), &eq_simulated_db, config.largest_eq_db, &mut warnings)?;
+        EqFilter::design(&gains_db, sample_rate_hz, EqFilterConfig { above, ..EqFilterConfig::default() })?
+    };
+    let dry = resample(input.dry.signal, sample_rate_hz)?;
+    let wet = sabine_eqfilter::convolve(dry.samples(), response.samples());
+    let matched = eq_filter.apply(&Signal::new(wet, sample_rate_hz)?)?;
+    let (matched, level_db) = to_full_scale(matched)?;
+    clock.lap("filter");
+    let decay = decay_curves(&response)?;
+    Ok(RoomMatch {
+        targets,
+        air,
+        material_names: room.scene().materials().iter().map(|named| named.name.clone()).collect(),
+        materials_before,
+        t60_reached_s: parameters.t30_s,
+        fit,
+        decay,
+        eq_simulated_db,
+        response,
+        eq_filter,
+        matched,
+        level_db,
+        seconds: clock.stages,
+        warnings,
+    })
+}
+
+/// Aims that make up for what the rendered response still misses, or nothing if it is close enough.
+///
+/// The fit works on path energies; the rendered response is read through octave filters, which let a slowly decaying band
+/// into a faster neighbour. Octaves that cannot reach their target are left alone.
+fn corrected(
+    aim: &PerBand<Estimate>,
+    target: &PerBand<Estimate>,
+    reached: &PerBand<Reading>,
+    fit: &MaterialFit,
+) -> Option<PerBand<Estimate>> {
+    let mut off = false;
+    let bands = target.bands();
+    let next = PerBand::from_fn(bands, |band| {
+        let (aim, target) = (aim.values()[band], target.values()[band]);
+        let stuck = fit.unreachable.iter().any(|u| u.band_hz == bands.nominal_hz(band));
+        match &reached.values()[band] {
+            Ok(reached) if !stuck => {
+                let miss = target.value / reached.value;
+                off |= (miss - 1.0).abs() > CLOSE;
+                Estimate::new(aim.value * miss, aim.standard_error)
+            }
+            _ => aim,
+        }
+    });
+    off.then_some(next)
+}
+
+/// Octaves whose rendered decay is not the one asked for although nothing stands in its way, or cannot be read.
+fn warn_of_misses(
+    target: &PerBand<Estimate>,
+    reached: &PerBand<Reading>,
+    fit: &MaterialFit,
+    warnings: &mut Vec<Warning>,
+) {
+    for ((band_hz, target), reached) in target.iter().zip(reached.values()) {
+        let stuck = fit.unreachable.iter().any(|u| u.band_hz == band_hz);
+        match reached {
+            Err(reason) => warnings.push(Warning::NotRead { band_hz, reason: reason.clone() }),
+            Ok(reached) if !stuck && (reached.value / target.value - 1.0).abs() > MISSED => {
+                warnings.push(Warning::Missed { band_hz, target_s: target.value, reached_s: reached.value });
+            }
+            Ok(_) => {}
+        }
+    }
+}
+
+/// What the filter must add to the simulation, kept within what is sensible.
+fn eq_gains(
+    target_db: &PerBand<Estimate>,
+    simulated_db: &PerBand<f64>,
+    largest_db: f64,
+    warnings: &mut Vec<Warning>,
+) -> Result<PerBand<f64>, Error> {
+    let bands = target_db.bands();
+    let gains = target_db.zip_with(simulated_db, |target, simulated| {
+        if simulated.is_finite() { target.value - simulated } else { 0.0 }
+    })?;
+    Ok(PerBand::from_fn(bands, |band| {
+        let gain = gains.values()[band];
+        if gain.abs() > largest_db {
+            warnings.push(Warning::EqLimited {
+                band_hz: bands.nominal_hz(band),
+                wanted_db: gain,
+                limit_db: largest_db,
+            });
+        }
+        gain.clamp(-largest_db, largest_db)
+    }))
+}
+
+fn to_full_scale(sound: Signal) -> Result<(Signal, f64), Error> {
+    let peak = sound.peak();
+    if peak <= FULL_SCALE {
+        return Ok((sound, 0.0));
+    }
+    let gain = FULL_SCALE / peak;
+    let rate = sound.sample_rate_hz();
+    let samples = sound.into_samples().into_iter().map(|s| s * gain).collect();
+    Ok((Signal::new(samples, rate)?, 20.0 * f64::from(gain).log10()))
+}
+
+/// Energy decay of a response in each octave of the targets.
+fn decay_curves(response: &ImpulseResponse) -> Result<PerBand<EnergyDecayCurve>, Error> {
+    let rate = response.sample_rate_hz();
+    let step = (f64::from(rate) * DECAY_STEP_S).round() as usize;
+    let bank = FilterBank::new(OctaveBands::T60, rate)?;
+    Ok(bank.split(response.samples()).map(|band| {
+        let energy: Vec<f64> =
+            band.chunks(step).map(|bin| bin.iter().map(|&s| f64::from(s) * f64::from(s)).sum()).collect();
+        EnergyDecayCurve::from_energy(&energy, step as f64 / f64::from(rate))
+    }))
+}
+
+/// Adds up what each stage takes.
+struct Clock {
+    since: Instant,
+    stages: Vec<(&'static str, f64)>,
+}
+
+impl Clock {
+    fn start() -> Self {
+        Self { since: Instant::now(), stages: Vec::new() }
+    }
+
+    fn lap(&mut self, stage: &'static str) {
+        let now = Instant::now();
+        let seconds = now.duration_since(self.since).as_secs_f64();
+        self.since = now;
+        match self.stages.iter_mut().find(|(name, _)| *name == stage) {
+            Some((_, sum)) => *sum += seconds,
+            None => self.stages.push((stage, seconds)),
+        }
+    }
+}

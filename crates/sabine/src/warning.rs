@@ -1,0 +1,76 @@
+//! What a user should know before trusting a match.
+
+use sabine_optimize::Unreachable;
+
+/// Something that does not stop the match but limits what it is worth; `Display` says it in words.
+#[derive(Clone, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Warning {
+    /// Some peaks of the recording are cut off.
+    #[error("{percent:.2} % of the recording's samples are clipped: the estimates may be off")]
+    SlightlyClipped {
+        /// Share of samples in flat tops, in percent.
+        percent: f64,
+    },
+    /// What the estimator says of the recording.
+    #[error("recording: {0}")]
+    Speech(sabine_estimator::Warning),
+    /// The room file says nothing about the air.
+    #[error("the room file has no [air]: 20 C, 50 % and 101.325 kPa are assumed")]
+    AirAssumed,
+    /// The dry sound was brought to another sample rate.
+    #[error("the dry sound was resampled from {from_hz} to {to_hz} Hz, so that the 8 kHz octave exists")]
+    DryResampled {
+        /// Its sample rate in Hz.
+        from_hz: u32,
+        /// Sample rate of the result in Hz.
+        to_hz: u32,
+    },
+    /// The recording was brought to the estimator's sample rate.
+    #[error("the recording was resampled from {from_hz} to {to_hz} Hz for the estimator")]
+    SpeechResampled {
+        /// Its sample rate in Hz.
+        from_hz: u32,
+        /// Sample rate of the estimator in Hz.
+        to_hz: u32,
+    },
+    /// A reverberation time that no absorption gives.
+    #[error("{0}")]
+    Unreachable(Unreachable),
+    /// A reverberation time that could not be read from the rendered response.
+    #[error("{band_hz} Hz: the reverberation time of the rendered response cannot be read: {reason}")]
+    NotRead {
+        /// Nominal octave centre in Hz.
+        band_hz: f64,
+        /// Why.
+        reason: sabine_acoustics::NoReading,
+    },
+    /// The rendered response misses a target that should be within reach.
+    #[error("{band_hz} Hz: the rendered response decays in {reached_s:.2} s; the target is {target_s:.2} s")]
+    Missed {
+        /// Nominal octave centre in Hz.
+        band_hz: f64,
+        /// Target in seconds.
+        target_s: f64,
+        /// Reverberation time read from the rendered response, in seconds.
+        reached_s: f64,
+    },
+    /// An equalisation too large to be believed.
+    #[error("{band_hz} Hz: an equalisation of {wanted_db:.0} dB is asked for; {limit_db:.0} dB are applied")]
+    EqLimited {
+        /// Nominal octave centre in Hz.
+        band_hz: f64,
+        /// Gain asked for, in dB.
+        wanted_db: f64,
+        /// Greatest gain that is applied, in dB.
+        limit_db: f64,
+    },
+    /// The mesh is not quite closed.
+    #[error("the room model has {edges} open edges; {:.2} % of the rays escape through them", 100.0 * escape_rate)]
+    OpenMesh {
+        /// Edges with one triangle only.
+        edges: usize,
+        /// Share of rays from the source that meet nothing.
+        escape_rate: f64,
+    },
+}

@@ -1,0 +1,124 @@
+//! The main job: reverberant speech and a rough room in, sound that belongs in the room out.
+//!
+//! Without arguments it runs on the fixtures of the repository. See README.md beside this file.
+
+mod report;
+
+use clap::Parser;
+use sabine::acoustics::{Channel, MeasuredRoom, SampleFormat, Signal, encode_wav, read_audio};
+use sabine::{MatchConfig, MatchInput, MatchSummary, Recording, RoomMatch, match_room, materials_toml};
+use sabine_examples::{Bar, OutputFolder};
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Match a simulated room to a recording of speech, and render dry sound in it.
+#[derive(Parser)]
+struct Arguments {
+    /// Reverberant recording of speech (WAV), at least one second [default: the fixture]
+    #[arg(long, value_name = "F.wav")]
+    speech: Option<PathBuf>,
+    /// Folder with room.toml and its mesh [default: the fixture]
+    #[arg(long, value_name = "DIR")]
+    room: Option<PathBuf>,
+    /// Source in the room file [default: its first]
+    #[arg(long, value_name = "ID")]
+    source: Option<String>,
+    /// Receiver in the room file [default: its first]
+    #[arg(long, value_name = "ID")]
+    receiver: Option<String>,
+    /// Sound to place in the room (WAV) [default: the fixture]
+    #[arg(long, value_name = "F.wav")]
+    dry: Option<PathBuf>,
+    /// Channel of the recordings, from 0; without it they must be mono
+    #[arg(long)]
+    channel: Option<usize>,
+    /// Seed of rays and noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/match_room")]
+    out: PathBuf,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), Box<dyn Error + Send + Sync>> {
+    let fixtures = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures"));
+    let or_fixture = |path: &Option<PathBuf>, fixture: &str| path.clone().unwrap_or_else(|| fixtures.join(fixture));
+    let speech_path = or_fixture(&arguments.speech, "speech/recording.wav");
+    let dry_path = or_fixture(&arguments.dry, "speech/dry.wav");
+    let room_path = or_fixture(&arguments.room, "room");
+
+    // A folder that cannot be written to should not cost the user a computation first.
+    let mut out = OutputFolder::create(&arguments.out)?;
+    let channel = arguments.channel.map_or(Channel::Mono, Channel::Index);
+    let speech = read_audio(&speech_path, channel)?;
+    let dry = read_audio(&dry_path, channel)?;
+    let room = MeasuredRoom::read(&room_path)?;
+    let first = |ids: Vec<&str>| ids.first().map(ToString::to_string).unwrap_or_default();
+    let source = arguments.source.clone().unwrap_or_else(|| first(room.sources().iter().map(|s| &*s.id).collect()));
+    let receiver =
+        arguments.receiver.clone().unwrap_or_else(|| first(room.receivers().iter().map(|r| &*r.id).collect()));
+    let input = MatchInput {
+        speech: Recording { name: &speech_path.display().to_string(), signal: &speech },
+        dry: Recording { name: &dry_path.display().to_string(), signal: &dry },
+        room: &room,
+        source: &source,
+        receiver: &receiver,
+    };
+    let config = MatchConfig { seed: arguments.seed, ..MatchConfig::default() };
+    let bar = Bar::new();
+    let matched = match_room(&input, &config, &bar)?;
+    bar.finish();
+
+    let summary = MatchSummary::new(&matched);
+    write_results(&mut out, &input, &room_path.display().to_string(), &matched, &summary)?;
+    out.finish()?;
+    print_summary(&summary, &arguments.out);
+    Ok(())
+}
+
+fn write_results(
+    out: &mut OutputFolder,
+    input: &MatchInput<'_>,
+    room_name: &str,
+    matched: &RoomMatch,
+    summary: &MatchSummary,
+) -> Result<(), Box<dyn Error + Send + Sync>> {
+    let response = Signal::from(matched.response.clone());
+    let filter = Signal::new(matched.eq_filter.taps().to_vec(), matched.eq_filter.sample_rate_hz())?;
+    out.write("matched.wav", &encode_wav(&matched.matched, SampleFormat::Int24)?)?;
+    out.write("impulse_response.wav", &encode_wav(&response, SampleFormat::Float32)?)?;
+    out.write("eq_filter.wav", &encode_wav(&filter, SampleFormat::Float32)?)?;
+    out.write("materials.toml", materials_toml(matched)?.as_bytes())?;
+    out.write("match.json", summary.to_json()?.as_bytes())?;
+    out.write("report.html", report::html(input, room_name, matched, summary)?.as_bytes())?;
+    Ok(())
+}
+
+fn print_summary(summary: &MatchSummary, out: &Path) {
+    println!("octave        {}", row(&summary.bands_hz, |hz| format!("{hz}")));
+    println!("T60 heard     {} s", row(&summary.t60_target_s, |t| format!("{t:.2}")));
+    println!(
+        "T60 reached   {} s",
+        row(&summary.t60_reached_s, |t| t.map_or("-".to_owned(), |t| format!("{t:.2}")))
+    );
+    for warning in &summary.warnings {
+        println!("note: {warning}");
+    }
+    let seconds: f64 = summary.seconds.values().sum();
+    println!("{seconds:.1} s; listen to and look at {}", out.join("report.html").display());
+}
+
+fn row<T>(values: &[T], format: impl Fn(&T) -> String) -> String {
+    values.iter().map(|v| format!("{:>6}", format(v))).collect()
+}

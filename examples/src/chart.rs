@@ -1,0 +1,212 @@
+//! Line charts as SVG: one style for all, readable in light and dark, with colours that the colour-blind can tell apart.
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+/// Size of a chart in SVG units; it scales to the width of the page.
+const SIZE: (u32, u32) = (600, 360);
+/// Text and axes; a dark page turns it light.
+const INK: RGBColor = RGBColor(34, 34, 34);
+/// Grid lines.
+const GRID: RGBColor = RGBColor(208, 208, 208);
+/// Okabe and Ito 2008: distinguishable with any kind of colour vision.
+const COLOURS: [RGBColor; 6] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+];
+/// Chosen by attribute, so that the file keeps plain colours for viewers that know no style sheets.
+const DARK: &str = "<style>@media (prefers-color-scheme: dark){\
+svg.chart [fill=\"#222222\"]{fill:#e4e4e4}svg.chart [stroke=\"#222222\"]{stroke:#e4e4e4}\
+svg.chart [stroke=\"#D0D0D0\"]{stroke:#444}\
+svg.chart [fill=\"#0072B2\"]{fill:#4da3dc}svg.chart [stroke=\"#0072B2\"]{stroke:#4da3dc}\
+svg.chart [fill=\"#D55E00\"]{fill:#ff8a3c}svg.chart [stroke=\"#D55E00\"]{stroke:#ff8a3c}}</style>";
+
+/// How a series is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Look {
+    /// A line.
+    Line,
+    /// A broken line.
+    Dashed,
+    /// A line with a dot at each point, and error bars where there are any.
+    Dots,
+}
+
+/// Points that belong together.
+#[derive(Clone, Debug)]
+pub struct Series {
+    /// Name in the legend.
+    pub name: String,
+    /// Points in data units; NaN breaks the line.
+    pub points: Vec<(f64, f64)>,
+    /// Half-width of an interval about each point, or nothing.
+    pub half_widths: Vec<f64>,
+    /// How it is drawn.
+    pub look: Look,
+    /// Which of the six colours.
+    pub colour: usize,
+    /// Whether the legend names it.
+    pub in_legend: bool,
+}
+
+/// What the horizontal axis counts.
+#[derive(Clone, Debug)]
+pub enum Scale {
+    /// A quantity, from and to.
+    Linear(f64, f64),
+    /// Frequencies in Hz on a logarithmic axis, a tick at each: points are given in Hz.
+    Octaves(Vec<f64>),
+}
+
+/// A chart, ready to be drawn.
+#[derive(Clone, Debug)]
+pub struct Chart {
+    /// What the horizontal axis shows, with its unit.
+    pub x_label: String,
+    /// What the vertical axis shows, with its unit.
+    pub y_label: String,
+    /// Horizontal axis.
+    pub x: Scale,
+    /// Vertical range; `None` fits the points and zero.
+    pub y: Option<(f64, f64)>,
+    /// What is drawn, in the order of the legend.
+    pub series: Vec<Series>,
+}
+
+impl Series {
+    /// A series without intervals.
+    pub fn new(name: impl Into<String>, look: Look, colour: usize, points: Vec<(f64, f64)>) -> Self {
+        Self { name: name.into(), points, half_widths: Vec::new(), look, colour, in_legend: true }
+    }
+}
+
+impl Chart {
+    /// The chart as one `<svg>` element without a fixed size.
+    ///
+    /// # Errors
+    /// What plotters reports; drawing into memory does not fail by itself.
+    pub fn svg(&self) -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
+        let mut text = String::new();
+        {
+            let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
+            self.draw(&root).map_err(|e| e.to_string())?;
+            root.present().map_err(|e| e.to_string())?;
+        }
+        let open = format!("<svg width=\"{}\" height=\"{}\"", SIZE.0, SIZE.1);
+        let text = text.replacen(&open, "<svg class=\"chart\" role=\"img\"", 1);
+        Ok(match text.find('>') {
+            Some(end) => format!("{}{DARK}{}", &text[..=end], &text[end + 1..]),
+            None => text,
+        })
+    }
+
+    fn position(&self, x: f64) -> f64 {
+        if matches!(self.x, Scale::Octaves(_)) { x.log2() } else { x }
+    }
+
+    fn x_range(&self) -> (f64, f64) {
+        match &self.x {
+            Scale::Linear(from, to) => (*from, *to),
+            Scale::Octaves(centres) => {
+                let log = |hz: Option<&f64>| hz.copied().unwrap_or(1000.0).log2();
+                (log(centres.first()) - 0.35, log(centres.last()) + 0.35)
+            }
+        }
+    }
+
+    fn y_range(&self) -> (f64, f64) {
+        if let Some(range) = self.y {
+            return range;
+        }
+        let (mut low, mut high) = (0.0f64, 0.0f64);
+        for series in &self.series {
+            for (i, &(_, y)) in series.points.iter().enumerate() {
+                let half = series.half_widths.get(i).copied().unwrap_or(0.0);
+                if (y + half).is_finite() {
+                    low = low.min(y - half);
+                    high = high.max(y + half);
+                }
+            }
+        }
+        let margin = 0.05 * (high - low).max(1e-9);
+        (if low < 0.0 { low - margin } else { 0.0 }, if high > 0.0 { high + margin } else { 0.0 })
+    }
+
+    fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
+        let ink = |size: u32| ("sans-serif", size).into_font().color(&INK);
+        let (legend, body) = root.split_vertically(26);
+        let mut left = 62;
+        for series in self.series.iter().filter(|s| s.in_legend) {
+            let colour = COLOURS[series.colour % COLOURS.len()];
+            let dashes: &[(i32, i32)] =
+                if series.look == Look::Dashed { &[(0, 7), (11, 18)] } else { &[(0, 18)] };
+            for &(from, to) in dashes {
+                legend.draw(&PathElement::new(vec![(left + from, 13), (left + to, 13)], colour.stroke_width(3)))?;
+            }
+            legend.draw(&Text::new(series.name.clone(), (left + 24, 5), ink(15)))?;
+            left += 40 + 8 * series.name.chars().count() as i32;
+        }
+
+        let (x0, x1) = self.x_range();
+        let (y0, y1) = self.y_range();
+        let mut chart = ChartBuilder::on(&body)
+            .margin_right(14)
+            .x_label_area_size(46)
+            .y_label_area_size(58)
+            .build_cartesian_2d(x0..x1, y0..y1)?;
+        let octaves = matches!(self.x, Scale::Octaves(_));
+        let mut mesh = chart.configure_mesh();
+        mesh.x_desc(self.x_label.as_str())
+            .y_desc(self.y_label.as_str())
+            .axis_desc_style(ink(15))
+            .label_style(ink(14))
+            .axis_style(INK)
+            .bold_line_style(GRID)
+            .light_line_style(TRANSPARENT)
+            .y_labels(7);
+        if octaves { mesh.x_labels(0).disable_x_mesh() } else { mesh.x_labels(8) }.draw()?;
+        if let Scale::Octaves(centres) = &self.x {
+            // plotters places its own ticks on a linear axis; octaves want one at each centre.
+            let plot = chart.plotting_area();
+            for &hz in centres {
+                let x = hz.log2();
+                plot.draw(&PathElement::new(vec![(x, y0), (x, y1)], GRID))?;
+                let (pixel, bottom) = plot.map_coordinate(&(x, y0));
+                let label = if hz < 1000.0 { format!("{hz}") } else { format!("{}k", hz / 1000.0) };
+                let shift = 4 * label.len() as i32;
+                body.draw(&Text::new(label, (pixel - shift, bottom + 5 - 26), ink(14)))?;
+            }
+        }
+        for series in &self.series {
+            let colour = COLOURS[series.colour % COLOURS.len()];
+            for run in series.points.split(|(x, y)| !(x.is_finite() && y.is_finite())) {
+                let run: Vec<(f64, f64)> =
+                    run.iter().map(|&(x, y)| (self.position(x), y.clamp(y0, y1))).collect();
+                if series.look == Look::Dashed {
+                    chart.draw_series(DashedLineSeries::new(run, 7, 5, colour.stroke_width(2)))?;
+                } else {
+                    chart.draw_series(LineSeries::new(run, colour.stroke_width(2)))?;
+                }
+            }
+            if series.look != Look::Dots {
+                continue;
+            }
+            for (i, &(x, y)) in series.points.iter().enumerate() {
+                if !y.is_finite() {
+                    continue;
+                }
+                let x = self.position(x);
+                chart.draw_series([Circle::new((x, y.clamp(y0, y1)), 4, colour.filled())])?;
+                if let Some(&half) = series.half_widths.get(i).filter(|h| h.is_finite() && **h > 0.0) {
+                    let ends = [(y - half).clamp(y0, y1), (y + half).clamp(y0, y1)];
+                    chart.draw_series([PathElement::new(ends.map(|e| (x, e)).to_vec(), colour.stroke_width(1))])?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
