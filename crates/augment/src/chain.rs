@@ -75,7 +75,11 @@ impl Chain {
 }
 
 impl Augment for Chain {
-    fn augment(&self, response: &ImpulseResponse, seed: u64) -> Result<ImpulseResponse, sabine_acoustics::Error> {
+    fn augment(
+        &self,
+        response: &ImpulseResponse,
+        seed: u64,
+    ) -> Result<ImpulseResponse, sabine_acoustics::Error> {
         let mut changed = response.clone();
         for (stage, (probability, augment)) in self.stages.iter().enumerate() {
             let seed = derive(seed, stage as u64);

@@ -84,7 +84,9 @@ mod t60;
 
 pub use chain::{AugmentedResponse, Chain};
 pub use clip::ClipConfig;
-pub use corpus::{LeftOut, MeasuredResponse, NoiseCorpus, ResponseCorpus, ResponseFilter, SourceFile, SpeechCorpus};
+pub use corpus::{
+    LeftOut, MeasuredResponse, NoiseCorpus, ResponseCorpus, ResponseFilter, SourceFile, SpeechCorpus,
+};
 pub use dataset::{Built, DatasetBuilder, DatasetConfig, Worker};
 pub use drr::{DrrAugment, DrrConfig};
 pub use eq::{EqAugment, EqConfig};

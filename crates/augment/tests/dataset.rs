@@ -25,7 +25,9 @@ fn rooms(count: u64) -> ResponseCorpus {
     for i in 0..count {
         for position in 0..2 {
             let measured = response(0.3 + 0.1 * i as f64, 0.8, 65.0, 16_000, 10 * i + position);
-            corpus.add(format!("r{i}"), format!("r{i}/{position}.wav"), measured, &ResponseFilter::default()).unwrap();
+            corpus
+                .add(format!("r{i}"), format!("r{i}/{position}.wav"), measured, &ResponseFilter::default())
+                .unwrap();
         }
     }
     corpus
@@ -40,7 +42,13 @@ fn noise() -> NoiseCorpus {
 }
 
 fn config() -> DatasetConfig {
-    DatasetConfig { seed: 5, clips: [21, 9, 9], shard_clips: 7, clips_per_response: 3, ..DatasetConfig::default() }
+    DatasetConfig {
+        seed: 5,
+        clips: [21, 9, 9],
+        shard_clips: 7,
+        clips_per_response: 3,
+        ..DatasetConfig::default()
+    }
 }
 
 fn builder() -> DatasetBuilder {
@@ -88,12 +96,14 @@ fn threads_workers_and_interruptions_change_no_byte() {
     let stopped = tempfile::tempdir().unwrap();
     let mut stops = 0;
     loop {
-        let first = std::sync::atomic::AtomicU64::new(u64::MAX);
-        let stop_after_nine = |_: &str, done: u64, _: u64| {
-            let begin = first.fetch_min(done, std::sync::atomic::Ordering::Relaxed).min(done);
-            if done > begin + 9 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        // A little later every time.
+        let calls = std::sync::atomic::AtomicU64::new(0);
+        let limit = 4 + 3 * stops;
+        let stop = |_: &str, _: u64, _: u64| {
+            let call = calls.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            if call > limit { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let observer: &dyn Observer = &stop_after_nine;
+        let observer: &dyn Observer = &stop;
         match builder().build(stopped.path(), Worker::default(), true, observer) {
             Ok(_) => break,
             Err(Error::Acoustics(sabine_acoustics::Error::Cancelled { .. })) => stops += 1,
@@ -153,7 +163,8 @@ fn the_shards_hold_what_the_manifest_says() {
         rooms_of.entry(shard.partition).or_default().extend(integers("room"));
         speakers_of.entry(shard.partition).or_default().extend(integers("speaker"));
         let t60 = tensors.tensor("t60_s").unwrap().data().to_vec();
-        let readable = t60.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).filter(|t| t.is_finite());
+        let readable =
+            t60.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).filter(|t| t.is_finite());
         assert!(readable.clone().count() > 5 * n, "{}: too few readings", shard.file);
         assert!(readable.into_iter().all(|t| t > 0.03 && t < 10.0));
     }
@@ -168,7 +179,10 @@ fn the_shards_hold_what_the_manifest_says() {
                 assert_eq!(*seen.entry(index).or_insert(partition), partition, "leak of {index}");
                 let name = &names[index as usize];
                 let own = dealt.get(name).copied();
-                assert!(own.map_or(name.contains(partition.name()), |p| p == partition), "{name} in {partition}");
+                assert!(
+                    own.map_or(name.contains(partition.name()), |p| p == partition),
+                    "{name} in {partition}"
+                );
             }
         }
     }
@@ -183,7 +197,11 @@ fn what_leaks_or_cannot_be_partitioned_is_refused() {
     let refused = DatasetBuilder::new(config(), voices(5), rooms(2), noise()).err().unwrap();
     assert!(matches!(refused, Error::TooFew { what: "room", .. }), "{refused}");
 
-    let leak = PartitionConfig { validation: vec!["r1".into()], test: vec!["r1".into()], ..PartitionConfig::default() };
+    let leak = PartitionConfig {
+        validation: vec!["r1".into()],
+        test: vec!["r1".into()],
+        ..PartitionConfig::default()
+    };
     let config_with_leak = DatasetConfig { rooms: leak, ..config() };
     let refused = DatasetBuilder::new(config_with_leak, voices(5), rooms(4), noise()).err().unwrap();
     assert!(matches!(refused, Error::Leak { what: "room", .. }), "{refused}");
@@ -192,8 +210,14 @@ fn what_leaks_or_cannot_be_partitioned_is_refused() {
     let mut copied = rooms(3);
     let copy = copied.responses()[0].response.clone();
     copied.add("another", "copy.wav", copy, &ResponseFilter::default()).unwrap();
-    let apart = PartitionConfig { validation: vec!["another".into()], test: vec!["r1".into()], ..PartitionConfig::default() };
-    let refused = DatasetBuilder::new(DatasetConfig { rooms: apart, ..config() }, voices(5), copied, noise()).err().unwrap();
+    let apart = PartitionConfig {
+        validation: vec!["another".into()],
+        test: vec!["r1".into()],
+        ..PartitionConfig::default()
+    };
+    let refused = DatasetBuilder::new(DatasetConfig { rooms: apart, ..config() }, voices(5), copied, noise())
+        .err()
+        .unwrap();
     assert!(matches!(refused, Error::Leak { .. }), "{refused}");
 }
 
@@ -203,7 +227,8 @@ fn another_set_is_not_overwritten() {
     built(2, folder.path());
     let again = builder().build(folder.path(), Worker::default(), false, &());
     assert!(matches!(again, Err(Error::NotEmpty { .. })), "{again:?}");
-    let other = DatasetBuilder::new(DatasetConfig { seed: 6, ..config() }, voices(5), rooms(4), noise()).unwrap();
+    let other =
+        DatasetBuilder::new(DatasetConfig { seed: 6, ..config() }, voices(5), rooms(4), noise()).unwrap();
     let resumed = other.build(folder.path(), Worker::default(), true, &());
     assert!(matches!(resumed, Err(Error::OtherPlan { .. })), "{resumed:?}");
     let worker = builder().build(folder.path(), Worker { index: 4, of: 3 }, true, &());
@@ -213,12 +238,17 @@ fn another_set_is_not_overwritten() {
 #[test]
 fn unusable_sound_is_left_out_with_its_reason() {
     let mut corpus = SpeechCorpus::default();
-    assert!(corpus.add("quiet", Signal::new(vec![0.0; 80_000], 16_000).unwrap(), 4.0).unwrap().contains("silent"));
+    assert!(
+        corpus.add("quiet", Signal::new(vec![0.0; 80_000], 16_000).unwrap(), 4.0).unwrap().contains("silent")
+    );
     assert!(corpus.add("brief", speech(2.0, 100.0, 1), 4.0).unwrap().contains("2.00 s"));
     let empty = tempfile::tempdir().unwrap();
     assert!(matches!(SpeechCorpus::read(empty.path(), 16_000, 4.0, &()), Err(Error::TooFew { .. })));
     let filter = ResponseFilter::default();
-    assert!(matches!(ResponseCorpus::read(empty.path(), 16_000, &filter, &[], &()), Err(Error::TooFew { .. })));
+    assert!(matches!(
+        ResponseCorpus::read(empty.path(), 16_000, &filter, &[], &()),
+        Err(Error::TooFew { .. })
+    ));
     assert!(matches!(NoiseCorpus::read(&empty.path().join("nowhere"), 16_000, &()), Err(Error::Io { .. })));
     std::fs::write(empty.path().join("a.wav"), b"not a sound").unwrap();
     assert!(SpeechCorpus::read(empty.path(), 16_000, 4.0, &()).is_err());

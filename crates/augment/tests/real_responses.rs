@@ -4,13 +4,16 @@ mod material;
 
 use material::{quantile, shared_data};
 use sabine_acoustics::ImpulseResponse;
-use sabine_augment::{EqStatistics, Labels, MeasuredResponse, ResponseCorpus, ResponseFilter, T60Augment, T60Config};
+use sabine_augment::{
+    EqStatistics, Labels, MeasuredResponse, ResponseCorpus, ResponseFilter, T60Augment, T60Config,
+};
 
 fn corpus() -> Option<ResponseCorpus> {
     let data = shared_data()?;
     let by_file = ["python_acoustics".to_owned(), "decayfitnet".to_owned()];
     // The hand clap is no response.
-    let filter = ResponseFilter { excluded_rooms: vec!["spatialaudio".to_owned()], ..ResponseFilter::default() };
+    let filter =
+        ResponseFilter { excluded_rooms: vec!["spatialaudio".to_owned()], ..ResponseFilter::default() };
     let mut corpus = ResponseCorpus::read(&data.join("rir"), 16_000, &filter, &by_file, &()).unwrap();
     corpus.extend(ResponseCorpus::read(&data.join("rooms"), 16_000, &filter, &by_file, &()).unwrap());
     for left_out in corpus.left_out() {
@@ -86,7 +89,8 @@ fn the_shipped_statistics_are_those_of_the_responses() {
     for i in 0..7 {
         assert!((fitted.mean_db().values()[i] - shipped.mean_db().values()[i]).abs() < 0.05);
         assert!(
-            (fitted.standard_deviation_db().values()[i] - shipped.standard_deviation_db().values()[i]).abs() < 0.05
+            (fitted.standard_deviation_db().values()[i] - shipped.standard_deviation_db().values()[i]).abs()
+                < 0.05
         );
     }
     assert_eq!(fitted.responses(), shipped.responses());

@@ -38,7 +38,12 @@ fn the_time_measured_afterwards_is_the_time_asked_for() {
         .collect();
     let mut errors = errors(&recorded, &[0.12, 0.3, 0.6, 1.0, 1.5]);
     let (median, high) = (quantile(&mut errors, 0.5), quantile(&mut errors, 0.95));
-    eprintln!("{} readings: median error {:.2} %, 95th percentile {:.2} %", errors.len(), 100.0 * median, 100.0 * high);
+    eprintln!(
+        "{} readings: median error {:.2} %, 95th percentile {:.2} %",
+        errors.len(),
+        100.0 * median,
+        100.0 * high
+    );
     assert!(errors.len() > 150);
     assert!(median < 0.03, "median {median}");
     assert!(high < 0.10, "95th percentile {high}");
@@ -50,7 +55,8 @@ fn the_decay_goes_on_below_the_old_noise_floor() {
     let recorded = response(0.5, 1.0, 45.0, 16_000, 3);
     let augment = T60Augment::new(T60Config::default()).unwrap();
     let changed = augment.by_factor(&recorded, 1.0, 1).unwrap();
-    let bands = FilterBank::new(OctaveBands::new(500.0, 4000.0).unwrap(), 16_000).unwrap().split(changed.samples());
+    let bands =
+        FilterBank::new(OctaveBands::new(500.0, 4000.0).unwrap(), 16_000).unwrap().split(changed.samples());
     for (hz, band) in bands.iter() {
         let level_db = |from_s: f64| {
             let block = &band[(from_s * 16e3) as usize..][..1600];

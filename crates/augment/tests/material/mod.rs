@@ -33,7 +33,9 @@ pub fn speech(seconds: f64, pitch_hz: f64, seed: u64) -> Signal {
         .map(|i| {
             let t = i as f64 / 16e3;
             let syllable = (std::f64::consts::TAU * 4.0 * t).sin().max(0.0);
-            let buzz: f64 = (1..20).map(|k| (std::f64::consts::TAU * pitch_hz * f64::from(k) * t).sin() / f64::from(k)).sum();
+            let buzz: f64 = (1..20)
+                .map(|k| (std::f64::consts::TAU * pitch_hz * f64::from(k) * t).sin() / f64::from(k))
+                .sum();
             (0.1 * syllable * (buzz + 0.1 * rng.random_range(-1.0..1.0))) as f32
         })
         .collect();
