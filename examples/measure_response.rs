@@ -107,7 +107,8 @@ fn quantities(room: &RoomParameters) -> [(&'static str, &PerBand<Reading>); 9] {
 fn table(path: &Path, room: &RoomParameters, whole: &BandParameters) -> String {
     let mut text = format!("{}\n{:<14}", path.display(), "");
     for hz in room.bands().iter_hz() {
-        let _ = write!(text, "{:>9}", if hz < 1000.0 { format!("{hz}") } else { format!("{}k", hz / 1000.0) });
+        let _ =
+            write!(text, "{:>9}", if hz < 1000.0 { format!("{hz}") } else { format!("{}k", hz / 1000.0) });
     }
     text.push_str("     full\n");
     let mut reasons: Vec<(String, Vec<String>)> = Vec::new();
@@ -238,7 +239,8 @@ fn plot(response: &ImpulseResponse, room: &RoomParameters) -> Result<String, Any
             })
             .collect();
         let loudest = measured.iter().fold(f64::NEG_INFINITY, |most, point| most.max(point.1));
-        let relative = |points: Vec<(f64, f64)>| points.into_iter().map(|(t, db)| (t, db - loudest)).collect();
+        let relative =
+            |points: Vec<(f64, f64)>| points.into_iter().map(|(t, db)| (t, db - loudest)).collect();
         let mut series = vec![Series::new("measured", Look::Line, 5, relative(measured))];
         if let Ok(fit) = &room.fits.values()[i] {
             let times = (0..PLOT_POINTS).map(|k| {

@@ -1,13 +1,40 @@
 //! The spectrum of a padded signal, filtered by gains at frequencies.
 
 use realfft::num_complex::Complex;
-use realfft::{RealFftPlanner, RealToComplex};
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use std::cell::RefCell;
+use std::collections::HashMap;
 use std::sync::Arc;
+
+/// Plans that a thread keeps, a megabyte or two each.
+const MOST_PLANS: usize = 32;
+
+/// Both transforms of one length.
+#[derive(Clone)]
+struct Plan {
+    forward: Arc<dyn RealToComplex<f64>>,
+    inverse: Arc<dyn ComplexToReal<f64>>,
+}
 
 thread_local! {
     /// Plans made so far: planning a length costs more than transforming it.
-    static PLANNER: RefCell<RealFftPlanner<f64>> = RefCell::new(RealFftPlanner::new());
+    static PLANS: RefCell<HashMap<usize, Plan>> = RefCell::new(HashMap::new());
+}
+
+/// The plan of a length, the same on every thread: a planner takes apart a length by what it has planned before, so that
+/// with a planner kept from length to length the last bits would depend on what a thread happened to do earlier.
+fn plan(length: usize) -> Plan {
+    PLANS.with(|plans| {
+        let mut plans = plans.borrow_mut();
+        if plans.len() >= MOST_PLANS && !plans.contains_key(&length) {
+            plans.clear();
+        }
+        let make = || {
+            let mut planner = RealFftPlanner::new();
+            Plan { forward: planner.plan_fft_forward(length), inverse: planner.plan_fft_inverse(length) }
+        };
+        plans.entry(length).or_insert_with(make).clone()
+    })
 }
 
 /// Spectrum of a real signal followed by silence.
@@ -24,8 +51,7 @@ impl Spectrum {
     pub(crate) fn new(samples: &[f64], sample_rate_hz: u32, padding_s: f64) -> Self {
         let rate = f64::from(sample_rate_hz);
         let transform_len = fast_len(samples.len() + (padding_s * rate).ceil() as usize);
-        let forward: Arc<dyn RealToComplex<f64>> =
-            PLANNER.with(|planner| planner.borrow_mut().plan_fft_forward(transform_len));
+        let forward = plan(transform_len).forward;
         let mut padded = samples.to_vec();
         padded.resize(transform_len, 0.0);
         let mut bins = forward.make_output_vec();
@@ -37,7 +63,7 @@ impl Spectrum {
 
     /// The signal filtered by a real gain, which is evaluated (and taken as not zero) within `support_hz` only.
     pub(crate) fn filtered(&self, support_hz: (f64, f64), gain: impl Fn(f64) -> f64) -> Vec<f64> {
-        let inverse = PLANNER.with(|planner| planner.borrow_mut().plan_fft_inverse(self.transform_len));
+        let inverse = plan(self.transform_len).inverse;
         let mut product = inverse.make_input_vec();
         let scale = 1.0 / self.transform_len as f64;
         for i in self.range(support_hz) {

@@ -112,7 +112,8 @@ mod tests {
 
     #[test]
     fn the_bands_add_up_to_the_input() {
-        let samples: Vec<f32> = (0..5000).map(|i| ((i * i) as f32 * 0.37).sin() * (-(i as f32) / 900.0).exp()).collect();
+        let samples: Vec<f32> =
+            (0..5000).map(|i| ((i * i) as f32 * 0.37).sin() * (-(i as f32) / 900.0).exp()).collect();
         let split = BandSplit::new(OctaveBands::SIMULATION, samples.len(), 16_000);
         let bands = bands_of(&split, &samples);
         assert_eq!(bands.len(), 8);
@@ -124,7 +125,8 @@ mod tests {
 
     #[test]
     fn a_tone_lands_in_its_octave() {
-        let samples: Vec<f32> = (0..8000).map(|i| (i as f32 * 1000.0 * std::f32::consts::TAU / 16e3).sin()).collect();
+        let samples: Vec<f32> =
+            (0..8000).map(|i| (i as f32 * 1000.0 * std::f32::consts::TAU / 16e3).sin()).collect();
         let split = BandSplit::new(OctaveBands::SIMULATION, samples.len(), 16_000);
         let bands = bands_of(&split, &samples);
         let energy = |b: &[f32]| b[1000..7000].iter().map(|s| s * s).sum::<f32>();

@@ -43,15 +43,15 @@ impl Chain {
         Self::default()
     }
 
-    /// T60 in three of four responses, then DRR and EQ in two of three: what training sets are made with.
+    /// T60 in nine of ten responses, then DRR and EQ in two of three: what training sets are made with.
     ///
     /// # Errors
     /// [`Error::Setting`] for the sample rate.
     pub fn for_training(sample_rate_hz: u32) -> Result<Self, Error> {
         let (t60, drr, eq) = (T60Config::default(), DrrConfig::default(), EqConfig::default());
-        let description = vec![format!("0.75 {t60:?}"), format!("0.66 {drr:?}"), format!("0.66 {eq:?}")];
+        let description = vec![format!("0.9 {t60:?}"), format!("0.66 {drr:?}"), format!("0.66 {eq:?}")];
         let mut chain = Self::new()
-            .then(0.75, T60Augment::new(t60)?)?
+            .then(0.9, T60Augment::new(t60)?)?
             .then(0.66, DrrAugment::new(drr)?)?
             .then(0.66, EqAugment::new(eq, sample_rate_hz)?)?;
         chain.description = description;
@@ -75,7 +75,11 @@ impl Chain {
 }
 
 impl Augment for Chain {
-    fn augment(&self, response: &ImpulseResponse, seed: u64) -> Result<ImpulseResponse, sabine_acoustics::Error> {
+    fn augment(
+        &self,
+        response: &ImpulseResponse,
+        seed: u64,
+    ) -> Result<ImpulseResponse, sabine_acoustics::Error> {
         let mut changed = response.clone();
         for (stage, (probability, augment)) in self.stages.iter().enumerate() {
             let seed = derive(seed, stage as u64);

@@ -170,7 +170,12 @@ impl ClipMaker {
     }
 
     pub(crate) fn scratch(&self) -> ClipScratch {
-        ClipScratch { log_mel: self.log_mel.scratch(), input: Vec::new(), output: Vec::new(), spectrum: Vec::new() }
+        ClipScratch {
+            log_mel: self.log_mel.scratch(),
+            input: Vec::new(),
+            output: Vec::new(),
+            spectrum: Vec::new(),
+        }
     }
 
     /// Transforms a response. What exceeds the longest length set up is cut off.
@@ -277,7 +282,8 @@ impl ClipMaker {
             for _ in 0..8 {
                 let track = noises[rng.random_range(0..noises.len())];
                 let from = rng.random_range(0..track.len());
-                let noise: Vec<f32> = track[from..].iter().chain(track.iter().cycle()).take(self.samples).copied().collect();
+                let noise: Vec<f32> =
+                    track[from..].iter().chain(track.iter().cycle()).take(self.samples).copied().collect();
                 if power(&noise) > 1e-12 {
                     return Ok(noise);
                 }

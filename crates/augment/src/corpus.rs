@@ -4,7 +4,9 @@ use crate::clip::ActiveSpeech;
 use crate::direct::Direct;
 use crate::error::Error;
 use crate::labels::Labels;
-use sabine_acoustics::{Channel, ImpulseResponse, Observer, Signal, probe_wav, read_audio, report, resample, resample_response};
+use sabine_acoustics::{
+    Channel, ImpulseResponse, Observer, Signal, probe_wav, read_audio, report, resample, resample_response,
+};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
@@ -50,7 +52,12 @@ impl SpeechCorpus {
     /// # Errors
     /// [`Error::TooFew`] if nothing remains; [`Error::Io`]; what [`read_audio`] refuses (several channels among it), naming
     /// the file; [`sabine_acoustics::Error::Cancelled`].
-    pub fn read(folder: &Path, sample_rate_hz: u32, least_s: f64, observer: &dyn Observer) -> Result<Self, Error> {
+    pub fn read(
+        folder: &Path,
+        sample_rate_hz: u32,
+        least_s: f64,
+        observer: &dyn Observer,
+    ) -> Result<Self, Error> {
         let mut corpus = Self::default();
         let files = sound_files(folder)?;
         for (done, file) in files.iter().enumerate() {
@@ -78,7 +85,8 @@ impl SpeechCorpus {
         if speech.peak() < 1e-4 {
             return Some("silent".to_owned());
         }
-        self.utterances.push(Utterance { speaker: speaker.into(), speech: ActiveSpeech::new(speech.into_samples()) });
+        self.utterances
+            .push(Utterance { speaker: speaker.into(), speech: ActiveSpeech::new(speech.into_samples()) });
         None
     }
 
@@ -172,10 +180,9 @@ impl ResponseCorpus {
                 let response = resample_response(&native, sample_rate_hz)?;
                 match corpus.add(room.clone(), format!("{path}#{channel}"), response, filter) {
                     Ok(()) => used = true,
-                    Err(reason) => corpus.left_out.push(LeftOut {
-                        path: format!("{path}#{channel}"),
-                        reason: reason.to_string(),
-                    }),
+                    Err(reason) => corpus
+                        .left_out
+                        .push(LeftOut { path: format!("{path}#{channel}"), reason: reason.to_string() }),
                 }
             }
             if used {
@@ -183,7 +190,12 @@ impl ResponseCorpus {
             }
         }
         if corpus.responses.is_empty() {
-            return Err(Error::TooFew { what: "usable responses", purpose: "a data set", needed: 1, found: 0 });
+            return Err(Error::TooFew {
+                what: "usable responses",
+                purpose: "a data set",
+                needed: 1,
+                found: 0,
+            });
         }
         Ok(corpus)
     }
@@ -261,7 +273,12 @@ impl NoiseCorpus {
             corpus.files.push(SourceFile { path, sha256: hash_file(file)? });
         }
         if corpus.tracks.is_empty() {
-            return Err(Error::TooFew { what: "noise files", purpose: "a data set with noise", needed: 1, found: 0 });
+            return Err(Error::TooFew {
+                what: "noise files",
+                purpose: "a data set with noise",
+                needed: 1,
+                found: 0,
+            });
         }
         Ok(corpus)
     }
@@ -287,7 +304,8 @@ fn sound_files(folder: &Path) -> Result<Vec<PathBuf>, Error> {
             let path = entry.map_err(failed)?.path();
             if path.is_dir() {
                 folders.push(path);
-            } else if path.extension().is_some_and(|e| ["wav", "flac", "ogg", "aiff"].iter().any(|k| e == *k)) {
+            } else if path.extension().is_some_and(|e| ["wav", "flac", "ogg", "aiff"].iter().any(|k| e == *k))
+            {
                 found.push(path);
             }
         }

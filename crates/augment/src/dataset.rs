@@ -2,7 +2,9 @@
 
 use crate::chain::Chain;
 use crate::clip::{ClipConfig, ClipMaker, ClipScratch};
-use crate::corpus::{MeasuredResponse, NoiseCorpus, ResponseCorpus, SpeechCorpus, Utterance, hash_bytes, hash_file};
+use crate::corpus::{
+    MeasuredResponse, NoiseCorpus, ResponseCorpus, SpeechCorpus, Utterance, hash_bytes, hash_file,
+};
 use crate::error::{Error, check};
 use crate::labels::Labels;
 use crate::manifest::{DATASET_FORMAT, Manifest, ShardEntry, read_json, write_json};
@@ -31,7 +33,7 @@ pub struct DatasetConfig {
     pub shard_clips: usize,
     /// Clips that share a response (with other speech and noise), 1 to 64. Default 4.
     pub clips_per_response: usize,
-    /// Fraction of the responses that are measured ones, in each partition; the others are simulated. Default 0.35, 0.5, 1:
+    /// Fraction of the responses that are measured ones, in each partition; the others are simulated. Default 0.3, 0.5, 1:
     /// the test is real.
     pub measured_fraction: [f64; 3],
     /// How clips are made.
@@ -51,7 +53,7 @@ impl Default for DatasetConfig {
             clips: [56_500, 19_500, 18_500],
             shard_clips: 512,
             clips_per_response: 4,
-            measured_fraction: [0.35, 0.5, 1.0],
+            measured_fraction: [0.3, 0.5, 1.0],
             clip: ClipConfig::default(),
             synthetic: SyntheticRoomConfig::default(),
             rooms: PartitionConfig::default(),
@@ -98,6 +100,7 @@ pub struct DatasetBuilder {
     plan_sha256: String,
     maker: ClipMaker,
     synthetic: SyntheticRooms,
+    chain: Chain,
     speech: SpeechCorpus,
     responses: ResponseCorpus,
     noise: NoiseCorpus,
@@ -169,17 +172,27 @@ impl DatasetBuilder {
                 });
             }
         }
-        let speakers = config.speakers.deal("speaker", "three partitions", &speech.speakers(), derive(config.seed, 11))?;
+        let speakers = config.speakers.deal(
+            "speaker",
+            "three partitions",
+            &speech.speakers(),
+            derive(config.seed, 11),
+        )?;
         let rooms = if config.measured_fraction.iter().all(|&f| f == 0.0) {
             BTreeMap::new()
         } else {
             config.rooms.deal("room", "three partitions", &responses.rooms(), derive(config.seed, 12))?
         };
-        let noises = if noise.tracks.len() < 3 {
-            // Too few to deal out: only computed noise is heard then, unless there is none to keep apart.
+        let noises = if noise.tracks.is_empty() {
+            // All noise is computed then.
             BTreeMap::new()
         } else {
-            PartitionConfig::default().deal("noise", "three partitions", &noise.names(), derive(config.seed, 13))?
+            PartitionConfig::default().deal(
+                "noise",
+                "three partitions",
+                &noise.names(),
+                derive(config.seed, 13),
+            )?
         };
         let mut content = BTreeMap::new();
         for (i, u) in speech.utterances.iter().enumerate() {
@@ -191,6 +204,8 @@ impl DatasetBuilder {
         for (name, samples) in &noise.tracks {
             content.insert(format!("noise {name}"), hash_samples(samples));
         }
+        check_copies(&responses, &speech, &rooms, &speakers)?;
+        let chain = Chain::for_training(maker.sample_rate_hz())?;
         let plan = Plan {
             format: DATASET_FORMAT.to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -201,15 +216,27 @@ impl DatasetBuilder {
             measured_fraction: config.measured_fraction,
             clip: config.clip.clone(),
             synthetic: format!("{:?}", config.synthetic),
-            chain: Chain::for_training(maker.sample_rate_hz())?.describe(),
+            chain: chain.describe(),
             rooms,
             speakers,
             noise: noises,
             content,
         };
-        let text = serde_json::to_vec(&plan).map_err(|source| Error::Json { path: PathBuf::from("plan.json"), source })?;
+        let text = serde_json::to_vec(&plan)
+            .map_err(|source| Error::Json { path: PathBuf::from("plan.json"), source })?;
         let plan_sha256 = hash_bytes(&text);
-        Ok(Self { config, plan, plan_sha256, maker, synthetic, speech, responses, noise, refused: AtomicU64::new(0) })
+        Ok(Self {
+            config,
+            plan,
+            plan_sha256,
+            maker,
+            synthetic,
+            chain,
+            speech,
+            responses,
+            noise,
+            refused: AtomicU64::new(0),
+        })
     }
 
     /// Partition of each measured room.
@@ -246,9 +273,21 @@ impl DatasetBuilder {
     /// # Errors
     /// [`Error::NotEmpty`], [`Error::OtherPlan`], [`Error::Setting`] for the worker, [`Error::Io`] (a full disk),
     /// [`sabine_acoustics::Error::Cancelled`].
-    pub fn build(&self, folder: &Path, worker: Worker, resume: bool, observer: &dyn Observer) -> Result<Built, Error> {
+    pub fn build(
+        &self,
+        folder: &Path,
+        worker: Worker,
+        resume: bool,
+        observer: &dyn Observer,
+    ) -> Result<Built, Error> {
         check("worker count", worker.of as f64, 1.0, 1e6, "at least 1")?;
-        check("worker index", worker.index as f64, 1.0, worker.of as f64, "between 1 and the number of workers")?;
+        check(
+            "worker index",
+            worker.index as f64,
+            1.0,
+            worker.of as f64,
+            "between 1 and the number of workers",
+        )?;
         std::fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.to_owned(), source })?;
         self.begin(folder, worker, resume)?;
         let shards = self.shards();
@@ -283,7 +322,8 @@ impl DatasetBuilder {
         }
         // Compared as text: a plan of another version may have other fields.
         let found: serde_json::Value = read_json(&path)?;
-        let mine = serde_json::to_value(&self.plan).map_err(|source| Error::Json { path: path.clone(), source })?;
+        let mine =
+            serde_json::to_value(&self.plan).map_err(|source| Error::Json { path: path.clone(), source })?;
         if found == mine { Ok(()) } else { Err(Error::OtherPlan { path }) }
     }
 
@@ -326,7 +366,8 @@ impl DatasetBuilder {
         let bytes = content.encode(self.maker.mels(), self.maker.frames(), &path)?;
         let entry = ShardEntry { file: name.to_owned(), partition, clips, sha256: hash_bytes(&bytes) };
         sabine_acoustics::write_atomically(&path, |file| file.write_all(&bytes))?;
-        let sidecar = Sidecar { plan_sha256: self.plan_sha256.clone(), entry, statistics: content.statistics };
+        let sidecar =
+            Sidecar { plan_sha256: self.plan_sha256.clone(), entry, statistics: content.statistics };
         write_json(&sidecar_path, &sidecar)?;
         Ok(if found { Outcome::Mended } else { Outcome::Made })
     }
@@ -334,11 +375,16 @@ impl DatasetBuilder {
     /// True if a shard belongs to this plan and its bytes are what they were.
     fn is_whole(&self, path: &Path, sidecar: &Path) -> bool {
         let Ok(sidecar) = read_json::<Sidecar>(sidecar) else { return false };
-        sidecar.plan_sha256 == self.plan_sha256 && hash_file(path).is_ok_and(|hash| hash == sidecar.entry.sha256)
+        sidecar.plan_sha256 == self.plan_sha256
+            && hash_file(path).is_ok_and(|hash| hash == sidecar.entry.sha256)
     }
 
     /// Writes the manifest if all shards are there.
-    fn finish(&self, folder: &Path, shards: &[(String, Partition, usize, usize)]) -> Result<Option<Manifest>, Error> {
+    fn finish(
+        &self,
+        folder: &Path,
+        shards: &[(String, Partition, usize, usize)],
+    ) -> Result<Option<Manifest>, Error> {
         let mut entries = Vec::new();
         let mut statistics: BTreeMap<Partition, LabelStatistics> = BTreeMap::new();
         for (name, ..) in shards {
@@ -390,7 +436,10 @@ impl DatasetBuilder {
     fn room_names(&self) -> Vec<String> {
         let mut names: Vec<String> = self.plan.rooms.keys().cloned().collect();
         for partition in Partition::ALL {
-            names.extend((0..self.simulated_before(partition, self.groups(partition))).map(|i| format!("simulated/{partition}/{i:06}")));
+            names.extend(
+                (0..self.simulated_before(partition, self.groups(partition)))
+                    .map(|i| format!("simulated/{partition}/{i:06}")),
+            );
         }
         names
     }
@@ -409,7 +458,12 @@ impl DatasetBuilder {
     }
 
     /// The response of a group of clips, the index of its room, and its labels.
-    fn response(&self, partition: Partition, group: usize, seed: u64) -> Result<(ImpulseResponse, usize, Labels), Error> {
+    fn response(
+        &self,
+        partition: Partition,
+        group: usize,
+        seed: u64,
+    ) -> Result<(ImpulseResponse, usize, Labels), Error> {
         if self.measured_before(partition, group + 1) == self.measured_before(partition, group) {
             let response = self.synthetic.draw(seed)?;
             let labels = Labels::measure(&response)?;
@@ -417,7 +471,11 @@ impl DatasetBuilder {
                 .iter()
                 .map(|&p| self.simulated_before(p, self.groups(p)))
                 .sum();
-            return Ok((response, self.plan.rooms.len() + before + self.simulated_before(partition, group), labels));
+            return Ok((
+                response,
+                self.plan.rooms.len() + before + self.simulated_before(partition, group),
+                labels,
+            ));
         }
         let rng = &mut generator(derive(seed, 1));
         let rooms: Vec<(usize, &String)> = self
@@ -428,14 +486,14 @@ impl DatasetBuilder {
             .filter_map(|(i, (name, &p))| (p == partition).then_some((i, name)))
             .collect();
         let (index, room) = rooms[rng.random_range(0..rooms.len())];
-        let candidates: Vec<&MeasuredResponse> = self.responses.responses.iter().filter(|r| &r.room == room).collect();
+        let candidates: Vec<&MeasuredResponse> =
+            self.responses.responses.iter().filter(|r| &r.room == room).collect();
         let measured = candidates[rng.random_range(0..candidates.len())];
         if partition == Partition::Test {
             return Ok((measured.response.clone(), index, measured.labels.clone()));
         }
-        let chain = Chain::for_training(self.maker.sample_rate_hz())?;
         for attempt in 0..8 {
-            match chain.augment(&measured.response, derive(seed, 100 + attempt)) {
+            match self.chain.augment(&measured.response, derive(seed, 100 + attempt)) {
                 Ok(response) => {
                     let labels = Labels::measure(&response)?;
                     return Ok((response, index, labels));
@@ -479,11 +537,39 @@ impl DatasetBuilder {
             content.features.extend(features.iter().map(|&v| f16::from_f32(v)));
             content.push_labels(&labels, facts.snr_db);
             content.room.push(room as i64);
-            content.speaker.push(self.plan.speakers.keys().position(|s| *s == voice.speaker).unwrap_or_default() as i64);
+            content
+                .speaker
+                .push(self.plan.speakers.keys().position(|s| *s == voice.speaker).unwrap_or_default() as i64);
             content.clips += 1;
         }
         Ok(content)
     }
+}
+
+/// The same sound under two names must not come into two partitions.
+fn check_copies(
+    responses: &ResponseCorpus,
+    speech: &SpeechCorpus,
+    rooms: &BTreeMap<String, Partition>,
+    speakers: &BTreeMap<String, Partition>,
+) -> Result<(), Error> {
+    let of_rooms =
+        responses.responses.iter().map(|r| ("room", &r.room, r.response.samples(), rooms.get(&r.room)));
+    let of_speakers = speech
+        .utterances
+        .iter()
+        .map(|u| ("speaker", &u.speaker, &u.speech.samples[..], speakers.get(&u.speaker)));
+    let mut seen: BTreeMap<String, Partition> = BTreeMap::new();
+    for (what, name, samples, partition) in of_rooms.chain(of_speakers) {
+        let Some(&second) = partition else { continue };
+        match seen.insert(hash_samples(samples), second) {
+            Some(first) if first != second => {
+                return Err(Error::Leak { what, name: name.clone(), first, second });
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 fn hash_samples(samples: &[f32]) -> String {

@@ -32,12 +32,15 @@ impl Direct {
     pub(crate) fn find(response: &ImpulseResponse) -> Result<Self, Error> {
         let samples = response.samples();
         let rate = f64::from(response.sample_rate_hz());
-        let (peak, level) =
-            samples.iter().enumerate().fold((0, 0.0_f32), |best, (i, s)| if s.abs() > best.1 { (i, s.abs()) } else { best });
+        let (peak, level) = samples
+            .iter()
+            .enumerate()
+            .fold((0, 0.0_f32), |best, (i, s)| if s.abs() > best.1 { (i, s.abs()) } else { best });
         let power = samples.iter().map(|s| f64::from(s * s)).sum::<f64>() / samples.len() as f64;
         let peak_db = 10.0 * (f64::from(level).powi(2) / power).log10();
         let half = (HALF_DIRECT_S * rate).round() as usize;
-        let direct = Self { peak, start: peak.saturating_sub(half), end: (peak + half + 1).min(samples.len()) };
+        let direct =
+            Self { peak, start: peak.saturating_sub(half), end: (peak + half + 1).min(samples.len()) };
         let late_s = (samples.len() - direct.end) as f64 / rate;
         if level <= 0.0 {
             return Err(Error::NoDirectSound { peak_db: f64::NEG_INFINITY });
@@ -72,8 +75,9 @@ mod tests {
     use super::*;
 
     fn decay(n: usize) -> Vec<f32> {
-        let mut s: Vec<f32> =
-            (0..n).map(|i| 0.1 * (i as f32 * 1.7 + (i * i) as f32 * 0.01).sin() * (-(i as f32) / 1500.0).exp()).collect();
+        let mut s: Vec<f32> = (0..n)
+            .map(|i| 0.1 * (i as f32 * 1.7 + (i * i) as f32 * 0.01).sin() * (-(i as f32) / 1500.0).exp())
+            .collect();
         s[100] = 1.0;
         s
     }

@@ -95,7 +95,11 @@ impl DrrAugment {
 }
 
 impl Augment for DrrAugment {
-    fn augment(&self, response: &ImpulseResponse, seed: u64) -> Result<ImpulseResponse, sabine_acoustics::Error> {
+    fn augment(
+        &self,
+        response: &ImpulseResponse,
+        seed: u64,
+    ) -> Result<ImpulseResponse, sabine_acoustics::Error> {
         let (low, high) = self.config.drr_db;
         let target_db = generator(seed).random_range(low..=high);
         Ok(self.to_db(response, target_db)?)

@@ -6,10 +6,13 @@ use crate::seed::generator;
 use sabine_acoustics::{Augment, ImpulseResponse, NoReading, OctaveBands, PerBand, Signal, equalisation};
 use sabine_eqfilter::{EqDesigner, EqFilterConfig};
 
-/// Corrections of the filter by what is still missing: a spectrum that is uneven within an octave needs one or two.
-const ROUNDS: usize = 4;
+/// Corrections of the filter by what is still missing: a spectrum that is uneven within an octave needs one or two, a target
+/// that is steep between octaves more.
+const ROUNDS: usize = 12;
 /// Good enough, dB.
 const TOLERANCE_DB: f64 = 0.1;
+/// What is not met within this is refused, dB.
+const LARGEST_MISS_DB: f64 = 0.5;
 /// The most that an octave is lifted or lowered, dB.
 const LARGEST_CHANGE_DB: f64 = 40.0;
 
@@ -50,19 +53,37 @@ impl EqAugment {
     /// The response with these levels at 62.5 Hz to 4 kHz in dB re 1 kHz. Above 4 kHz the change goes on as at 4 kHz.
     ///
     /// # Errors
-    /// [`Error::NoEqualisation`] where a level cannot be read, [`Error::Setting`] for a change of more than 40 dB,
+    /// [`Error::NoEqualisation`] where a level cannot be read, [`Error::EqUnreachable`] where an octave cannot be brought
+    /// within 0.5 dB (its neighbours leak into it), [`Error::Setting`] for a change of more than 40 dB,
     /// [`Error::Acoustics`] for other bands or another sample rate.
-    pub fn to_db(&self, response: &ImpulseResponse, target_db: &PerBand<f64>) -> Result<ImpulseResponse, Error> {
+    pub fn to_db(
+        &self,
+        response: &ImpulseResponse,
+        target_db: &PerBand<f64>,
+    ) -> Result<ImpulseResponse, Error> {
         let mut gains = PerBand::uniform(OctaveBands::EQ, 0.0);
         let mut changed = response.clone();
-        for _ in 0..ROUNDS {
+        for round in 0..=ROUNDS {
             let missing = target_db.zip_with(&levels(&changed)?, |t, l| t - l)?;
-            if missing.values().iter().all(|d| d.abs() < TOLERANCE_DB) {
+            let worst = |limit_db: f64| missing.iter().find(|(_, d)| d.abs() >= limit_db);
+            if worst(TOLERANCE_DB).is_none() {
+                break;
+            }
+            if round == ROUNDS {
+                if let Some((centre_hz, &off_db)) = worst(LARGEST_MISS_DB) {
+                    return Err(Error::EqUnreachable { centre_hz, off_db });
+                }
                 break;
             }
             gains = gains.zip_with(&missing, |g, d| g + d)?;
             for &gain in gains.values() {
-                check("change of an octave (dB)", gain, -LARGEST_CHANGE_DB, LARGEST_CHANGE_DB, "within 40 dB")?;
+                check(
+                    "change of an octave (dB)",
+                    gain,
+                    -LARGEST_CHANGE_DB,
+                    LARGEST_CHANGE_DB,
+                    "within 40 dB",
+                )?;
             }
             let filtered = self
                 .designer
@@ -76,7 +97,11 @@ impl EqAugment {
 }
 
 impl Augment for EqAugment {
-    fn augment(&self, response: &ImpulseResponse, seed: u64) -> Result<ImpulseResponse, sabine_acoustics::Error> {
+    fn augment(
+        &self,
+        response: &ImpulseResponse,
+        seed: u64,
+    ) -> Result<ImpulseResponse, sabine_acoustics::Error> {
         let target_db = self.config.statistics.draw_db(&mut generator(seed), self.config.inflation);
         Ok(self.to_db(response, &target_db)?)
     }

@@ -42,8 +42,11 @@ impl EqStatistics {
             let per_room: Vec<f64> = rooms
                 .iter()
                 .filter_map(|room| {
-                    let read: Vec<f64> =
-                        room.iter().filter_map(|l| l.eq_db().values()[band].as_ref().ok()).map(|e| e.value).collect();
+                    let read: Vec<f64> = room
+                        .iter()
+                        .filter_map(|l| l.eq_db().values()[band].as_ref().ok())
+                        .map(|e| e.value)
+                        .collect();
                     (!read.is_empty()).then(|| read.iter().sum::<f64>() / read.len() as f64)
                 })
                 .collect();

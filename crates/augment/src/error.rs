@@ -43,7 +43,9 @@ pub enum Error {
         delay_s: f64,
     },
     /// The scaled direct sound would fall below the reverberation, or no scaling reaches the target.
-    #[error("a direct-to-reverberant ratio of {target_db:.1} dB would bury the direct peak under the late part")]
+    #[error(
+        "a direct-to-reverberant ratio of {target_db:.1} dB would bury the direct peak under the late part"
+    )]
     DrrUnreachable {
         /// The ratio asked for, in dB.
         target_db: f64,
@@ -63,6 +65,14 @@ pub enum Error {
         centre_hz: f64,
         /// Why.
         reason: sabine_acoustics::NoReading,
+    },
+    /// A filter of this length cannot part an octave from its neighbours that far.
+    #[error("the equalisation at {centre_hz} Hz stays {off_db:.1} dB off its target")]
+    EqUnreachable {
+        /// Nominal centre, in Hz.
+        centre_hz: f64,
+        /// Target less what was reached, in dB.
+        off_db: f64,
     },
     /// Sound at a rate for which this was not set up.
     #[error("the sample rate is {found_hz} Hz; {expected_hz} Hz was set up")]
@@ -84,7 +94,7 @@ pub enum Error {
         /// How many there are.
         found: usize,
     },
-    /// A room or speaker in two partitions.
+    /// A room or speaker (or the same sound under another name) in two partitions.
     #[error("leak: {what} {name:?} is both in {first} and in {second}")]
     Leak {
         /// `room` or `speaker`.

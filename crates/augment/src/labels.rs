@@ -2,7 +2,8 @@
 
 use crate::error::Error;
 use sabine_acoustics::{
-    BandParameters, ImpulseResponse, OctaveBands, PerBand, Reading, RoomParameters, ThirdOctaveBands, equalisation,
+    BandParameters, ImpulseResponse, OctaveBands, PerBand, Reading, RoomParameters, ThirdOctaveBands,
+    equalisation,
 };
 
 /// What is measured on a response: reverberation time, equalisation and ratio of direct to reverberant energy, each a

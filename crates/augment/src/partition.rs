@@ -125,9 +125,18 @@ mod tests {
     fn everyone_is_dealt_once_and_the_shares_hold() {
         let dealt = PartitionConfig::default().deal("speaker", "three partitions", &names(100), 1).unwrap();
         let count = |p| dealt.values().filter(|&&q| q == p).count();
-        assert_eq!((count(Partition::Train), count(Partition::Validation), count(Partition::Test)), (70, 15, 15));
-        assert_eq!(dealt, PartitionConfig::default().deal("speaker", "three partitions", &names(100), 1).unwrap());
-        assert_ne!(dealt, PartitionConfig::default().deal("speaker", "three partitions", &names(100), 2).unwrap());
+        assert_eq!(
+            (count(Partition::Train), count(Partition::Validation), count(Partition::Test)),
+            (70, 15, 15)
+        );
+        assert_eq!(
+            dealt,
+            PartitionConfig::default().deal("speaker", "three partitions", &names(100), 1).unwrap()
+        );
+        assert_ne!(
+            dealt,
+            PartitionConfig::default().deal("speaker", "three partitions", &names(100), 2).unwrap()
+        );
     }
 
     #[test]

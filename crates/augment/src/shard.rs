@@ -171,7 +171,8 @@ impl Distribution {
                 self.first_edge = edges[0];
                 self.bin_width = ((edges[1] - edges[0]) * 1e9).round() / 1e9;
                 self.histogram.resize(edges.len() - 1, 0);
-                let bin = ((value - self.first_edge) / self.bin_width).floor().clamp(0.0, (edges.len() - 2) as f64);
+                let bin =
+                    ((value - self.first_edge) / self.bin_width).floor().clamp(0.0, (edges.len() - 2) as f64);
                 self.histogram[bin as usize] += 1;
             }
             Err(reason) => *self.missing.entry(kind(reason).to_owned()).or_insert(0) += 1,

@@ -16,6 +16,9 @@ const SOUND_M_S: f64 = 343.2;
 /// Nepers in 60 dB of energy: energy falls as exp(-13.8 t / T60).
 const SIXTY_DB: f64 = 13.815_510_557_964_274;
 
+/// Responses are multiples of this long, in samples.
+const LENGTH_STEP: usize = 2048;
+
 /// From which rooms to draw.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SyntheticRoomConfig {
@@ -90,7 +93,13 @@ impl SyntheticRooms {
     pub fn new(config: SyntheticRoomConfig) -> Result<Self, Error> {
         check("sample_rate_hz", f64::from(config.sample_rate_hz), 8e3, 48e3, "between 8 and 48 kHz")?;
         check_span("t60_s", config.t60_s, 0.05, 10.0, "a rising range within 0.05 to 10 s")?;
-        check("longest_t60_s", config.longest_t60_s, config.t60_s.1, 10.0, "between the end of t60_s and 10 s")?;
+        check(
+            "longest_t60_s",
+            config.longest_t60_s,
+            config.t60_s.1,
+            10.0,
+            "between the end of t60_s and 10 s",
+        )?;
         for (field, value) in [
             ("long_fraction", config.long_fraction),
             ("drr_drawn_fraction", config.drr_drawn_fraction),
@@ -103,7 +112,8 @@ impl SyntheticRooms {
         check("eq_inflation", config.eq_inflation, 0.0, 5.0, "between 0 and 5")?;
         check("longest_s", config.longest_s, 0.1, 10.0, "between 0.1 and 10 s")?;
         // One transform for each power of two, so that a short response costs little.
-        let longest = (config.longest_s * f64::from(config.sample_rate_hz)) as usize;
+        let longest =
+            ((config.longest_s * f64::from(config.sample_rate_hz)) as usize).next_multiple_of(LENGTH_STEP);
         let bands = OctaveBands::SIMULATION;
         let mut splits = vec![BandSplit::new(bands, longest, config.sample_rate_hz)];
         while splits[0].length() > 8192 {
@@ -123,7 +133,8 @@ impl SyntheticRooms {
         let rate = f64::from(self.config.sample_rate_hz);
         let slowest = room.t60_s.iter().copied().fold(0.0, f64::max);
         let length_s = (0.1 + 1.05 * slowest).min(self.config.longest_s);
-        let wanted = (length_s * rate) as usize;
+        // Few different lengths, so that few transforms are planned.
+        let wanted = ((length_s * rate) as usize).next_multiple_of(LENGTH_STEP);
         let split = self.splits.iter().find(|s| wanted + wanted / 16 + 64 <= s.length());
         let split = split.unwrap_or(&self.splits[self.splits.len() - 1]);
         let samples = wanted.min(split.length());
@@ -139,7 +150,8 @@ impl SyntheticRooms {
         for band in 0..split.bands() {
             let mut track = vec![0.0_f32; samples];
             let step = |t60: f64| (-0.5 * SIXTY_DB / (t60 * rate)).exp() as f32;
-            let (fall, slow_fall) = (step(room.t60_s[band]), step(room.t60_s[band] * second.map_or(1.0, |s| s.0)));
+            let (fall, slow_fall) =
+                (step(room.t60_s[band]), step(room.t60_s[band] * second.map_or(1.0, |s| s.0)));
             let slow_level = second.map_or(0.0, |s| s.1 as f32);
             let (mut envelope, mut slow) = (1.0_f32, slow_level);
             for (out, &arrival) in track.iter_mut().zip(&arrivals) {
@@ -151,7 +163,8 @@ impl SyntheticRooms {
             for image in &images {
                 let index = (image.distance_m / SOUND_M_S * rate).round() as usize;
                 if index < samples {
-                    let gain = (1.0 - alpha * image.absorption_factor).max(0.05).powf(0.5 * f64::from(image.order));
+                    let gain =
+                        (1.0 - alpha * image.absorption_factor).max(0.05).powf(0.5 * f64::from(image.order));
                     track[index] += (gain / image.distance_m) as f32;
                 }
             }

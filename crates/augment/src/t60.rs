@@ -14,6 +14,8 @@ const NOISE_MARGIN_DB: f64 = 10.0;
 /// Share of an octave's width that a split band of Gaussian noise effectively has (integral of g^4 squared over that of g^8
 /// for the crossovers of [`FilterBank`], about).
 const EFFECTIVE_WIDTH: f64 = 0.8;
+/// Lengthened responses are multiples of this long, in samples.
+const LENGTH_STEP: usize = 2048;
 /// Octaves (of eight) in which a decay must be found.
 const LEAST_OCTAVES: usize = 4;
 
@@ -66,7 +68,12 @@ impl T60Augment {
     /// # Errors
     /// [`Error::NoDirectSound`] and the like for a response that cannot be split, [`Error::NoDecay`] where the decay cannot
     /// be read.
-    pub fn to_s(&self, response: &ImpulseResponse, target_s: f64, seed: u64) -> Result<ImpulseResponse, Error> {
+    pub fn to_s(
+        &self,
+        response: &ImpulseResponse,
+        target_s: f64,
+        seed: u64,
+    ) -> Result<ImpulseResponse, Error> {
         let factor = target_s / self.full_band_s(response)?;
         self.by_factor(response, factor, seed)
     }
@@ -88,7 +95,12 @@ impl T60Augment {
     ///
     /// # Errors
     /// As [`T60Augment::to_s`].
-    pub fn by_factor(&self, response: &ImpulseResponse, factor: f64, seed: u64) -> Result<ImpulseResponse, Error> {
+    pub fn by_factor(
+        &self,
+        response: &ImpulseResponse,
+        factor: f64,
+        seed: u64,
+    ) -> Result<ImpulseResponse, Error> {
         check("factor", factor, 1e-3, 1e3, "between 0.001 and 1000")?;
         let direct = Direct::find(response)?;
         let rate_hz = response.sample_rate_hz();
@@ -116,11 +128,11 @@ impl T60Augment {
                 .unwrap_or((1000.0, NoReading::NoDecay));
             return Err(Error::NoDecay { centre_hz, reason });
         }
-        let longest_s =
-            fits.iter().flatten().map(|f| f.t60_s().value).fold(0.0, f64::max) * factor;
+        let longest_s = fits.iter().flatten().map(|f| f.t60_s().value).fold(0.0, f64::max) * factor;
         let wanted = ((start_s + longest_s).min(self.config.longest_s) * rate) as usize;
         // A shorter decay needs no fewer samples; a longer one needs more.
-        let length = wanted.max(late.len());
+        // Few different lengths, so that few transforms are planned for them.
+        let length = if wanted > late.len() { wanted.next_multiple_of(LENGTH_STEP) } else { late.len() };
         let mut sum: Vec<f64> = response.samples().iter().map(|&s| f64::from(s)).collect();
         sum.resize(length, 0.0);
         let white: Vec<f32> = {
@@ -143,7 +155,11 @@ impl T60Augment {
 }
 
 impl Augment for T60Augment {
-    fn augment(&self, response: &ImpulseResponse, seed: u64) -> Result<ImpulseResponse, sabine_acoustics::Error> {
+    fn augment(
+        &self,
+        response: &ImpulseResponse,
+        seed: u64,
+    ) -> Result<ImpulseResponse, sabine_acoustics::Error> {
         let (low, high) = self.config.t60_s;
         let target_s = generator(seed).random_range(low..=high);
         Ok(self.to_s(response, target_s, derive(seed, 1))?)
@@ -166,7 +182,11 @@ impl<'a> Change<'a> {
             let (mut low, mut high) = (fit.start_s(), fit.knee_s());
             for _ in 0..50 {
                 let middle = 0.5 * (low + high);
-                if fit.decay_power_at(middle) > margin * fit.noise_power() { low = middle } else { high = middle }
+                if fit.decay_power_at(middle) > margin * fit.noise_power() {
+                    low = middle
+                } else {
+                    high = middle
+                }
             }
             ((low - crossfade_s).max(fit.start_s()), low)
         });
@@ -188,7 +208,8 @@ impl<'a> Change<'a> {
     fn apply(&self, part: &[f32], noise: &[f32], from: usize, rate: f64, sum: &mut [f64]) {
         // At the end of the direct sound the gain is one.
         let at_start = self.gain(from as f64 / rate);
-        let noise_power = noise.iter().map(|&n| f64::from(n).powi(2)).sum::<f64>() / noise.len().max(1) as f64;
+        let noise_power =
+            noise.iter().map(|&n| f64::from(n).powi(2)).sum::<f64>() / noise.len().max(1) as f64;
         let silent = 1e-14 * self.fit.decay_power_at(self.fit.start_s());
         for (i, total) in sum.iter_mut().enumerate().skip(from) {
             let t = i as f64 / rate;

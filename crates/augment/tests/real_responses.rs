@@ -1,0 +1,97 @@
+//! The augmentations on every usable measured response. Skipped where `../shared/data` is not there.
+
+mod material;
+
+use material::{quantile, shared_data};
+use sabine_acoustics::ImpulseResponse;
+use sabine_augment::{
+    EqStatistics, Labels, MeasuredResponse, ResponseCorpus, ResponseFilter, T60Augment, T60Config,
+};
+
+fn corpus() -> Option<ResponseCorpus> {
+    let data = shared_data()?;
+    let by_file = ["python_acoustics".to_owned(), "decayfitnet".to_owned()];
+    // The hand clap is no response.
+    let filter =
+        ResponseFilter { excluded_rooms: vec!["spatialaudio".to_owned()], ..ResponseFilter::default() };
+    let mut corpus = ResponseCorpus::read(&data.join("rir"), 16_000, &filter, &by_file, &()).unwrap();
+    corpus.extend(ResponseCorpus::read(&data.join("rooms"), 16_000, &filter, &by_file, &()).unwrap());
+    for left_out in corpus.left_out() {
+        eprintln!("left out: {}: {}", left_out.path, left_out.reason);
+    }
+    Some(corpus)
+}
+
+/// At most four responses of each room: the rooms count, not the microphones.
+fn few_of_each(corpus: &ResponseCorpus) -> Vec<&MeasuredResponse> {
+    let mut chosen = Vec::new();
+    for room in corpus.rooms() {
+        let own: Vec<_> = corpus.responses().iter().filter(|r| r.room == room).collect();
+        chosen.extend(own.iter().step_by(own.len().div_ceil(4)).copied());
+    }
+    chosen
+}
+
+fn times(response: &ImpulseResponse) -> Vec<Option<f64>> {
+    let labels = Labels::measure(response).unwrap();
+    labels.t60_s().values().iter().map(|r| r.as_ref().ok().map(|e| e.value)).collect()
+}
+
+#[test]
+fn reverberation_times_of_measured_responses_meet_their_targets() {
+    let Some(corpus) = corpus() else { return };
+    let augment = T60Augment::new(T60Config::default()).unwrap();
+    let (mut errors, mut refused, mut asked) = (Vec::new(), 0, 0);
+    for (i, measured) in few_of_each(&corpus).into_iter().enumerate() {
+        let before = times(&measured.response);
+        for (j, target_s) in [0.1, 0.2, 0.4, 0.7, 1.1, 1.5].into_iter().enumerate() {
+            asked += 1;
+            let Ok(full_band_s) = augment.full_band_s(&measured.response) else {
+                refused += 1;
+                continue;
+            };
+            let Ok(changed) = augment.to_s(&measured.response, target_s, (10 * i + j) as u64) else {
+                refused += 1;
+                continue;
+            };
+            for (before, after) in before.iter().zip(times(&changed)) {
+                if let (Some(before), Some(after)) = (before, after) {
+                    errors.push((after / (before * target_s / full_band_s) - 1.0).abs());
+                }
+            }
+        }
+    }
+    let (median, high) = (quantile(&mut errors, 0.5), quantile(&mut errors, 0.95));
+    eprintln!(
+        "{} responses asked, {refused} refused; {} readings: median error {:.2} %, 95th percentile {:.2} %",
+        asked,
+        errors.len(),
+        100.0 * median,
+        100.0 * high
+    );
+    assert!(median < 0.03, "median {median}");
+    assert!(refused * 10 < asked, "{refused} of {asked} refused");
+}
+
+#[test]
+fn the_shipped_statistics_are_those_of_the_responses() {
+    let Some(corpus) = corpus() else { return };
+    let rooms = corpus.rooms();
+    let labels: Vec<Vec<Labels>> = rooms
+        .iter()
+        .map(|room| corpus.responses().iter().filter(|r| &r.room == room).map(|r| r.labels.clone()).collect())
+        .collect();
+    let fitted = EqStatistics::fit(labels.iter().map(Vec::as_slice)).unwrap();
+    eprintln!("{} rooms, {} responses", rooms.len(), fitted.responses());
+    eprintln!("mean {:.2?}", fitted.mean_db().values());
+    eprintln!("sd   {:.2?}", fitted.standard_deviation_db().values());
+    let shipped = EqStatistics::measured();
+    for i in 0..7 {
+        assert!((fitted.mean_db().values()[i] - shipped.mean_db().values()[i]).abs() < 0.05);
+        assert!(
+            (fitted.standard_deviation_db().values()[i] - shipped.standard_deviation_db().values()[i]).abs()
+                < 0.05
+        );
+    }
+    assert_eq!(fitted.responses(), shipped.responses());
+}
