@@ -51,8 +51,14 @@ fn the_fixture_is_matched_within_ten_percent_of_every_target() {
     let mut names: Vec<String> =
         std::fs::read_dir(&out).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
     names.sort();
-    let expected =
-        ["eq_filter.wav", "impulse_response.wav", "match.json", "matched.wav", "materials.toml", "report.html"];
+    let expected = [
+        "eq_filter.wav",
+        "impulse_response.wav",
+        "match.json",
+        "matched.wav",
+        "materials.toml",
+        "report.html",
+    ];
     assert_eq!(names, expected);
 
     let json: Value = serde_json::from_slice(&std::fs::read(out.join("match.json")).unwrap()).unwrap();
@@ -84,7 +90,11 @@ fn the_fixture_is_matched_within_ten_percent_of_every_target() {
         }
     }
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
-    assert!(page.contains("<svg class=\"chart\"") && page.contains("data:audio/wav") && page.contains("data:image/png"));
+    assert!(
+        page.contains("<svg class=\"chart\"")
+            && page.contains("data:audio/wav")
+            && page.contains("data:image/png")
+    );
     assert!(!page.contains("http://") || !page.contains("<script"), "the page must not need a network");
     // What was written can be read again as tables of a room.
     let tables: toml::Table = std::fs::read_to_string(out.join("materials.toml")).unwrap().parse().unwrap();
@@ -147,7 +157,8 @@ fn faults_of_the_room_name_file_and_field() {
         std::fs::write(room.join("room.toml"), &text[..responses]).unwrap();
         room.to_str().unwrap().to_owned()
     };
-    let outside = broken("outside", &text.replacen("position_m = [", "position_m = [100.0, 0.0, 1.0] # [", 1));
+    let outside =
+        broken("outside", &text.replacen("position_m = [", "position_m = [100.0, 0.0, 1.0] # [", 1));
     refuses(&["--room", &outside], &out, &["outside"]);
     let unknown = broken("unknown", &format!("colour = \"blue\"\n{text}"));
     refuses(&["--room", &unknown], &out, &["room.toml", "colour"]);
