@@ -116,7 +116,7 @@ const PASSES: usize = 16;
 const STRIDE: f64 = 1.6;
 /// Change of any material, in standard deviations of its prior, below which another pass would bring nothing: the error
 /// left is of the order of its square.
-const SETTLED: f64 = 0.05;
+const SETTLED: f64 = 0.02;
 
 /// The most probable materials that meet the targets: minimises half the squared deviations from the priors, in standard
 /// deviations, subject to m/m' = 1, by the method of multipliers (Nocedal and Wright 2006, chapter 17).
