@@ -16,6 +16,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub(crate) const TARGET_RANGE_S: (f64, f64) = (0.02, 20.0);
 /// Name of this work to an observer.
 const STAGE: &str = "fit materials";
+/// Relative Monte-Carlo error of T60 that is worth a warning.
+const FEW_PATHS: f64 = 0.03;
 /// Deviation from a prior that is worth a warning, in standard deviations.
 const FAR_FROM_PRIOR: f64 = 3.0;
 
@@ -153,6 +155,12 @@ impl MaterialFitter {
                 let deviations = (values[k] - band.mean[k]) / band.standard_deviation[k];
                 if deviations.is_finite() && deviations.abs() > FAR_FROM_PRIOR {
                     fit.warnings.push(Warning::FarFromPrior { material: k, band_hz, deviations });
+                }
+            }
+            if let Ok(t60_s) = &reading {
+                let relative_error = t60_s.standard_error / t60_s.value;
+                if relative_error > FEW_PATHS {
+                    fit.warnings.push(Warning::FewPaths { band_hz, relative_error });
                 }
             }
             // 15 dB below the range, what is missing bends its lower end by 0.14 dB.

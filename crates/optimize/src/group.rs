@@ -116,7 +116,7 @@ const PASSES: usize = 16;
 const STRIDE: f64 = 1.6;
 /// Change of any material, in standard deviations of its prior, below which another pass would bring nothing: the error
 /// left is of the order of its square.
-const SETTLED: f64 = 0.03;
+const SETTLED: f64 = 0.02;
 
 /// The most probable materials that meet the targets: minimises half the squared deviations from the priors, in standard
 /// deviations, subject to m/m' = 1, by the method of multipliers (Nocedal and Wright 2006, chapter 17).
@@ -181,15 +181,20 @@ impl<'a, 'b> Group<'a, 'b> {
         let mut iterations = 0;
         let mut rounds = Rounds::new(self, self.expand(&x), &x);
         let mut reach = f64::INFINITY;
+        let (mut relaxation, mut last) = (1.0, vec![0.0; x.len()]);
         for _ in 0..PASSES {
             let at_last = rounds.approach(&x);
             let minimum = rounds.solve(&x, reach)?;
             iterations += minimum.iterations;
             let (before, after) = (self.deviations(&x), self.deviations(&minimum.x));
             let moved = before.iter().zip(&after).fold(0.0, |w: f64, (a, b)| w.max((a - b).abs()));
-            let stepped = x.iter().zip(&minimum.x).fold(0.0, |w: f64, (a, b)| w.max((a - b).abs()));
-            let expected = rounds.residual(&minimum.x);
-            x = minimum.x;
+            // Steps that turn back upon themselves are shortened: what the expansion leaves out makes them overshoot.
+            let step: Vec<f64> = x.iter().zip(&minimum.x).map(|(from, to)| to - from).collect();
+            let along: f64 = step.iter().zip(&last).map(|(a, b)| a * b).sum();
+            relaxation = if along < 0.0 { 0.5f64.max(0.6 * relaxation) } else { 1f64.min(1.3 * relaxation) };
+            x.iter_mut().zip(&step).for_each(|(x, s)| *x += relaxation * s);
+            last = step;
+            let expected = rounds.residual(&x);
             rounds.models = self.expand(&x);
             let found = rounds.residual(&x);
             let surprise = expected.iter().zip(&found).fold(0.0, |w: f64, (e, f)| match (e, f) {
@@ -200,6 +205,7 @@ impl<'a, 'b> Group<'a, 'b> {
                 return Ok(self.solution(&x, rounds.models, iterations));
             }
             // An expansion that was far off was trusted too far.
+            let stepped = last.iter().fold(0.0, |w: f64, s| w.max(s.abs()));
             reach = if surprise > 0.1 { 0.5 * stepped } else { 2.0 * reach };
         }
         // The expansion does not settle, where bins hold few paths of very different histories: use the paths themselves.

@@ -273,6 +273,23 @@ fn a_band_without_energy_is_said_to_have_none() {
 }
 
 #[test]
+fn too_few_rays_are_said_to_be_too_few() {
+    let few = Ergodic { shares: vec![0.8, 0.2], rays: 32, ..six_materials() };
+    let priors = [AbsorptionPrior::uniform(OCTAVES, 0.05, 0.0), AbsorptionPrior::uniform(OCTAVES, 0.5, 0.3)];
+    let warned = |rays: usize| {
+        let fit = fit_with(
+            FitConfig::default(),
+            &Ergodic { rays, ..few.clone() }.trace(1),
+            &priors,
+            &exact([0.7; 7]),
+        );
+        fit.warnings.iter().any(|w| matches!(w, Warning::FewPaths { .. }))
+    };
+    assert!(warned(32));
+    assert!(!warned(2048));
+}
+
+#[test]
 fn smoothness_holds_neighbouring_octaves_together() {
     let (room, targets) = (six_materials(), [0.8, 0.5, 0.8, 0.5, 0.8, 0.5, 0.8]);
     let roughness = |fit: &MaterialFit| -> f64 {
