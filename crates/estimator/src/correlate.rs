@@ -115,10 +115,10 @@ impl Correlate<'_> {
                 }
             }
         }
-        for o in 0..O {
+        for (o, sums) in sums.iter().enumerate() {
             let start = (first + o) * self.out_stride + p;
             let (out, _) = S::as_mut_simd_f32s(&mut self.out[start..start + length]);
-            out.copy_from_slice(&sums[o]);
+            out.copy_from_slice(sums);
         }
     }
 

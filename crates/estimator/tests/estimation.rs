@@ -24,7 +24,7 @@ fn bursts(seconds: f64, t60_s: f64, rate_hz: u32, seed: u64) -> Signal {
             (level * rng.random_range(-1.0..1.0)) as f32 + rng.random_range(-1e-4f32..1e-4)
         })
         .collect();
-    Signal::new(samples, rate_hz).unwrap()
+    Signal::new(samples, rate_hz).expect("finite samples")
 }
 
 #[test]

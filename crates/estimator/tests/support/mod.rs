@@ -68,9 +68,9 @@ impl Shard {
             ("speaker", Dtype::I64, vec![n], integers(&self.speaker)),
         ];
         let views = tensors.iter().map(|(name, dtype, shape, bytes)| {
-            (*name, TensorView::new(*dtype, shape.clone(), bytes).unwrap())
+            (*name, TensorView::new(*dtype, shape.clone(), bytes).expect("a tensor of this shape"))
         });
-        safetensors::serialize(views, None).unwrap()
+        safetensors::serialize(views, None).expect("whole tensors")
     }
 }
 
@@ -80,7 +80,7 @@ pub fn write(folder: &Path, shards: &[(&str, Shard)]) {
     for (i, (partition, shard)) in shards.iter().enumerate() {
         let bytes = shard.encode();
         let file = format!("{partition}-{i:05}.safetensors");
-        std::fs::write(folder.join(&file), &bytes).unwrap();
+        std::fs::write(folder.join(&file), &bytes).expect("a writable folder");
         let sha256: String = Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect();
         let clips = shard.room.len();
         entries.push(
@@ -93,7 +93,7 @@ pub fn write(folder: &Path, shards: &[(&str, Shard)]) {
         "eq_bands_hz": [62.5, 125.0, 250.0, 500.0, 2000.0, 4000.0],
         "shards": entries,
     });
-    std::fs::write(folder.join("manifest.json"), manifest.to_string()).unwrap();
+    std::fs::write(folder.join("manifest.json"), manifest.to_string()).expect("a writable folder");
 }
 
 /// The usual one: 96 clips to train on, 32 for validation, 16 for the test.
