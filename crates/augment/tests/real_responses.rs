@@ -42,6 +42,7 @@ fn reverberation_times_of_measured_responses_meet_their_targets() {
     let Some(corpus) = corpus() else { return };
     let augment = T60Augment::new(T60Config::default()).unwrap();
     let (mut errors, mut refused, mut asked) = (Vec::new(), 0, 0);
+    let mut by_octave: [Vec<f64>; 7] = Default::default();
     for (i, measured) in few_of_each(&corpus).into_iter().enumerate() {
         let before = times(&measured.response);
         for (j, target_s) in [0.1, 0.2, 0.4, 0.7, 1.1, 1.5].into_iter().enumerate() {
@@ -54,9 +55,18 @@ fn reverberation_times_of_measured_responses_meet_their_targets() {
                 refused += 1;
                 continue;
             };
-            for (before, after) in before.iter().zip(times(&changed)) {
+            for (octave, (before, after)) in before.iter().zip(times(&changed)).enumerate() {
                 if let (Some(before), Some(after)) = (before, after) {
-                    errors.push((after / (before * target_s / full_band_s) - 1.0).abs());
+                    let error = after / (before * target_s / full_band_s) - 1.0;
+                    errors.push(error.abs());
+                    by_octave[octave].push(error.abs());
+                    if error.abs() > 0.2 {
+                        eprintln!(
+                            "{} {target_s} s, octave {octave}: {:+.0} % ({before:.2} -> {after:.2} s)",
+                            measured.path,
+                            100.0 * error
+                        );
+                    }
                 }
             }
         }
@@ -69,6 +79,15 @@ fn reverberation_times_of_measured_responses_meet_their_targets() {
         100.0 * median,
         100.0 * high
     );
+    for (octave, errors) in by_octave.iter_mut().enumerate() {
+        eprintln!(
+            "{} Hz: {} readings, median {:.2} %, 95th percentile {:.2} %",
+            125 << octave,
+            errors.len(),
+            100.0 * quantile(errors, 0.5),
+            100.0 * quantile(errors, 0.95)
+        );
+    }
     assert!(median < 0.03, "median {median}");
     assert!(refused * 10 < asked, "{refused} of {asked} refused");
 }
