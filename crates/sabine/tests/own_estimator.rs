@@ -1,6 +1,8 @@
 //! The whole line with an estimator of one's own, so that what is heard is known.
 
-use sabine::acoustics::{Error, Estimate, MeasuredRoom, OctaveBands, PerBand, Propagator, RoomEstimator, RoomTargets, Signal};
+use sabine::acoustics::{
+    Error, Estimate, MeasuredRoom, OctaveBands, PerBand, Propagator, RoomEstimator, RoomTargets, Signal,
+};
 use sabine::propagate::{PathTracer, TracerConfig};
 use sabine::{MatchConfig, MatchInput, Recording, RoomMatch, match_room_with};
 
@@ -15,13 +17,15 @@ impl RoomEstimator for Told {
 
 fn told(t60_s: [f64; 7]) -> Told {
     let t60 = PerBand::from_fn(OctaveBands::T60, |i| Estimate::new(t60_s[i], 0.05));
-    let eq = PerBand::from_fn(OctaveBands::EQ, |i| Estimate::new([-3.0, 2.0, 1.0, 0.5, 0.0, -2.0, -5.0][i], 1.0));
+    let eq =
+        PerBand::from_fn(OctaveBands::EQ, |i| Estimate::new([-3.0, 2.0, 1.0, 0.5, 0.0, -2.0, -5.0][i], 1.0));
     Told(RoomTargets::new(t60, eq).unwrap())
 }
 
 /// A second of decaying clicks: anything that is not silent will do.
 fn clicks(rate: u32) -> Signal {
-    let samples = (0..2 * rate).map(|i| if i % 4000 < 40 { 0.5 * (1.0 - (i % 4000) as f32 / 40.0) } else { 0.0 });
+    let samples =
+        (0..2 * rate).map(|i| if i % 4000 < 40 { 0.5 * (1.0 - (i % 4000) as f32 / 40.0) } else { 0.0 });
     Signal::new(samples.collect(), rate).unwrap()
 }
 
@@ -37,7 +41,8 @@ fn place(room: &MeasuredRoom, t60_s: [f64; 7], seed: u64) -> RoomMatch {
     let tracer = |duration_s: f64| -> Result<Box<dyn Propagator>, sabine::Error> {
         Ok(Box::new(PathTracer::new(TracerConfig { duration_s, seed, ..TracerConfig::default() })?))
     };
-    match_room_with(&told(t60_s), &tracer, &input, &MatchConfig { seed, ..MatchConfig::default() }, &()).unwrap()
+    match_room_with(&told(t60_s), &tracer, &input, &MatchConfig { seed, ..MatchConfig::default() }, &())
+        .unwrap()
 }
 
 #[test]
