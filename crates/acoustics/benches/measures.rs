@@ -3,7 +3,9 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
-use sabine_acoustics::{BandParameters, FilterBank, ImpulseResponse, OctaveBands, RoomParameters, equalisation};
+use sabine_acoustics::{
+    BandParameters, FilterBank, ImpulseResponse, OctaveBands, RoomParameters, equalisation,
+};
 use std::hint::black_box;
 
 /// Duration in seconds and sample rate in Hz: a response of the estimator's training, and one as it is measured.
