@@ -3,8 +3,8 @@
 use clap::Parser;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 use sabine_augment::{
-    Built, DatasetBuilder, DatasetConfig, Error, Manifest, NoiseCorpus, Partition, ResponseCorpus, ResponseFilter,
-    SpeechCorpus, Worker,
+    Built, DatasetBuilder, DatasetConfig, Error, Manifest, NoiseCorpus, Partition, ResponseCorpus,
+    ResponseFilter, SpeechCorpus, Worker,
 };
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -104,7 +104,12 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         ControlFlow::Continue(())
     };
     let rate_hz = 16_000;
-    let mut config = DatasetConfig { seed: arguments.seed, shard_clips: arguments.shard_size, clips_per_response: arguments.clips_per_response, ..DatasetConfig::default() };
+    let mut config = DatasetConfig {
+        seed: arguments.seed,
+        shard_clips: arguments.shard_size,
+        clips_per_response: arguments.clips_per_response,
+        ..DatasetConfig::default()
+    };
     if let Some(counts) = &arguments.counts {
         config.clips = [counts[0], counts[1], counts[2]];
     } else if let Some(count) = arguments.count {
@@ -119,10 +124,17 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     config.rooms.validation = arguments.validation_rooms.clone();
 
     let speech = SpeechCorpus::read(&arguments.speech, rate_hz, config.clip.duration_s, &observer)?;
-    let filter = ResponseFilter { excluded_rooms: arguments.exclude_rooms.clone(), ..ResponseFilter::default() };
+    let filter =
+        ResponseFilter { excluded_rooms: arguments.exclude_rooms.clone(), ..ResponseFilter::default() };
     let mut responses = ResponseCorpus::default();
     for folder in &arguments.rir {
-        responses.extend(ResponseCorpus::read(folder, rate_hz, &filter, &arguments.rooms_by_file, &observer)?);
+        responses.extend(ResponseCorpus::read(
+            folder,
+            rate_hz,
+            &filter,
+            &arguments.rooms_by_file,
+            &observer,
+        )?);
     }
     let noise = match &arguments.noise {
         Some(folder) => NoiseCorpus::read(folder, rate_hz, &observer)?,
@@ -136,7 +148,12 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     let builder = DatasetBuilder::new(config, speech, responses, noise)?;
     for partition in Partition::ALL {
         let of = |dealt: &std::collections::BTreeMap<String, Partition>| {
-            dealt.iter().filter(|(_, p)| **p == partition).map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(" ")
+            dealt
+                .iter()
+                .filter(|(_, p)| **p == partition)
+                .map(|(name, _)| name.as_str())
+                .collect::<Vec<_>>()
+                .join(" ")
         };
         bar.suspend(|| eprintln!("{partition}: rooms {}", of(builder.room_partitions())));
     }
@@ -164,13 +181,27 @@ fn print_statistics(manifest: &Manifest) {
         println!("{partition}");
         for (hz, d) in manifest.t60_bands_hz.iter().zip(&statistics.t60_s) {
             let missing: u64 = d.missing.values().sum();
-            println!("  T60 {hz:>6} Hz  {:6.3} +- {:5.3} s, {missing} missing", d.mean(), d.standard_deviation());
+            println!(
+                "  T60 {hz:>6} Hz  {:6.3} +- {:5.3} s, {missing} missing",
+                d.mean(),
+                d.standard_deviation()
+            );
         }
         for (hz, d) in manifest.eq_bands_hz.iter().zip(&statistics.eq_db) {
             let missing: u64 = d.missing.values().sum();
-            println!("  EQ  {hz:>6} Hz  {:6.2} +- {:5.2} dB, {missing} missing", d.mean(), d.standard_deviation());
+            println!(
+                "  EQ  {hz:>6} Hz  {:6.2} +- {:5.2} dB, {missing} missing",
+                d.mean(),
+                d.standard_deviation()
+            );
         }
         let (drr, snr) = (&statistics.drr_db, &statistics.snr_db);
-        println!("  DRR {:.1} +- {:.1} dB, SNR {:.1} +- {:.1} dB", drr.mean(), drr.standard_deviation(), snr.mean(), snr.standard_deviation());
+        println!(
+            "  DRR {:.1} +- {:.1} dB, SNR {:.1} +- {:.1} dB",
+            drr.mean(),
+            drr.standard_deviation(),
+            snr.mean(),
+            snr.standard_deviation()
+        );
     }
 }

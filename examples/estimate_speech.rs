@@ -86,11 +86,21 @@ fn entry(file: PathBuf, estimate: &DetailedEstimate) -> Entry {
 fn print(entry: &Entry) {
     println!("{}", entry.file.display());
     for label in 0..T60_COUNT {
-        println!("  {:>6} Hz  T60 {:.2} s, standard error {:.2}", label_hz(label), entry.t60_s[label], entry.t60_sd_s[label]);
+        println!(
+            "  {:>6} Hz  T60 {:.2} s, standard error {:.2}",
+            label_hz(label),
+            entry.t60_s[label],
+            entry.t60_sd_s[label]
+        );
     }
     for label in T60_COUNT..LABEL_COUNT {
         let eq = label - T60_COUNT;
-        println!("  {:>6} Hz  EQ {:+.1} dB, standard error {:.1}", label_hz(label), entry.eq_db[eq], entry.eq_sd_db[eq]);
+        println!(
+            "  {:>6} Hz  EQ {:+.1} dB, standard error {:.1}",
+            label_hz(label),
+            entry.eq_db[eq],
+            entry.eq_sd_db[eq]
+        );
     }
     for warning in &entry.warnings {
         println!("  warning: {warning}");

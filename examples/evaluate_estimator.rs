@@ -4,7 +4,8 @@
 
 use clap::{Parser, ValueEnum};
 use sabine::estimator::{
-    Dataset, Errors, Estimator, Evaluation, LABEL_COUNT, Partition, RoomMean, Selection, T60_COUNT, label_name,
+    Dataset, Errors, Estimator, Evaluation, LABEL_COUNT, Partition, RoomMean, Selection, T60_COUNT,
+    label_name,
 };
 use std::error::Error;
 use std::path::PathBuf;
@@ -75,7 +76,9 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         }
         row("**T60, all octaves (s)**", evaluation.t60(&selection));
         row("**EQ, all octaves (dB)**", evaluation.eq(&selection));
-        println!("\n| selection | | model | constant | best constant | model - constant | bias | coverage | clips |");
+        println!(
+            "\n| selection | | model | constant | best constant | model - constant | bias | coverage | clips |"
+        );
         println!("|---|---|---|---|---|---|---|---|---|");
         let levels = [[-30.0, 5.0], [5.0, 10.0], [10.0, 20.0], [20.0, 30.0], [30.0, f64::INFINITY]];
         for snr_db in levels {

@@ -1,7 +1,7 @@
 //! Makes a reverberant recording out of dry speech, a measured impulse response and noise, at a stated signal-to-noise ratio.
 
 use clap::Parser;
-use sabine::acoustics::{Channel, Signal, SampleFormat, encode_wav, read_audio, resample};
+use sabine::acoustics::{Channel, SampleFormat, Signal, encode_wav, read_audio, resample};
 use sabine::eqfilter::convolve;
 use sabine_examples::OutputFolder;
 use std::error::Error;
@@ -55,7 +55,9 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error + Send + Sync>> {
     wet.iter_mut().for_each(|s| *s *= scale);
     if let Some(path) = &arguments.noise {
         let noise = read(path)?;
-        let power = |samples: &[f32]| samples.iter().map(|s| f64::from(*s).powi(2)).sum::<f64>() / samples.len() as f64;
+        let power = |samples: &[f32]| {
+            samples.iter().map(|s| f64::from(*s).powi(2)).sum::<f64>() / samples.len() as f64
+        };
         let gain = (power(&wet) / power(noise.samples()) / 10f64.powf(arguments.snr / 10.0)).sqrt() as f32;
         for (s, n) in wet.iter_mut().zip(noise.samples().iter().cycle()) {
             *s += gain * n;

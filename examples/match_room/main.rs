@@ -53,7 +53,8 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error + Send + Sync>> {
     let fixtures = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures"));
-    let or_fixture = |path: &Option<PathBuf>, fixture: &str| path.clone().unwrap_or_else(|| fixtures.join(fixture));
+    let or_fixture =
+        |path: &Option<PathBuf>, fixture: &str| path.clone().unwrap_or_else(|| fixtures.join(fixture));
     let speech_path = or_fixture(&arguments.speech, "speech/recording.wav");
     let dry_path = or_fixture(&arguments.dry, "speech/dry.wav");
     let room_path = or_fixture(&arguments.room, "room");
@@ -65,9 +66,12 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error + Send + Sync>> {
     let dry = read_audio(&dry_path, channel)?;
     let room = MeasuredRoom::read(&room_path)?;
     let first = |ids: Vec<&str>| ids.first().map(ToString::to_string).unwrap_or_default();
-    let source = arguments.source.clone().unwrap_or_else(|| first(room.sources().iter().map(|s| &*s.id).collect()));
-    let receiver =
-        arguments.receiver.clone().unwrap_or_else(|| first(room.receivers().iter().map(|r| &*r.id).collect()));
+    let source =
+        arguments.source.clone().unwrap_or_else(|| first(room.sources().iter().map(|s| &*s.id).collect()));
+    let receiver = arguments
+        .receiver
+        .clone()
+        .unwrap_or_else(|| first(room.receivers().iter().map(|r| &*r.id).collect()));
     let input = MatchInput {
         speech: Recording { name: &speech_path.display().to_string(), signal: &speech },
         dry: Recording { name: &dry_path.display().to_string(), signal: &dry },

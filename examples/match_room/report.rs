@@ -1,6 +1,6 @@
 //! The page that a person would rather look at than read.
 
-use sabine::acoustics::{EnergyDecayCurve, PerBand, Reading, Signal, SampleFormat, encode_wav, resample};
+use sabine::acoustics::{EnergyDecayCurve, PerBand, Reading, SampleFormat, Signal, encode_wav, resample};
 use sabine::{DECAY_STEP_S, MatchInput, MatchSummary, RoomMatch};
 use sabine_examples::{Chart, Look, Page, Scale, Series, escape, spectrogram_png};
 use std::error::Error;
@@ -11,7 +11,12 @@ type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
 const NORMAL_90: f64 = 1.645;
 
 /// The report as one HTML file.
-pub fn html(input: &MatchInput<'_>, room_name: &str, matched: &RoomMatch, summary: &MatchSummary) -> Result<String> {
+pub fn html(
+    input: &MatchInput<'_>,
+    room_name: &str,
+    matched: &RoomMatch,
+    summary: &MatchSummary,
+) -> Result<String> {
     let mut page = Page::new("Your room, matched");
     page.paragraph(&format!(
         "From {} of speech in {} the room's sound was estimated, the materials of its model ({}) were fitted, and {} was placed at \"{}\" and heard at \"{}\".",
@@ -45,10 +50,16 @@ pub fn html(input: &MatchInput<'_>, room_name: &str, matched: &RoomMatch, summar
     page.markup(&absorption_chart(summary).svg()?);
     page.markup("</section><section>");
     page.heading("Spectrogram of the recording");
-    page.picture(&spectrogram_png(input.speech.signal)?, &format!("0 to {}, 0 to 8 kHz", seconds(input.speech.signal.duration_s())));
+    page.picture(
+        &spectrogram_png(input.speech.signal)?,
+        &format!("0 to {}, 0 to 8 kHz", seconds(input.speech.signal.duration_s())),
+    );
     page.markup("</section><section>");
     page.heading("Spectrogram of the result");
-    page.picture(&spectrogram_png(&matched.matched)?, &format!("0 to {}, 0 to 8 kHz", seconds(matched.matched.duration_s())));
+    page.picture(
+        &spectrogram_png(&matched.matched)?,
+        &format!("0 to {}, 0 to 8 kHz", seconds(matched.matched.duration_s())),
+    );
     page.markup("</section></div>");
     page.heading("In numbers");
     page.table(&t60_table(summary));
@@ -56,7 +67,8 @@ pub fn html(input: &MatchInput<'_>, room_name: &str, matched: &RoomMatch, summar
     page.heading("Materials: absorption in the model and as fitted");
     page.table(&material_table(summary));
     if !summary.not_determined.is_empty() {
-        let items: String = summary.not_determined.iter().map(|s| format!("<li>{}</li>", escape(s))).collect();
+        let items: String =
+            summary.not_determined.iter().map(|s| format!("<li>{}</li>", escape(s))).collect();
         page.markup(&format!(
             "<div class=\"soft\">One reverberation time per octave cannot tell all materials apart. What the fit took from the model's own tables rather than from the recording:<ul>{items}</ul></div>"
         ));
@@ -93,12 +105,13 @@ fn t60_chart(matched: &RoomMatch, summary: &MatchSummary) -> Chart {
     heard.half_widths = summary.t60_target_sd_s.iter().map(|sd| NORMAL_90 * sd).collect();
     let reached: Vec<f64> = summary.t60_reached_s.iter().map(|t| t.unwrap_or(f64::NAN)).collect();
     let limit: Vec<f64> = bands.iter().map(|&hz| matched.air.t60_limit_s(hz)).collect();
-    let mut series =
-        vec![heard, Series::new("reached", Look::Dots, 1, pairs(bands, &reached))];
+    let mut series = vec![heard, Series::new("reached", Look::Dots, 1, pairs(bands, &reached))];
     let top = 1.3
         * series
             .iter()
-            .flat_map(|s| s.points.iter().enumerate().map(|(i, p)| p.1 + s.half_widths.get(i).copied().unwrap_or(0.0)))
+            .flat_map(|s| {
+                s.points.iter().enumerate().map(|(i, p)| p.1 + s.half_widths.get(i).copied().unwrap_or(0.0))
+            })
             .filter(|y| y.is_finite())
             .fold(0.1, f64::max);
     if limit.iter().any(|&l| l < top) {
@@ -194,7 +207,10 @@ fn t60_table(summary: &MatchSummary) -> Vec<Vec<String>> {
         head("Reverberation time (s)", &summary.bands_hz),
         named("heard", summary.t60_target_s.iter().map(number)),
         named("standard error", summary.t60_target_sd_s.iter().map(number)),
-        named("reached (T30)", summary.t60_reached_s.iter().map(|t| t.map_or("-".into(), |t| format!("{t:.2}")))),
+        named(
+            "reached (T30)",
+            summary.t60_reached_s.iter().map(|t| t.map_or("-".into(), |t| format!("{t:.2}"))),
+        ),
     ]
 }
 

@@ -136,7 +136,10 @@ impl Chart {
         (if low < 0.0 { low - margin } else { 0.0 }, if high > 0.0 { high + margin } else { 0.0 })
     }
 
-    fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
+    fn draw<B: DrawingBackend>(
+        &self,
+        root: &DrawingArea<B, Shift>,
+    ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
         let ink = |size: u32| ("sans-serif", size).into_font().color(&INK);
         let (legend, body) = root.split_vertically(26);
         let mut left = 62;
@@ -145,7 +148,10 @@ impl Chart {
             let dashes: &[(i32, i32)] =
                 if series.look == Look::Dashed { &[(0, 7), (11, 18)] } else { &[(0, 18)] };
             for &(from, to) in dashes {
-                legend.draw(&PathElement::new(vec![(left + from, 13), (left + to, 13)], colour.stroke_width(3)))?;
+                legend.draw(&PathElement::new(
+                    vec![(left + from, 13), (left + to, 13)],
+                    colour.stroke_width(3),
+                ))?;
             }
             legend.draw(&Text::new(series.name.clone(), (left + 24, 5), ink(15)))?;
             left += 40 + 8 * series.name.chars().count() as i32;
@@ -203,7 +209,10 @@ impl Chart {
                 chart.draw_series([Circle::new((x, y.clamp(y0, y1)), 4, colour.filled())])?;
                 if let Some(&half) = series.half_widths.get(i).filter(|h| h.is_finite() && **h > 0.0) {
                     let ends = [(y - half).clamp(y0, y1), (y + half).clamp(y0, y1)];
-                    chart.draw_series([PathElement::new(ends.map(|e| (x, e)).to_vec(), colour.stroke_width(1))])?;
+                    chart.draw_series([PathElement::new(
+                        ends.map(|e| (x, e)).to_vec(),
+                        colour.stroke_width(1),
+                    )])?;
                 }
             }
         }

@@ -54,7 +54,9 @@ impl Page {
             return self;
         }
         let items: String = warnings.iter().map(|w| format!("<li>{}</li>", escape(w))).collect();
-        self.markup(&format!("<div class=\"warn\" role=\"note\"><strong>Worth knowing</strong><ul>{items}</ul></div>"))
+        self.markup(&format!(
+            "<div class=\"warn\" role=\"note\"><strong>Worth knowing</strong><ul>{items}</ul></div>"
+        ))
     }
 
     /// Adds a table; the first row is its head.
