@@ -2,7 +2,7 @@
 
 use clap::Parser;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
-use sabine_augment::{
+use sabine::augment::{
     Built, DatasetBuilder, DatasetConfig, Error, Manifest, NoiseCorpus, Partition, ResponseCorpus,
     ResponseFilter, SpeechCorpus, Worker,
 };
