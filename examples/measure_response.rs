@@ -256,6 +256,7 @@ fn plot(response: &ImpulseResponse, room: &RoomParameters) -> Result<String, Any
             x: Scale::Linear(0.0, response.duration_s()),
             y: Some((-100.0, 5.0)),
             series,
+            small: false,
         };
         let title = match &room.t60_s.values()[i] {
             Ok(t60) => format!("{hz} Hz: T60 {:.3} ± {:.3} s", t60.value, t60.standard_error),

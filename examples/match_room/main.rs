@@ -56,7 +56,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error + Send + Sync>> {
     let or_fixture =
         |path: &Option<PathBuf>, fixture: &str| path.clone().unwrap_or_else(|| fixtures.join(fixture));
     let speech_path = or_fixture(&arguments.speech, "speech/recording.wav");
-    let dry_path = or_fixture(&arguments.dry, "speech/dry.wav");
+    let dry_path = or_fixture(&arguments.dry, "speech/dry_guest.wav");
     let room_path = or_fixture(&arguments.room, "room");
 
     // A folder that cannot be written to should not cost the user a computation first.

@@ -1,7 +1,7 @@
 //! The page that a person would rather look at than read.
 
-use sabine::acoustics::{EnergyDecayCurve, PerBand, Reading, SampleFormat, Signal, encode_wav, resample};
-use sabine::{DECAY_STEP_S, MatchInput, MatchSummary, RoomMatch};
+use sabine::acoustics::{EnergyDecayCurve, Estimate, PerBand, SampleFormat, Signal, encode_wav, resample};
+use sabine::{DECAY_STEP_S, MatchInput, MatchSummary, MaterialChange, RoomMatch};
 use sabine_examples::{Chart, Look, Page, Scale, Series, escape, spectrogram_png};
 use std::error::Error;
 
@@ -9,6 +9,8 @@ type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
 
 /// 1.645 standard errors either side: a 90 % interval.
 const NORMAL_90: f64 = 1.645;
+/// Lowest level of the decay plot.
+const DECAY_FLOOR_DB: f64 = -50.0;
 
 /// The report as one HTML file.
 pub fn html(
@@ -44,10 +46,7 @@ pub fn html(
     page.markup(&eq_chart(matched).svg()?);
     page.markup("</section><section>");
     page.heading("Decay of the rendered response");
-    page.markup(&decay_chart(&matched.decay, &matched.t60_reached_s).svg()?);
-    page.markup("</section><section>");
-    page.heading("Absorption, before and after");
-    page.markup(&absorption_chart(summary).svg()?);
+    page.markup(&decay_chart(&matched.decay, matched.targets.t60_s()).svg()?);
     page.markup("</section><section>");
     page.heading("Spectrogram of the recording");
     page.picture(
@@ -61,10 +60,16 @@ pub fn html(
         &format!("0 to {}, 0 to 8 kHz", seconds(matched.matched.duration_s())),
     );
     page.markup("</section></div>");
+    page.heading("Absorption of each material: in the model and as fitted");
+    page.markup("<div class=\"small\">");
+    for (name, change) in &summary.materials {
+        let chart = absorption_chart(&summary.bands_hz, change).svg()?;
+        page.markup(&format!("<figure><figcaption>{}</figcaption>{chart}</figure>", escape(name)));
+    }
+    page.markup("</div>");
     page.heading("In numbers");
     page.table(&t60_table(summary));
     page.table(&eq_table(summary));
-    page.heading("Materials: absorption in the model and as fitted");
     page.table(&material_table(summary));
     if !summary.not_determined.is_empty() {
         let items: String =
@@ -124,6 +129,7 @@ fn t60_chart(matched: &RoomMatch, summary: &MatchSummary) -> Chart {
         x: Scale::Octaves(bands.clone()),
         y: Some((0.0, top)),
         series,
+        small: false,
     }
 }
 
@@ -151,6 +157,7 @@ fn eq_chart(matched: &RoomMatch) -> Chart {
         x: Scale::Octaves(centres),
         y: None,
         series: vec![heard, simulated, filter],
+        small: false,
     }
 }
 
@@ -161,43 +168,43 @@ fn dense_hz(centres: &[f64]) -> Vec<f64> {
     (0..=steps).map(|i| first * 2f64.powf(i as f64 / 8.0)).collect()
 }
 
-fn decay_chart(decay: &PerBand<EnergyDecayCurve>, reached: &PerBand<Reading>) -> Chart {
-    let longest_s =
-        reached.values().iter().filter_map(|r| r.as_ref().ok()).map(|t| t.value).fold(0.3, f64::max);
-    let series = [125.0, 500.0, 2000.0, 8000.0]
-        .into_iter()
-        .enumerate()
-        .filter_map(|(colour, hz)| {
-            let level = decay.at_hz(hz)?.level_db();
-            let points = level.iter().enumerate().map(|(i, &l)| (i as f64 * DECAY_STEP_S, l));
-            let visible = points.take_while(|&(t, l)| l > -70.0 && t < 1.1 * longest_s).collect();
-            let name = if hz < 1000.0 { format!("{hz} Hz") } else { format!("{} kHz", hz / 1000.0) };
-            Some(Series::new(name, Look::Line, colour, visible))
-        })
-        .collect();
+fn decay_chart(decay: &PerBand<EnergyDecayCurve>, target_s: &PerBand<Estimate>) -> Chart {
+    let longest_s = target_s.values().iter().map(|t| t.value).fold(0.3, f64::max);
+    let mut series = Vec::new();
+    for (colour, hz) in [125.0, 500.0, 2000.0, 8000.0].into_iter().enumerate() {
+        let (Some(curve), Some(target)) = (decay.at_hz(hz), target_s.at_hz(hz)) else { continue };
+        let level = curve.level_db();
+        let points = level.iter().enumerate().map(|(i, &l)| (i as f64 * DECAY_STEP_S, l));
+        let visible = points.take_while(|&(t, l)| l > DECAY_FLOOR_DB && t < longest_s).collect();
+        let name = if hz < 1000.0 { format!("{hz} Hz") } else { format!("{} kHz", hz / 1000.0) };
+        series.push(Series::new(name, Look::Line, colour, visible));
+        let end_s = (-DECAY_FLOOR_DB / 60.0 * target.value).min(longest_s);
+        let wanted = vec![(0.0, 0.0), (end_s, -60.0 * end_s / target.value)];
+        let mut wanted = Series::new("wanted", Look::Dashed, colour, wanted);
+        wanted.in_legend = false;
+        series.push(wanted);
+    }
     Chart {
-        x_label: "Time (s)".into(),
+        x_label: "Time (s); broken: the slope that was heard".into(),
         y_label: "Energy still to come (dB)".into(),
-        x: Scale::Linear(0.0, 1.1 * longest_s),
-        y: Some((-65.0, 2.0)),
+        x: Scale::Linear(0.0, longest_s),
+        y: Some((DECAY_FLOOR_DB, 2.0)),
         series,
+        small: false,
     }
 }
 
-fn absorption_chart(summary: &MatchSummary) -> Chart {
-    let mut series = Vec::new();
-    for (colour, (name, change)) in summary.materials.iter().enumerate() {
-        series.push(Series::new(name.clone(), Look::Dots, colour, pairs(&summary.bands_hz, &change.after)));
-        let mut before = Series::new("", Look::Dashed, colour, pairs(&summary.bands_hz, &change.before));
-        before.in_legend = false;
-        series.push(before);
-    }
+fn absorption_chart(bands_hz: &[f64], change: &MaterialChange) -> Chart {
     Chart {
-        x_label: "Octave (Hz); broken: before, dots: after".into(),
-        y_label: "Absorption".into(),
-        x: Scale::Octaves(summary.bands_hz.clone()),
+        x_label: String::new(),
+        y_label: String::new(),
+        x: Scale::Octaves(bands_hz.to_vec()),
         y: Some((0.0, 1.0)),
-        series,
+        series: vec![
+            Series::new("model", Look::Dashed, 0, pairs(bands_hz, &change.before)),
+            Series::new("fitted", Look::Dots, 1, pairs(bands_hz, &change.after)),
+        ],
+        small: true,
     }
 }
 

@@ -3,8 +3,12 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-/// Size of a chart in SVG units; it scales to the width of the page.
-const SIZE: (u32, u32) = (600, 360);
+/// Size of a chart in SVG units: it scales to its place on the page, and its text stays readable on a phone.
+const SIZE: (u32, u32) = (480, 320);
+/// Size of one of several small charts side by side.
+const SMALL: (u32, u32) = (320, 220);
+/// Height of a row of the legend.
+const LEGEND_ROW: i32 = 20;
 /// Text and axes; a dark page turns it light.
 const INK: RGBColor = RGBColor(34, 34, 34);
 /// Grid lines.
@@ -75,6 +79,8 @@ pub struct Chart {
     pub y: Option<(f64, f64)>,
     /// What is drawn, in the order of the legend.
     pub series: Vec<Series>,
+    /// Whether it is one of several small charts.
+    pub small: bool,
 }
 
 impl Series {
@@ -91,12 +97,13 @@ impl Chart {
     /// What plotters reports; drawing into memory does not fail by itself.
     pub fn svg(&self) -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
         let mut text = String::new();
+        let size = if self.small { SMALL } else { SIZE };
         {
-            let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
+            let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
             self.draw(&root).map_err(|e| e.to_string())?;
             root.present().map_err(|e| e.to_string())?;
         }
-        let open = format!("<svg width=\"{}\" height=\"{}\"", SIZE.0, SIZE.1);
+        let open = format!("<svg width=\"{}\" height=\"{}\"", size.0, size.1);
         let text = text.replacen(&open, "<svg class=\"chart\" role=\"img\"", 1);
         Ok(match text.find('>') {
             Some(end) => format!("{}{DARK}{}", &text[..=end], &text[end + 1..]),
@@ -136,33 +143,51 @@ impl Chart {
         (if low < 0.0 { low - margin } else { 0.0 }, if high > 0.0 { high + margin } else { 0.0 })
     }
 
+    /// Left edge and row of each entry of the legend, wrapped at the width of the chart.
+    fn legend_places(&self, width: i32) -> Vec<(i32, i32)> {
+        let start = if self.small { 44 } else { 58 };
+        let (mut left, mut row) = (start, 0);
+        self.series
+            .iter()
+            .filter(|s| s.in_legend)
+            .map(|series| {
+                let needed = 40 + 8 * series.name.chars().count() as i32;
+                if left > start && left + needed > width {
+                    (left, row) = (start, row + 1);
+                }
+                left += needed;
+                (left - needed, row)
+            })
+            .collect()
+    }
+
     fn draw<B: DrawingBackend>(
         &self,
         root: &DrawingArea<B, Shift>,
     ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
         let ink = |size: u32| ("sans-serif", size).into_font().color(&INK);
-        let (legend, body) = root.split_vertically(26);
-        let mut left = 62;
-        for series in self.series.iter().filter(|s| s.in_legend) {
+        let entries = self.legend_places(root.dim_in_pixel().0 as i32);
+        let rows = entries.last().map_or(0, |&(_, row)| row + 1);
+        let legend_height = rows * LEGEND_ROW + 6;
+        let (legend, body) = root.split_vertically(legend_height);
+        for (series, (left, row)) in self.series.iter().filter(|s| s.in_legend).zip(entries) {
             let colour = COLOURS[series.colour % COLOURS.len()];
+            let middle = row * LEGEND_ROW + LEGEND_ROW / 2;
             let dashes: &[(i32, i32)] =
                 if series.look == Look::Dashed { &[(0, 7), (11, 18)] } else { &[(0, 18)] };
             for &(from, to) in dashes {
-                legend.draw(&PathElement::new(
-                    vec![(left + from, 13), (left + to, 13)],
-                    colour.stroke_width(3),
-                ))?;
+                let stroke = vec![(left + from, middle), (left + to, middle)];
+                legend.draw(&PathElement::new(stroke, colour.stroke_width(3)))?;
             }
-            legend.draw(&Text::new(series.name.clone(), (left + 24, 5), ink(15)))?;
-            left += 40 + 8 * series.name.chars().count() as i32;
+            legend.draw(&Text::new(series.name.clone(), (left + 24, middle - 8), ink(15)))?;
         }
 
         let (x0, x1) = self.x_range();
         let (y0, y1) = self.y_range();
         let mut chart = ChartBuilder::on(&body)
             .margin_right(14)
-            .x_label_area_size(46)
-            .y_label_area_size(58)
+            .x_label_area_size(if self.x_label.is_empty() { 24 } else { 46 })
+            .y_label_area_size(if self.y_label.is_empty() { 40 } else { 58 })
             .build_cartesian_2d(x0..x1, y0..y1)?;
         let octaves = matches!(self.x, Scale::Octaves(_));
         let mut mesh = chart.configure_mesh();
@@ -173,18 +198,19 @@ impl Chart {
             .axis_style(INK)
             .bold_line_style(GRID)
             .light_line_style(TRANSPARENT)
-            .y_labels(7);
+            .y_labels(if self.small { 4 } else { 7 });
         if octaves { mesh.x_labels(0).disable_x_mesh() } else { mesh.x_labels(8) }.draw()?;
         if let Scale::Octaves(centres) = &self.x {
             // plotters places its own ticks on a linear axis; octaves want one at each centre.
             let plot = chart.plotting_area();
-            for &hz in centres {
+            let every = if self.small { 2 } else { 1 };
+            for &hz in centres.iter().step_by(every) {
                 let x = hz.log2();
                 plot.draw(&PathElement::new(vec![(x, y0), (x, y1)], GRID))?;
                 let (pixel, bottom) = plot.map_coordinate(&(x, y0));
                 let label = if hz < 1000.0 { format!("{hz}") } else { format!("{}k", hz / 1000.0) };
                 let shift = 4 * label.len() as i32;
-                body.draw(&Text::new(label, (pixel - shift, bottom + 5 - 26), ink(14)))?;
+                body.draw(&Text::new(label, (pixel - shift, bottom + 5 - legend_height), ink(14)))?;
             }
         }
         for series in &self.series {

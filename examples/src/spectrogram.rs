@@ -28,15 +28,17 @@ const VIRIDIS: [[f32; 3]; 6] = [
 /// For a sound shorter than one window, or that cannot be resampled.
 pub fn spectrogram_png(sound: &Signal) -> Result<Vec<u8>, Box<dyn Error + Send + Sync>> {
     let sound = resample(sound, RATE_HZ)?;
-    let hop = (sound.samples().len() / WIDEST).max(WINDOW / 4);
+    let hop = (sound.samples().len() / WIDEST).clamp(WINDOW / 4, WINDOW);
     let spectra = Stft::new(WINDOW, hop)?.forward(sound.samples());
-    let (bins, frames) = spectra.dim();
     let level_db = spectra.mapv(|c| 10.0 * (c.norm_sqr() + 1e-12).log10());
+    // Beyond half a minute the windows that are shown no longer touch.
+    let step = level_db.ncols().div_ceil(WIDEST);
+    let (bins, frames) = (level_db.nrows(), level_db.ncols().div_ceil(step));
     let loudest_db = level_db.iter().copied().fold(f32::MIN, f32::max);
     let mut pixels = Vec::with_capacity(3 * bins * frames);
     for bin in (0..bins).rev() {
         for frame in 0..frames {
-            let share = (1.0 + (level_db[[bin, frame]] - loudest_db) / RANGE_DB).clamp(0.0, 1.0);
+            let share = (1.0 + (level_db[[bin, frame * step]] - loudest_db) / RANGE_DB).clamp(0.0, 1.0);
             let position = share * (VIRIDIS.len() - 1) as f32;
             let below = (position as usize).min(VIRIDIS.len() - 2);
             let part = position - below as f32;

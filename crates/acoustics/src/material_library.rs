@@ -38,7 +38,9 @@ impl LibraryMaterial {
 const SPEED_M_S: f64 = 343.2;
 
 fn scattering_of_depth(depth_m: f64, frequency_hz: f64) -> f64 {
-    (0.5 * (depth_m * frequency_hz / SPEED_M_S).sqrt()).clamp(0.05, 0.99)
+    let estimate = (0.5 * (depth_m * frequency_hz / SPEED_M_S).sqrt()).clamp(0.05, 0.99);
+    // More digits would pretend to know more.
+    (estimate * 1e3).round() / 1e3
 }
 
 /// All surfaces of the library.

@@ -3,6 +3,8 @@
 //! `cargo test -p sabine-acoustics --test decay_accuracy -- --nocapture` prints the figures of
 //! `docs/validation/measures.md`.
 
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
 mod synthetic;
 
 use sabine_acoustics::{BandParameters, NoReading, OctaveBands, RoomParameters};

@@ -4,6 +4,8 @@
 //! `cargo test -p sabine-acoustics --test real_responses -- --nocapture` prints the tables of
 //! `docs/validation/measures.md`.
 
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
 use sabine_acoustics::{
     BandParameters, ImpulseResponse, NoReading, OctaveBands, Reading, RoomParameters, ThirdOctaveBands,
 };

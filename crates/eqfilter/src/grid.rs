@@ -103,7 +103,7 @@ impl Grid {
 
     /// Bins and weights by which the mean over an octave of a power response is formed; the weights add up to one.
     ///
-    /// A low octave holds few bins: there the power between bins is interpolated, by a sinc in a Hann window of eight bins,
+    /// A low octave holds few bins: there the power between bins is interpolated, by a sinc in a window (cos^4) of sixteen bins,
     /// and the weights are the mean of the octave's shape with that kernel. A high octave is smooth over a bin.
     fn weights(&self, bands: OctaveBands, band: usize) -> Vec<(usize, f64)> {
         /// From this many bins up an octave is smooth over a bin.
@@ -111,7 +111,7 @@ impl Grid {
         /// Points between bins.
         const POINTS: usize = 8;
         /// Half the width of the kernel, in bins.
-        const REACH: f64 = 4.0;
+        const REACH: f64 = 8.0;
         let nyquist = self.length / 2;
         let (low_hz, high_hz) = support_hz(bands, band);
         let first = (low_hz / self.bin_hz).floor() as usize;
@@ -125,18 +125,24 @@ impl Grid {
             let lowest = first.saturating_sub(REACH as usize);
             let highest = (last + REACH as usize).min(nyquist);
             weights.extend((lowest..=highest).map(|k| (k, 0.0)));
-            for point in POINTS * first..POINTS * last {
-                let at = (point as f64 + 0.5) / POINTS as f64;
-                let shape = weight(bands, band, at * self.bin_hz);
-                let from = (at - REACH).ceil() as i64;
-                for k in from..from + 2 * REACH as i64 {
-                    let t = at - k as f64;
-                    let hann = (std::f64::consts::FRAC_PI_2 * t / REACH).cos().powi(2);
-                    let angle = std::f64::consts::PI * t;
-                    // The spectrum of a real signal is even about 0 Hz and about half the sample rate.
-                    let k = k.unsigned_abs() as usize;
-                    let k = if k > nyquist { self.length - k } else { k };
-                    weights[k - lowest].1 += shape * hann * angle.sin() / angle;
+            // A point between two bins is made of REACH bins on either side, the same way between any two.
+            let kernel: [[f64; 2 * REACH as usize]; POINTS] = std::array::from_fn(|point| {
+                std::array::from_fn(|i| {
+                    let t = (point as f64 + 0.5) / POINTS as f64 + REACH - 1.0 - i as f64;
+                    let window = (std::f64::consts::FRAC_PI_2 * t / REACH).cos().powi(4);
+                    window * (std::f64::consts::PI * t).sin() / (std::f64::consts::PI * t)
+                })
+            });
+            for bin in first..last {
+                for (point, kernel) in kernel.iter().enumerate() {
+                    let at = bin as f64 + (point as f64 + 0.5) / POINTS as f64;
+                    let shape = weight(bands, band, at * self.bin_hz);
+                    for (i, share) in kernel.iter().enumerate() {
+                        // The spectrum of a real signal is even about 0 Hz and about half the sample rate.
+                        let k = (bin + i + 1).abs_diff(REACH as usize);
+                        let k = if k > nyquist { self.length - k } else { k };
+                        weights[k - lowest].1 += shape * share;
+                    }
                 }
             }
         }

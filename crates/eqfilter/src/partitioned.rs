@@ -249,6 +249,7 @@ impl PartitionedConvolver {
         if let Some(tail) = &mut self.tail {
             tail.stage.clear();
             tail.input.fill(0.0);
+            tail.phase = 0;
         }
         for voice in [&mut self.current_voice, &mut self.incoming_voice] {
             voice.sum.fill(Complex::default());

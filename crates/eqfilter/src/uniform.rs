@@ -128,5 +128,6 @@ impl Stage {
     pub fn clear(&mut self) {
         self.spectra.fill(Complex::default());
         self.pair.fill(0.0);
+        self.newest = 0;
     }
 }

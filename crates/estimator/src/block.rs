@@ -52,7 +52,8 @@ pub(crate) fn forward_sample(
             length: span,
         }
         .run();
-        PoolRow { shape, convolved: scratch, convolved_stride: span, out, marks: marks.as_deref_mut(), row }.run();
+        PoolRow { shape, convolved: scratch, convolved_stride: span, out, marks: marks.as_deref_mut(), row }
+            .run();
     }
 }
 

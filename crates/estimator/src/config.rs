@@ -115,7 +115,11 @@ impl NetworkConfig {
             }
         }
         if !(0.0..1.0).contains(&self.dropout) {
-            return Err(Error::Config { field: "dropout", value: self.dropout, range: "0 or more and below 1" });
+            return Err(Error::Config {
+                field: "dropout",
+                value: self.dropout,
+                range: "0 or more and below 1",
+            });
         }
         for shape in self.unchecked_shapes() {
             let (rows, columns) = shape.pooled();

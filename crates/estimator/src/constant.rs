@@ -1,8 +1,8 @@
 //! The guess that any estimator has to beat.
 
+use crate::Error;
 use crate::labels::{LABEL_COUNT, per_band};
 use crate::model::Model;
-use crate::Error;
 use sabine_acoustics::{Estimate, RoomEstimator, RoomTargets, Signal};
 
 /// Says the same whatever it hears: the mean of the training labels, with their deviation as the standard error.

@@ -87,7 +87,13 @@ impl Correlate<'_> {
     }
 
     #[inline(always)]
-    fn tile<S: Simd, const O: usize, const V: usize>(&mut self, simd: S, first: usize, weights: &[f32], p: usize) {
+    fn tile<S: Simd, const O: usize, const V: usize>(
+        &mut self,
+        simd: S,
+        first: usize,
+        weights: &[f32],
+        p: usize,
+    ) {
         let length = V * S::F32_LANES;
         let offsets = self.weights.offsets.as_slice();
         let mut sums = [[simd.splat_f32s(0.0); V]; O];
@@ -109,10 +115,10 @@ impl Correlate<'_> {
                 }
             }
         }
-        for o in 0..O {
+        for (o, sums) in sums.iter().enumerate() {
             let start = (first + o) * self.out_stride + p;
             let (out, _) = S::as_mut_simd_f32s(&mut self.out[start..start + length]);
-            out.copy_from_slice(&sums[o]);
+            out.copy_from_slice(sums);
         }
     }
 
@@ -182,8 +188,7 @@ impl CorrelateWeights<'_> {
         to: usize,
     ) {
         let mut sums = [[simd.splat_f32s(0.0); T]; O];
-        let g: [&[f32]; O] =
-            std::array::from_fn(|o| &self.g[(first + o) * self.g_stride..][from..to]);
+        let g: [&[f32]; O] = std::array::from_fn(|o| &self.g[(first + o) * self.g_stride..][from..to]);
         let x: [&[f32]; T] =
             std::array::from_fn(|t| &self.x[input * self.x_stride + self.offsets[tap + t]..][from..to]);
         let vectors = (to - from) / S::F32_LANES;

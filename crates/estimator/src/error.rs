@@ -6,13 +6,13 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The recording has another sample rate than the network was trained on.
-    #[error("the recording has {found_hz} Hz; the network hears {expected_hz} Hz: resample it first")]
+    /// The recording has a lower sample rate than the network was trained on: the upper octaves are not in it.
+    #[error("the recording has {found_hz} Hz; the network needs at least {needed_hz} Hz")]
     SampleRate {
         /// Sample rate of the recording, in Hz.
         found_hz: u32,
         /// Sample rate of the network, in Hz.
-        expected_hz: u32,
+        needed_hz: u32,
     },
     /// The recording is too short to hear a room in it.
     #[error("the recording lasts {duration_s:.2} s; at least {needed_s:.2} s are needed")]

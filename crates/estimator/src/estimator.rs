@@ -1,18 +1,20 @@
 //! From a recording to the targets of a room.
 
+use crate::Error;
 use crate::labels::{LABEL_COUNT, T60_COUNT, label_hz, per_band};
 use crate::layout::Normalisation;
 use crate::model::Model;
 use crate::network::{Network, Scratch, spectrum};
 use crate::warning::Warning;
 use crate::windows::{Loudness, clipped_share, first_frames};
-use crate::Error;
 use ndarray::{ArrayView2, Axis, Slice};
 use rayon::prelude::*;
-use sabine_acoustics::{FeatureExtractor, RoomEstimator, RoomTargets, Signal};
+use sabine_acoustics::{FeatureExtractor, RoomEstimator, RoomTargets, Signal, resample};
 use sabine_features::LogMel;
 use std::path::Path;
 
+/// The weights that come with the crate.
+const PRETRAINED: &[u8] = include_bytes!("../weights/room.safetensors");
 /// Least length of a recording in seconds.
 pub const LEAST_DURATION_S: f64 = 1.0;
 /// Peak below which a recording is silent; full scale is 1 (the last bit of 24-bit samples is 1.2e-7).
@@ -71,6 +73,15 @@ impl Estimator {
         Ok(Self { network: Network::new(&model.parameters), extractor, model })
     }
 
+    /// The estimator with the weights that come with the crate: `docs/model_card.md` says what they were trained on and how
+    /// far they can be trusted.
+    ///
+    /// # Errors
+    /// [`Error::Weights`] if the file in the crate was replaced by one that does not fit.
+    pub fn pretrained() -> Result<Self, Error> {
+        Self::new(Model::from_safetensors("of the crate", PRETRAINED)?)
+    }
+
     /// An estimator from the bytes of a weights file.
     ///
     /// # Errors
@@ -94,7 +105,7 @@ impl Estimator {
         &self.model
     }
 
-    /// Sample rate that recordings must have, in Hz.
+    /// Sample rate of the network in Hz; recordings at higher rates are resampled.
     pub fn sample_rate_hz(&self) -> u32 {
         self.model.layout.sample_rate_hz
     }
@@ -105,12 +116,12 @@ impl Estimator {
     /// precision and by how clearly speech stands out in it.
     ///
     /// # Errors
-    /// [`Error::SampleRate`], [`Error::TooShort`] below [`LEAST_DURATION_S`], or [`Error::Silent`].
+    /// [`Error::SampleRate`] below the network's rate, [`Error::TooShort`] below [`LEAST_DURATION_S`], or [`Error::Silent`].
     pub fn estimate_detailed(&self, speech: &Signal) -> Result<DetailedEstimate, Error> {
         let layout = &self.model.layout;
-        if speech.sample_rate_hz() != layout.sample_rate_hz {
-            let (found_hz, expected_hz) = (speech.sample_rate_hz(), layout.sample_rate_hz);
-            return Err(Error::SampleRate { found_hz, expected_hz });
+        let (found_hz, needed_hz) = (speech.sample_rate_hz(), layout.sample_rate_hz);
+        if found_hz < needed_hz {
+            return Err(Error::SampleRate { found_hz, needed_hz });
         }
         if speech.duration_s() < LEAST_DURATION_S {
             return Err(Error::TooShort { duration_s: speech.duration_s(), needed_s: LEAST_DURATION_S });
@@ -119,12 +130,21 @@ impl Estimator {
             return Err(Error::Silent { peak: speech.peak() });
         }
         let mut warnings = Vec::new();
-        if speech.samples().len() < layout.window_samples() {
-            warnings.push(Warning::Short { duration_s: speech.duration_s(), window_s: layout.window_s() });
-        }
+        // Flat tops are flat at the rate at which they were recorded only.
         let clipped = clipped_share(speech.samples());
         if clipped > CLIPPED_SHARE {
             warnings.push(Warning::Clipped { share: clipped });
+        }
+        let resampled;
+        let speech = if found_hz == needed_hz {
+            speech
+        } else {
+            warnings.push(Warning::Resampled { from_hz: found_hz, to_hz: needed_hz });
+            resampled = resample(speech, needed_hz)?;
+            &resampled
+        };
+        if speech.samples().len() < layout.window_samples() {
+            warnings.push(Warning::Short { duration_s: speech.duration_s(), window_s: layout.window_s() });
         }
         // The floor of the features is absolute: a quiet recording would drown in it. A fixed level costs nothing where
         // the network does not hear the level.
@@ -135,7 +155,11 @@ impl Estimator {
     }
 
     /// Joins the windows of a spectrogram in dB `[mel, frame]`.
-    fn judge(&self, spectrogram_db: ArrayView2<'_, f32>, mut warnings: Vec<Warning>) -> Result<DetailedEstimate, Error> {
+    fn judge(
+        &self,
+        spectrogram_db: ArrayView2<'_, f32>,
+        mut warnings: Vec<Warning>,
+    ) -> Result<DetailedEstimate, Error> {
         let layout = &self.model.layout;
         let firsts = first_frames(spectrogram_db.ncols(), layout.frames);
         let heard: Vec<(Loudness, WindowOutput)> = firsts
@@ -205,14 +229,9 @@ impl Estimator {
     }
 
     fn novelty(&self, window: &[f32]) -> f64 {
-        let calibration = &self.model.calibration;
         let mut statistics = Vec::new();
         spectrum(window, self.model.layout.frames, &mut statistics);
-        let squares = statistics
-            .iter()
-            .zip(calibration.statistic_mean.iter().zip(&calibration.statistic_deviation))
-            .map(|(v, (mean, deviation))| ((f64::from(*v) - mean) / deviation).powi(2));
-        (squares.sum::<f64>() / statistics.len() as f64).sqrt()
+        self.model.calibration.novelty(&statistics)
     }
 
     /// One answer from many: the mean weighted by precision and `weights`, label by label.

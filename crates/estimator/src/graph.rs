@@ -3,12 +3,12 @@
 //! candle's max-pool gradient is wrong and its convolutions are slow at these sizes; everything with a gradient of its own
 //! here is checked against central differences of a naive network in double precision (`tests` below).
 
+use crate::Error;
 use crate::config::{NetworkConfig, Summary, is_running};
 use crate::network::spectrum;
 use crate::norm::BatchMoments;
 use crate::parameters::Parameters;
 use crate::stack::{Stack, Workspace};
-use crate::Error;
 use candle_core::{D, Device, Tensor, Var};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -63,7 +63,11 @@ impl Graph {
 
     /// Outputs `[sample, output]` for a batch of inputs that `fill` writes; updates the running moments. `keep` holds a
     /// factor for each value that reaches the dense layers (dropout), or nothing.
-    pub fn forward(&mut self, fill: impl FnOnce(&mut Vec<f32>), keep: Option<Vec<f32>>) -> Result<Tensor, Error> {
+    pub fn forward(
+        &mut self,
+        fill: impl FnOnce(&mut Vec<f32>),
+        keep: Option<Vec<f32>>,
+    ) -> Result<Tensor, Error> {
         let (mels, frames) = (self.config.mels, self.config.frames);
         let mut statistics = Vec::new();
         let samples = {

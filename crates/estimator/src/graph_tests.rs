@@ -10,7 +10,13 @@ type Tensors = BTreeMap<String, Vec<f64>>;
 
 /// The whole network by its definition: loops over every index, nothing shared with the kernels. With `running`, the
 /// normalisation uses the running moments; else those of the batch.
-fn naive(config: &NetworkConfig, tensors: &Tensors, inputs: &[f64], keep: Option<&[f64]>, running: bool) -> Vec<f64> {
+fn naive(
+    config: &NetworkConfig,
+    tensors: &Tensors,
+    inputs: &[f64],
+    keep: Option<&[f64]>,
+    running: bool,
+) -> Vec<f64> {
     let samples = inputs.len() / (config.mels * config.frames);
     let (mut channels, mut rows, mut columns) = (1, config.mels, config.frames);
     let mut x = inputs.to_vec();
@@ -89,7 +95,10 @@ fn naive(config: &NetworkConfig, tensors: &Tensors, inputs: &[f64], keep: Option
         }
         let dense = |v: &[f64], name: &str| -> Vec<f64> {
             let (w, b) = (&tensors[&format!("{name}.weight")], &tensors[&format!("{name}.bias")]);
-            w.chunks(v.len()).zip(b).map(|(w, b)| b + w.iter().zip(v).map(|(w, v)| w * v).sum::<f64>()).collect()
+            w.chunks(v.len())
+                .zip(b)
+                .map(|(w, b)| b + w.iter().zip(v).map(|(w, v)| w * v).sum::<f64>())
+                .collect()
         };
         if config.hidden.is_some() {
             v = dense(&v, "hidden").into_iter().map(|v| v.max(0.0)).collect();
@@ -107,7 +116,9 @@ fn rough(config: &NetworkConfig, seed: u64) -> Parameters {
         .tensors()
         .iter()
         .map(|(name, values)| {
-            let shake = |v: &f32| v + rng.random_range(0.05..0.3) as f32 * if name.ends_with("bias") { 1.0 } else { 0.5 };
+            let shake = |v: &f32| {
+                v + rng.random_range(0.05..0.3) as f32 * if name.ends_with("bias") { 1.0 } else { 0.5 }
+            };
             (name.clone(), values.iter().map(shake).collect())
         })
         .collect();
@@ -173,8 +184,7 @@ fn every_gradient_meets_central_differences() {
             out.iter().zip(&weights).map(|(o, w)| o * w).sum()
         };
         for (name, variable) in graph.variables() {
-            let found: Vec<f32> =
-                gradients.get(variable).unwrap().flatten_all().unwrap().to_vec1().unwrap();
+            let found: Vec<f32> = gradients.get(variable).unwrap().flatten_all().unwrap().to_vec1().unwrap();
             let scale = found.iter().map(|g| f64::from(g.abs())).fold(0.0, f64::max);
             for index in 0..found.len() {
                 let step = 1e-6;
@@ -247,29 +257,4 @@ fn threads_do_not_change_a_bit() {
     let one = run(1);
     assert_eq!(one, run(2));
     assert_eq!(one, run(5));
-}
-
-#[test]
-#[ignore]
-fn timing() {
-    let config = NetworkConfig { outputs: 13, ..NetworkConfig::small() };
-    let parameters = Parameters::random(&config, 5).unwrap();
-    let inputs = noise(64 * config.mels * config.frames, 6);
-    for threads in [1, 2] {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| {
-            let mut graph = Graph::new(&parameters).unwrap();
-            for _ in 0..3 {
-                let t = std::time::Instant::now();
-                let out = graph.forward(|x| x.clone_from(&inputs), None).unwrap();
-                let tf = t.elapsed();
-                let gradients = out.sqr().unwrap().sum_all().unwrap().backward().unwrap();
-                let tt = t.elapsed();
-                println!("{threads} threads: forward {tf:?} total {tt:?} {:.0}/s", 64.0 / tt.as_secs_f64());
-            }
-            let n = Network::new(&parameters);
-            let t = std::time::Instant::now();
-            for _ in 0..4 { n.infer_batch(&inputs); }
-            println!("infer {:.0}/s", 256.0 / t.elapsed().as_secs_f64());
-        });
-    }
 }

@@ -102,11 +102,14 @@ impl Model {
         }
         let views = arrays
             .iter()
-            .map(|(name, shape, dtype, bytes)| Ok((name.clone(), TensorView::new(*dtype, shape.clone(), bytes)?)))
+            .map(|(name, shape, dtype, bytes)| {
+                Ok((name.clone(), TensorView::new(*dtype, shape.clone(), bytes)?))
+            })
             .collect::<Result<Vec<_>, _>>()
             .map_err(|source| fault(WeightsFault::Container { source }))?;
         let metadata = HashMap::from([(FIELD.to_owned(), header)]);
-        safetensors::serialize(views, Some(metadata)).map_err(|source| fault(WeightsFault::Container { source }))
+        safetensors::serialize(views, Some(metadata))
+            .map_err(|source| fault(WeightsFault::Container { source }))
     }
 
     fn vectors(&self) -> Vec<(&'static str, Vec<f64>)> {
@@ -174,10 +177,9 @@ impl Model {
         let deviation_db = positive("normalisation.deviation_db", wide("normalisation.deviation_db", mels)?)?;
         let low = wide("calibration.t60_low_s", T60_COUNT)?;
         let high = wide("calibration.t60_high_s", T60_COUNT)?;
-        for (field, value) in [
-            ("window_correlation", header.window_correlation),
-            ("novelty_limit", header.novelty_limit),
-        ] {
+        for (field, value) in
+            [("window_correlation", header.window_correlation), ("novelty_limit", header.novelty_limit)]
+        {
             if !value.is_finite() || value < 0.0 {
                 return Err(ReadFault::Weights(WeightsFault::Metadata { field }));
             }

@@ -74,7 +74,8 @@ impl Network {
                 let mut total = f64::from(bias[output]);
                 for input in 0..inputs {
                     let weight = f64::from(weights[output * inputs + input]);
-                    let channel = if layer == 0 && input < from_blocks { Some(input / per_channel) } else { None };
+                    let channel =
+                        if layer == 0 && input < from_blocks { Some(input / per_channel) } else { None };
                     total += channel.map_or(0.0, |c| weight * offset[c]);
                     transposed[input * outputs + output] = (weight * channel.map_or(1.0, |c| gain[c])) as f32;
                 }

@@ -132,7 +132,9 @@ impl WithSimd for Unpool<'_> {
                             pair[1] = if mark == first + 1 { g } else { 0.0 };
                         }
                     } else {
-                        for ((group, &g), &mark) in out.chunks_exact_mut(pool_columns).zip(gradient).zip(marks) {
+                        for ((group, &g), &mark) in
+                            out.chunks_exact_mut(pool_columns).zip(gradient).zip(marks)
+                        {
                             for (dx, value) in group.iter_mut().enumerate() {
                                 *value = if mark == first + dx as u8 { g } else { 0.0 };
                             }

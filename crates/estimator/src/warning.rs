@@ -6,6 +6,13 @@ use std::fmt;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Warning {
+    /// The recording was brought to the sample rate of the network.
+    Resampled {
+        /// Its sample rate in Hz.
+        from_hz: u32,
+        /// That of the network in Hz.
+        to_hz: u32,
+    },
     /// The recording is shorter than a window; it was repeated to fill one.
     Short {
         /// Its length in seconds.
@@ -53,11 +60,17 @@ pub enum Warning {
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Resampled { from_hz, to_hz } => write!(f, "resampled from {from_hz} to {to_hz} Hz"),
             Self::Short { duration_s, window_s } => {
-                write!(f, "the recording lasts {duration_s:.1} s; it was repeated to fill a window of {window_s:.1} s")
+                write!(
+                    f,
+                    "the recording lasts {duration_s:.1} s; it was repeated to fill a window of {window_s:.1} s"
+                )
             }
             Self::Inactive { windows, of } => write!(f, "{windows} of {of} windows hold no speech"),
-            Self::Clipped { share } => write!(f, "clipped: {:.2} % of the samples lie on flat tops", 100.0 * share),
+            Self::Clipped { share } => {
+                write!(f, "clipped: {:.2} % of the samples lie on flat tops", 100.0 * share)
+            }
             Self::Noisy { range_db } => {
                 write!(f, "noisy: loud and quiet moments differ by {range_db:.0} dB only")
             }
@@ -66,7 +79,10 @@ impl fmt::Display for Warning {
                 "{band_hz} Hz: T60 of {t60_s:.2} s is at the edge of the {low_s:.2} to {high_s:.2} s that were trained on"
             ),
             Self::Unfamiliar { novelty, limit } => {
-                write!(f, "unlike the speech that was trained on: novelty {novelty:.1}, usual is below {limit:.1}")
+                write!(
+                    f,
+                    "unlike the speech that was trained on: novelty {novelty:.1}, usual is below {limit:.1}"
+                )
             }
         }
     }

@@ -1,6 +1,7 @@
 //! The log-mel spectrogram.
 
 use crate::error::check_range;
+use crate::mel::LANES;
 use crate::stft::{Stft, StftScratch, check_length};
 use crate::{Error, LogMelStream, MelBands};
 use ndarray::Array2;
@@ -82,7 +83,8 @@ pub struct LogMel {
 #[derive(Clone, Debug)]
 pub struct LogMelScratch {
     stft: StftScratch,
-    power: Vec<f64>,
+    /// Power of each bin in the frames side by side.
+    power: Vec<[f32; LANES]>,
 }
 
 impl LogMel {
@@ -116,7 +118,7 @@ impl LogMel {
 
     /// Working memory for [`LogMel::extract_into`].
     pub fn scratch(&self) -> LogMelScratch {
-        LogMelScratch { stft: self.stft.scratch(), power: vec![0.0; self.stft.bins()] }
+        LogMelScratch { stft: self.stft.scratch(), power: vec![[0.0; LANES]; self.stft.bins()] }
     }
 
     /// Levels in dB, `[mel, frame]` row by row, written to `mels * frames` values without allocating.
@@ -144,32 +146,32 @@ impl LogMel {
     /// [`LogMel::extract_into`] after the check of the length.
     fn extract_checked(&self, samples: &[f32], scratch: &mut LogMelScratch, out: &mut [f32]) {
         let frames = self.stft.frames(samples.len());
-        for t in 0..frames {
-            let frame = &samples[t * self.config.hop..][..self.config.n_fft];
-            self.band_power(frame, scratch, |band, power| out[band * frames + t] = power);
+        let floor = self.config.floor_power as f32;
+        for first in (0..frames).step_by(LANES) {
+            let lanes = LANES.min(frames - first);
+            for lane in 0..lanes {
+                let frame = &samples[(first + lane) * self.config.hop..][..self.config.n_fft];
+                self.bin_power(frame, lane, scratch);
+            }
+            self.bands.apply(&scratch.power, |band, powers| {
+                let levels = powers.map(|power| power_to_db(power, floor));
+                out[band * frames + first..][..lanes].copy_from_slice(&levels[..lanes]);
+            });
         }
-        self.to_db(out);
     }
 
-    /// Power of one frame in each band.
-    pub(crate) fn band_power(
-        &self,
-        frame: &[f32],
-        scratch: &mut LogMelScratch,
-        mut take: impl FnMut(usize, f32),
-    ) {
+    /// Levels of one frame.
+    pub(crate) fn frame_levels(&self, frame: &[f32], scratch: &mut LogMelScratch, levels_db: &mut [f32]) {
+        self.bin_power(frame, 0, scratch);
+        let floor = self.config.floor_power as f32;
+        self.bands.apply(&scratch.power, |band, powers| levels_db[band] = power_to_db(powers[0], floor));
+    }
+
+    /// Power of one frame in each bin, written to a lane.
+    fn bin_power(&self, frame: &[f32], lane: usize, scratch: &mut LogMelScratch) {
         self.stft.transform(frame, &mut scratch.stft);
         for (p, x) in scratch.power.iter_mut().zip(&scratch.stft.spectrum) {
-            *p = x.norm_sqr();
-        }
-        self.bands.apply(&scratch.power, |band, power| take(band, power as f32));
-    }
-
-    /// Powers to levels, in place.
-    pub(crate) fn to_db(&self, values: &mut [f32]) {
-        let floor = self.config.floor_power as f32;
-        for value in values {
-            *value = power_to_db(*value, floor);
+            p[lane] = x.norm_sqr() as f32;
         }
     }
 }

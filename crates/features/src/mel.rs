@@ -13,6 +13,9 @@ fn log_step() -> f64 {
     6.4_f64.ln() / 27.0
 }
 
+/// Frames that are turned into bands side by side: eight single-precision numbers fill the vectors of common processors.
+pub(crate) const LANES: usize = 8;
+
 /// Frequency in Hz to mel (Slaney 1998: linear below 1 kHz, logarithmic above).
 ///
 /// ```
@@ -39,7 +42,7 @@ pub struct MelBands {
 #[derive(Clone, Debug)]
 struct MelBand {
     first_bin: usize,
-    weights: Vec<f64>,
+    weights: Vec<f32>,
 }
 
 impl MelBands {
@@ -67,7 +70,7 @@ impl MelBands {
             let Some(first_bin) = (0..bins).find(inside) else {
                 return Err(Error::EmptyMelBand { band, mels, n_fft });
             };
-            let weights = (first_bin..bins).take_while(inside).map(|k| weight(bin_hz(k))).collect();
+            let weights = (first_bin..bins).take_while(inside).map(|k| weight(bin_hz(k)) as f32).collect();
             bands.push(MelBand { first_bin, weights });
         }
         Ok(Self { bands, bins })
@@ -86,15 +89,23 @@ impl MelBands {
     pub fn row(&self, band: usize) -> Vec<f64> {
         let mut row = vec![0.0; self.bins];
         let MelBand { first_bin, weights } = &self.bands[band];
-        row[*first_bin..][..weights.len()].copy_from_slice(weights);
+        for (to, &from) in row[*first_bin..].iter_mut().zip(weights) {
+            *to = f64::from(from);
+        }
         row
     }
 
-    /// Power in each band, given the power in each bin, handed to `take(band, power)`.
-    pub(crate) fn apply(&self, power: &[f64], mut take: impl FnMut(usize, f64)) {
+    /// Power in each band of [`LANES`] frames side by side, handed to `take(band, powers)`. Each lane is summed in the order of
+    /// its bins, so that a frame's power does not depend on its neighbours.
+    pub(crate) fn apply(&self, power: &[[f32; LANES]], mut take: impl FnMut(usize, &[f32; LANES])) {
         for (i, band) in self.bands.iter().enumerate() {
-            let bins = &power[band.first_bin..][..band.weights.len()];
-            take(i, bins.iter().zip(&band.weights).map(|(p, w)| p * w).sum());
+            let mut sum = [0.0; LANES];
+            for (bin, &weight) in power[band.first_bin..].iter().zip(&band.weights) {
+                for (sum, &p) in sum.iter_mut().zip(bin) {
+                    *sum += weight * p;
+                }
+            }
+            take(i, &sum);
         }
     }
 }

@@ -52,10 +52,8 @@ impl LogMelStream {
             self.filled += taken;
             rest = later;
             if self.filled == self.frame.len() {
-                let levels = &mut self.levels_db;
-                self.log_mel.band_power(&self.frame, &mut self.scratch, |band, power| levels[band] = power);
-                self.log_mel.to_db(levels);
-                on_frame(levels);
+                self.log_mel.frame_levels(&self.frame, &mut self.scratch, &mut self.levels_db);
+                on_frame(&self.levels_db);
                 let hop = self.log_mel.config().hop;
                 self.frame.copy_within(hop.., 0);
                 self.filled -= hop;

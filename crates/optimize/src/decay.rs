@@ -1,7 +1,11 @@
 //! The slope of a decay curve between two levels, and how it depends on the energy of every time bin.
 
-/// Share of the total energy that is added to every point of the decay curve, so that its level exists everywhere: -100 dB.
-const FLOOR: f64 = 1e-10;
+/// How far below the range the decay curve levels out, in dB: so that it has a level everywhere.
+const FLOOR_DB: f64 = 40.0;
+/// Points in each time bin at which the curve is read.
+const POINTS: usize = 8;
+/// Half the width over which the ends of the range fade, in dB.
+const FADE_DB: f64 = 1.0;
 /// Decibels per neper of energy.
 pub(crate) const DB_PER_NEPER: f64 = 10.0 / std::f64::consts::LN_10;
 
@@ -9,8 +13,8 @@ pub(crate) const DB_PER_NEPER: f64 = 10.0 / std::f64::consts::LN_10;
 /// curve running straight in dB from bin edge to bin edge. `sensitivity` receives its derivative by the energy of each
 /// bin, the motion of both ends of the range included. `None` where there is no energy.
 ///
-/// The line is fitted to the continuous curve, not to its samples: the slope does not jump where an end of the range
-/// passes a sample, and its derivative exists.
+/// ISO 3382 counts a sample of the curve fully or not at all. Here its weight fades from 0 to 1 over 2 dB about either end of
+/// the range, so that the slope does not jump where a sample enters or leaves, and has a derivative.
 pub(crate) fn slope_with_sensitivity(
     energy: &[f64],
     bin_s: f64,
@@ -24,7 +28,8 @@ pub(crate) fn slope_with_sensitivity(
     }
     // Remaining energy and level at the start of each bin, and at the end of the last one, where only the floor is left.
     let edges = energy.len() + 1;
-    let floor = FLOOR * total;
+    let floor_share = 10f64.powf((range_db.1 - FLOOR_DB) / 10.0);
+    let floor = floor_share * total;
     let mut remaining = vec![floor; edges];
     let mut sum = 0.0;
     for (edge, value) in energy.iter().enumerate().rev() {
@@ -34,42 +39,50 @@ pub(crate) fn slope_with_sensitivity(
     let reference = remaining[0].ln();
     let level: Vec<f64> = remaining.iter().map(|r| DB_PER_NEPER * (r.ln() - reference)).collect();
 
-    let start = crossing(&level, range_db.0)?;
-    let end = crossing(&level, range_db.1)?;
-    let (t1, t2) = (start.bin as f64 + start.fraction, end.bin as f64 + end.fraction);
-    let (width, centre) = (t2 - t1, 0.5 * (t1 + t2));
-    if width <= 1e-9 {
+    // The curve never rises: only these bins have points within the range.
+    let first = level.partition_point(|&l| l > range_db.0 + FADE_DB).saturating_sub(1);
+    let last = level.partition_point(|&l| l > range_db.1 - FADE_DB).min(energy.len());
+    let points = || {
+        (first..last).flat_map(|bin| {
+            let (l0, l1) = (level[bin], level[bin + 1]);
+            (0..POINTS).map(move |p| {
+                let fraction = (p as f64 + 0.5) / POINTS as f64;
+                (bin, fraction, l0 + fraction * (l1 - l0))
+            })
+        })
+    };
+
+    // Weighted least squares, times in bins from the first.
+    let (mut sum_w, mut sum_t, mut sum_l) = (0.0, 0.0, 0.0);
+    for (bin, fraction, l) in points() {
+        let (w, _) = weight(l, range_db);
+        sum_w += w;
+        sum_t += w * ((bin - first) as f64 + fraction);
+        sum_l += w * l;
+    }
+    if sum_w <= 0.0 {
         return None;
     }
-
-    // Everything below is in bins; 12/D^3 times the integral of (t - centre) L(t) is the slope of the least-squares line.
-    let scale = 12.0 / (width * width * width);
-    let (mut slope, mut area) = (0.0, 0.0);
-    let by_level = &mut vec![0.0; edges];
-    for bin in start.bin..=end.bin {
-        let from = if bin == start.bin { start.fraction } else { 0.0 };
-        let to = if bin == end.bin { end.fraction } else { 1.0 };
-        // Moments of the two hat functions over the part of the bin inside the range; f runs from 0 to 1 across the bin.
-        let offset = bin as f64 - centre;
-        let f1 = to - from;
-        let f2 = 0.5 * (to * to - from * from);
-        let f3 = (to * to * to - from * from * from) / 3.0;
-        let whole = offset * f1 + f2;
-        let rising = offset * f2 + f3;
-        by_level[bin] += scale * (whole - rising);
-        by_level[bin + 1] += scale * rising;
-        slope += scale * ((whole - rising) * level[bin] + rising * level[bin + 1]);
-        area += (f1 - f2) * level[bin] + f2 * level[bin + 1];
+    let (mean_t, mean_l) = (sum_t / sum_w, sum_l / sum_w);
+    let (mut sum_tt, mut sum_tl) = (0.0, 0.0);
+    for (bin, fraction, l) in points() {
+        let (w, _) = weight(l, range_db);
+        let t = (bin - first) as f64 + fraction - mean_t;
+        sum_tt += w * t * t;
+        sum_tl += w * t * l;
     }
-    let mean = area / width;
-
-    // The ends move: dt = -(change of level at the end) / (local slope of the curve).
-    let by_start = 6.0 / (width * width) * (range_db.0 - mean) + 3.0 * slope / width;
-    let by_end = 6.0 / (width * width) * (range_db.1 - mean) - 3.0 * slope / width;
-    for (end, by_time) in [(&start, by_start), (&end, by_end)] {
-        let local = level[end.bin + 1] - level[end.bin];
-        by_level[end.bin] -= by_time * (1.0 - end.fraction) / local;
-        by_level[end.bin + 1] -= by_time * end.fraction / local;
+    if sum_tt <= 0.0 {
+        return None;
+    }
+    let slope = sum_tl / sum_tt;
+    let by_level = &mut vec![0.0; edges];
+    for (bin, fraction, l) in points() {
+        let (w, by_l) = weight(l, range_db);
+        let t = (bin - first) as f64 + fraction - mean_t;
+        // A point pulls by its level, and by what its weight gains as the level moves, times its distance from the line.
+        let by = (w * t + by_l * t * (l - mean_l - slope * t)) / sum_tt;
+        by_level[bin] += by * (1.0 - fraction);
+        by_level[bin + 1] += by * fraction;
     }
 
     // From levels to remaining energies, from these to the energies of bins; the floor moves with the total.
@@ -78,11 +91,11 @@ pub(crate) fn slope_with_sensitivity(
     let mut by_remaining = vec![0.0; edges];
     for edge in 0..edges {
         by_remaining[edge] = DB_PER_NEPER * by_level[edge] / remaining[edge];
-        by_total += by_remaining[edge] * FLOOR;
+        by_total += by_remaining[edge] * floor_share;
     }
     let of_reference = DB_PER_NEPER * by_reference / remaining[0];
     by_remaining[0] -= of_reference;
-    by_total -= of_reference * FLOOR;
+    by_total -= of_reference * floor_share;
     let mut sum = 0.0;
     for (bin, out) in sensitivity.iter_mut().enumerate() {
         sum += by_remaining[bin];
@@ -91,20 +104,23 @@ pub(crate) fn slope_with_sensitivity(
     Some(slope / bin_s)
 }
 
-/// Where a falling curve passes a level.
-struct Crossing {
-    bin: usize,
-    fraction: f64,
+/// Weight of a point at a level, and its derivative: 1 within the range, fading at either end.
+fn weight(level: f64, range_db: (f64, f64)) -> (f64, f64) {
+    let (upper, by_upper) = step((range_db.0 + FADE_DB - level) / (2.0 * FADE_DB));
+    let (lower, by_lower) = step((level - range_db.1 + FADE_DB) / (2.0 * FADE_DB));
+    (upper * lower, (upper * by_lower - by_upper * lower) / (2.0 * FADE_DB))
 }
 
-fn crossing(level: &[f64], value: f64) -> Option<Crossing> {
-    // The first edge below the value: the curve never rises.
-    let below = level.partition_point(|&l| l >= value);
-    if below == 0 || below == level.len() {
-        return None;
+/// A step from 0 to 1 over 0..1 with two continuous derivatives, and the first of them.
+fn step(x: f64) -> (f64, f64) {
+    if x <= 0.0 {
+        (0.0, 0.0)
+    } else if x >= 1.0 {
+        (1.0, 0.0)
+    } else {
+        let y = 1.0 - x;
+        (x * x * x * (10.0 - 15.0 * x + 6.0 * x * x), 30.0 * x * x * y * y)
     }
-    let bin = below - 1;
-    Some(Crossing { bin, fraction: (level[bin] - value) / (level[bin] - level[below]) })
 }
 
 #[cfg(test)]
@@ -122,7 +138,8 @@ mod tests {
             let energy = exponential(t60_s, (2000.0 * t60_s) as usize);
             let slope =
                 slope_with_sensitivity(&energy, 1e-3, (-5.0, -35.0), &mut vec![0.0; energy.len()]).unwrap();
-            assert!((slope / (-60.0 / t60_s) - 1.0).abs() < 1e-6, "{t60_s} s: {slope}");
+            // The floor 40 dB below the range is what is left.
+            assert!((slope / (-60.0 / t60_s) - 1.0).abs() < 2e-5, "{t60_s} s: {slope}");
         }
     }
 
@@ -151,14 +168,16 @@ mod tests {
         let total: f64 = energy.iter().sum();
         for bin in [0, 1, 7, 50, 199, 240, 300, 500] {
             // Small against what remains from this bin or from the end of the range on, large against rounding.
-            let step = 1e-5 * energy[bin..].iter().sum::<f64>().max(3e-4 * total);
+            let step = 1e-4 * energy[bin..].iter().sum::<f64>().max(3e-4 * total);
             let mut at = |delta: f64| {
                 let mut moved = energy.clone();
                 moved[bin] += delta;
                 slope_with_sensitivity(&moved, 1e-3, (-5.0, -35.0), scratch).unwrap()
             };
-            let difference = (at(step) - at(-step)) / (2.0 * step);
-            let scale = sensitivity[bin].abs().max(1e-9);
+            let mut central = |step: f64| (at(step) - at(-step)) / (2.0 * step);
+            let difference = (4.0 * central(step) - central(2.0 * step)) / 3.0;
+            // The terms of a sensitivity are of the size of the slope over what remains; they may cancel.
+            let scale = 150.0 / energy[bin..].iter().sum::<f64>();
             assert!(
                 (difference - sensitivity[bin]).abs() < 1e-6 * scale,
                 "bin {bin}: {difference} {}",

@@ -78,7 +78,7 @@ pub enum UnreachableReason {
         /// The target, in seconds.
         target_s: f64,
     },
-    /// No energy arrives in the band, or all at once.
+    /// No energy arrives in the band, or all at once: its decay cannot be read.
     NoEnergy,
 }
 
@@ -203,6 +203,14 @@ pub enum Warning {
         /// Fitted absorption less the prior's mean, in standard deviations.
         deviations: f64,
     },
+    /// So few paths carry the decay that T60 is uncertain by more than 3 %: the fit follows their accidents, and other
+    /// rays will decay otherwise, most likely longer.
+    FewPaths {
+        /// Nominal centre of the band, in Hz.
+        band_hz: f64,
+        /// Monte-Carlo standard error of T60, as a share of it.
+        relative_error: f64,
+    },
     /// The paths end so early that the fitted range of the decay is bent: T60 is read short.
     ShortPaths {
         /// Nominal centre of the band, in Hz.
@@ -220,6 +228,11 @@ impl fmt::Display for Warning {
             Self::FarFromPrior { material, band_hz, deviations } => write!(
                 f,
                 "{band_hz} Hz: material {material} had to move {deviations:+.1} standard deviations from its prior"
+            ),
+            Self::FewPaths { band_hz, relative_error } => write!(
+                f,
+                "{band_hz} Hz: the rays leave T60 uncertain by {:.0} %; trace more of them",
+                100.0 * relative_error
             ),
             Self::ShortPaths { band_hz, traced_s, advised_s } => write!(
                 f,

@@ -16,6 +16,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub(crate) const TARGET_RANGE_S: (f64, f64) = (0.02, 20.0);
 /// Name of this work to an observer.
 const STAGE: &str = "fit materials";
+/// Relative Monte-Carlo error of T60 that is worth a warning.
+const FEW_PATHS: f64 = 0.03;
 /// Deviation from a prior that is worth a warning, in standard deviations.
 const FAR_FROM_PRIOR: f64 = 3.0;
 
@@ -155,6 +157,12 @@ impl MaterialFitter {
                     fit.warnings.push(Warning::FarFromPrior { material: k, band_hz, deviations });
                 }
             }
+            if let Ok(t60_s) = &reading {
+                let relative_error = t60_s.standard_error / t60_s.value;
+                if relative_error > FEW_PATHS {
+                    fit.warnings.push(Warning::FewPaths { band_hz, relative_error });
+                }
+            }
             // 15 dB below the range, what is missing bends its lower end by 0.14 dB.
             let reached_s = reading.as_ref().map_or(0.0, |r| r.value);
             let advised_s = (15.0 - self.config.range_db.1) / 60.0 * reached_s;
@@ -175,7 +183,9 @@ impl MaterialFitter {
 
     /// Why the target of a band is not met; `None` where it is.
     fn unreachable(&self, band: &Band<'_>, found: &Fitted, limit_s: f64) -> Option<UnreachableReason> {
-        let Some(residual) = found.residual else { return Some(UnreachableReason::NoEnergy) };
+        let Some(residual) = found.residual.filter(|_| found.t60_s.is_ok()) else {
+            return Some(UnreachableReason::NoEnergy);
+        };
         if residual.abs() <= self.config.target_tolerance {
             return None;
         }

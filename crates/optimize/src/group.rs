@@ -82,11 +82,41 @@ pub(crate) struct Fitted {
     pub t60_s: Reading,
 }
 
+/// What a surface takes of the logarithm of energy: the slope of a decay is nearly linear in it, right up to full absorption.
+fn loss(absorption: f64) -> f64 {
+    -(-absorption).ln_1p()
+}
+
+/// The solver's variable for an absorption: its loss less that of the prior's mean, in units in which a step about the mean
+/// is one standard deviation of absorption.
+#[derive(Clone, Copy)]
+struct Scale {
+    origin: f64,
+    unit: f64,
+}
+
+impl Scale {
+    fn variable(&self, absorption: f64) -> f64 {
+        (loss(absorption) - self.origin) / self.unit
+    }
+
+    fn absorption(&self, variable: f64) -> f64 {
+        -(-(self.origin + self.unit * variable)).exp_m1()
+    }
+
+    /// Derivative of absorption by the variable.
+    fn by_variable(&self, variable: f64) -> f64 {
+        (1.0 - self.absorption(variable)) * self.unit
+    }
+}
+
 /// Passes over the paths before the fit falls back on evaluating all of them in every step.
-const PASSES: usize = 12;
+const PASSES: usize = 16;
+/// Greatest change of a slope that is aimed at in one pass, as a factor: farther off an expansion means little.
+const STRIDE: f64 = 1.6;
 /// Change of any material, in standard deviations of its prior, below which another pass would bring nothing: the error
 /// left is of the order of its square.
-const SETTLED: f64 = 0.03;
+const SETTLED: f64 = 0.02;
 
 /// The most probable materials that meet the targets: minimises half the squared deviations from the priors, in standard
 /// deviations, subject to m/m' = 1, by the method of multipliers (Nocedal and Wright 2006, chapter 17).
@@ -98,6 +128,7 @@ pub(crate) struct Group<'a, 'b> {
     config: &'b FitConfig,
     /// Band and material of each variable; held materials have none.
     free: Vec<(usize, usize)>,
+    scales: Vec<Scale>,
     /// Variables of the same material in neighbouring bands.
     neighbours: Vec<(usize, usize)>,
     lower: Vec<f64>,
@@ -112,15 +143,17 @@ impl<'a, 'b> Group<'a, 'b> {
             .flat_map(|(b, band)| (0..band.mean.len()).map(move |k| (b, k)))
             .filter(|&(b, k)| bands[b].standard_deviation[k] > 0.0)
             .collect();
-        let bounds = |&(b, k): &(usize, usize)| {
-            let (mean, sd) = (bands[b].mean[k], bands[b].standard_deviation[k]);
-            ((config.bounds.0 - mean) / sd, (config.bounds.1 - mean) / sd)
+        let scale = |&(b, k): &(usize, usize)| {
+            let mean = bands[b].mean[k].clamp(config.bounds.0, config.bounds.1);
+            Scale { origin: loss(mean), unit: bands[b].standard_deviation[k] / (1.0 - mean) }
         };
-        let (lower, upper) = free.iter().map(bounds).unzip();
+        let scales: Vec<Scale> = free.iter().map(scale).collect();
+        let lower = scales.iter().map(|s| s.variable(config.bounds.0)).collect();
+        let upper = scales.iter().map(|s| s.variable(config.bounds.1)).collect();
         let at = |b: usize, k: usize| free.iter().position(|&f| f == (b, k));
         let pairs = free.iter().enumerate();
         let neighbours = pairs.filter_map(|(low, &(b, k))| at(b + 1, k).map(|high| (low, high))).collect();
-        Self { bands, config, free, neighbours, lower, upper }
+        Self { bands, config, free, scales, neighbours, lower, upper }
     }
 
     pub fn solve(&self) -> Result<Solution, Error> {
@@ -147,25 +180,38 @@ impl<'a, 'b> Group<'a, 'b> {
         let mut x: Vec<f64> = start.iter().zip(bounds).map(|(x, (l, u))| x.clamp(*l, *u)).collect();
         let mut iterations = 0;
         let mut rounds = Rounds::new(self, self.expand(&x), &x);
+        let mut reach = f64::INFINITY;
+        let (mut relaxation, mut last) = (1.0, vec![0.0; x.len()]);
         for _ in 0..PASSES {
-            let minimum = rounds.solve(&x)?;
+            let at_last = rounds.approach(&x);
+            let minimum = rounds.solve(&x, reach)?;
             iterations += minimum.iterations;
-            let moved = x.iter().zip(&minimum.x).fold(0.0, |w: f64, (a, b)| w.max((a - b).abs()));
-            let expected = rounds.residual(&minimum.x);
-            x = minimum.x;
+            let (before, after) = (self.deviations(&x), self.deviations(&minimum.x));
+            let moved = before.iter().zip(&after).fold(0.0, |w: f64, (a, b)| w.max((a - b).abs()));
+            // Steps that turn back upon themselves are shortened: what the expansion leaves out makes them overshoot.
+            let step: Vec<f64> = x.iter().zip(&minimum.x).map(|(from, to)| to - from).collect();
+            let along: f64 = step.iter().zip(&last).map(|(a, b)| a * b).sum();
+            relaxation = if along < 0.0 { 0.5f64.max(0.6 * relaxation) } else { 1f64.min(1.3 * relaxation) };
+            x.iter_mut().zip(&step).for_each(|(x, s)| *x += relaxation * s);
+            last = step;
+            let expected = rounds.residual(&x);
             rounds.models = self.expand(&x);
             let found = rounds.residual(&x);
             let surprise = expected.iter().zip(&found).fold(0.0, |w: f64, (e, f)| match (e, f) {
                 (Some(e), Some(f)) => w.max((e - f).abs()),
                 _ => w,
             });
-            if moved < SETTLED && surprise < 0.1 * self.config.target_tolerance {
+            if at_last && moved < SETTLED && surprise < 0.1 * self.config.target_tolerance {
                 return Ok(self.solution(&x, rounds.models, iterations));
             }
+            // An expansion that was far off was trusted too far.
+            let stepped = last.iter().fold(0.0, |w: f64, s| w.max(s.abs()));
+            reach = if surprise > 0.1 { 0.5 * stepped } else { 2.0 * reach };
         }
         // The expansion does not settle, where bins hold few paths of very different histories: use the paths themselves.
         rounds.models = self.bands.iter().map(Band::paths).collect();
-        let minimum = rounds.solve(&x)?;
+        rounds.aim.fill(1.0);
+        let minimum = rounds.solve(&x, f64::INFINITY)?;
         rounds.models = self.expand(&minimum.x);
         Ok(self.solution(&minimum.x, rounds.models, iterations + minimum.iterations))
     }
@@ -222,37 +268,44 @@ impl<'a, 'b> Group<'a, 'b> {
             absorption[b] = scaled(0.5 * (low + high));
             found = true;
         }
-        let z = |&(b, k): &(usize, usize)| {
-            (absorption[b][k] - self.bands[b].mean[k]) / self.bands[b].standard_deviation[k]
-        };
-        found.then(|| self.free.iter().map(z).collect())
+        let variable = |(&(b, k), scale): (&(usize, usize), &Scale)| scale.variable(absorption[b][k]);
+        found.then(|| self.free.iter().zip(&self.scales).map(variable).collect())
     }
 
     /// Absorption by band and material.
     fn absorption(&self, x: &[f64]) -> Vec<Vec<f64>> {
         let mut absorption: Vec<Vec<f64>> = self.bands.iter().map(|b| b.mean.clone()).collect();
         let (lower, upper) = self.config.bounds;
-        for (&(b, k), z) in self.free.iter().zip(x) {
-            let band = &self.bands[b];
+        for ((&(b, k), scale), x) in self.free.iter().zip(&self.scales).zip(x) {
             // The bound may be missed by a rounding error.
-            absorption[b][k] = (band.mean[k] + band.standard_deviation[k] * z).clamp(lower, upper);
+            absorption[b][k] = scale.absorption(*x).clamp(lower, upper);
         }
         absorption
     }
 
     fn prior_cost(&self, x: &[f64], gradient: &mut [f64]) -> f64 {
-        let mut cost = 0.0;
-        for (g, z) in gradient.iter_mut().zip(x) {
-            cost += 0.5 * z * z;
-            *g = *z;
-        }
+        let z = self.deviations(x);
+        let mut cost = 0.5 * z.iter().map(|z| z * z).sum::<f64>();
+        gradient.copy_from_slice(&z);
         for &(low, high) in self.neighbours() {
-            let step = x[high] - x[low];
+            let step = z[high] - z[low];
             cost += 0.5 * self.config.smoothness * step * step;
             gradient[high] += self.config.smoothness * step;
             gradient[low] -= self.config.smoothness * step;
         }
+        for (i, g) in gradient.iter_mut().enumerate() {
+            let (b, k) = self.free[i];
+            *g *= self.scales[i].by_variable(x[i]) / self.bands[b].standard_deviation[k];
+        }
         cost
+    }
+
+    /// Deviations of absorption from the priors, in standard deviations.
+    fn deviations(&self, x: &[f64]) -> Vec<f64> {
+        let of = |((&(b, k), scale), x): ((&(usize, usize), &Scale), &f64)| {
+            (scale.absorption(*x) - self.bands[b].mean[k]) / self.bands[b].standard_deviation[k]
+        };
+        self.free.iter().zip(&self.scales).zip(x).map(of).collect()
     }
 
     /// Variables of the same material in neighbouring bands; without smoothness each band is a group of its own.
@@ -277,38 +330,65 @@ struct Rounds<'g, 'a, 'b> {
     models: Vec<Model<'b>>,
     weight: Vec<f64>,
     shift: Vec<f64>,
+    /// Slope that is aimed at, as a multiple of the target's: on the way there, a step of it.
+    aim: Vec<f64>,
 }
 
 impl<'g, 'a, 'b> Rounds<'g, 'a, 'b> {
     fn new(group: &'g Group<'a, 'b>, models: Vec<Model<'b>>, x: &[f64]) -> Self {
         let count = models.len();
-        let mut rounds = Self { group, models, weight: vec![0.0; count], shift: vec![0.0; count] };
-        for (weight, residual) in rounds.weight.iter_mut().zip(group.residuals(&rounds.models, x)) {
-            let square: f64 = residual.map_or(0.0, |(_, g)| g.iter().map(|g| g * g).sum());
+        let mut rounds =
+            Self { group, models, weight: vec![0.0; count], shift: vec![0.0; count], aim: vec![1.0; count] };
+        let residuals = group.residuals(&rounds.models, x);
+        for ((weight, residual), band) in rounds.weight.iter_mut().zip(residuals).zip(group.bands) {
+            // The slope's variance under the prior.
+            let square: f64 = residual.map_or(0.0, |(_, g)| {
+                g.iter().zip(&band.standard_deviation).map(|(g, sd)| (g * sd).powi(2)).sum()
+            });
             *weight = if square > 0.0 { 1.0 / (group.config.prior_weight * square) } else { 0.0 };
         }
         rounds
     }
 
+    /// Aims at most a stride from where the slopes are; whether at the targets themselves.
+    fn approach(&mut self, x: &[f64]) -> bool {
+        let mut at_last = true;
+        for (b, residual) in self.residual(x).into_iter().enumerate() {
+            let now = residual.map_or(1.0, |r| (1.0 + r).max(0.01));
+            let aim = 1f64.clamp(now / STRIDE, now * STRIDE);
+            if aim != self.aim[b] {
+                // What was missing at another aim says nothing here.
+                self.shift[b] = 0.0;
+            }
+            self.aim[b] = aim;
+            at_last &= aim == 1.0 || self.weight[b] == 0.0;
+        }
+        at_last
+    }
+
+    /// m/m' - 1 of each band.
     fn residual(&self, x: &[f64]) -> Vec<Option<f64>> {
         self.group.residuals(&self.models, x).into_iter().map(|r| r.map(|(r, _)| r)).collect()
     }
 
     /// Minimises, shifts the targets by what is missing, and minimises again, until they are met or nothing helps.
-    fn solve(&mut self, start: &[f64]) -> Result<Minimum, Error> {
+    /// No variable moves by more than `reach`.
+    fn solve(&mut self, start: &[f64], reach: f64) -> Result<Minimum, Error> {
         let config = self.group.config;
         // A tenth of the tolerance, so that a target is well met where it can be.
         let enough = 0.1 * config.target_tolerance;
         let mut before = vec![f64::INFINITY; self.models.len()];
         let mut stuck = vec![0; self.models.len()];
         let mut minimum = Minimum { x: start.to_vec(), cost: f64::NAN, iterations: 0 };
+        let lower: Vec<f64> = self.group.lower.iter().zip(start).map(|(l, x)| l.max(x - reach)).collect();
+        let upper: Vec<f64> = self.group.upper.iter().zip(start).map(|(u, x)| u.min(x + reach)).collect();
         for _ in 0..config.max_rounds {
-            let (lower, upper) = (&self.group.lower, &self.group.upper);
-            let next = minimise(&*self, &minimum.x, lower, upper, config.max_iterations)?;
+            let next = minimise(&*self, &minimum.x, &lower, &upper, config.max_iterations)?;
             minimum = Minimum { iterations: minimum.iterations + next.iterations, ..next };
             let mut open = false;
             for (b, residual) in self.residual(&minimum.x).into_iter().enumerate() {
-                let Some(r) = residual.filter(|r| r.abs() > enough && self.weight[b] > 0.0) else { continue };
+                let missing = residual.map(|r| (1.0 + r) / self.aim[b] - 1.0);
+                let Some(r) = missing.filter(|r| r.abs() > enough && self.weight[b] > 0.0) else { continue };
                 stuck[b] += usize::from(r.abs() > 0.9 * before[b]);
                 open |= stuck[b] < 2;
                 let grow = if r.abs() > 0.25 * before[b] { 10.0 } else { 1.0 };
@@ -325,7 +405,7 @@ impl<'g, 'a, 'b> Rounds<'g, 'a, 'b> {
 }
 
 impl Group<'_, '_> {
-    /// Residual of each band and its gradient by the deviations of its materials, in standard deviations.
+    /// Residual of each band and its gradient by the absorption of its materials.
     fn residuals(&self, models: &[Model<'_>], x: &[f64]) -> Vec<Option<(f64, Vec<f64>)>> {
         self.bands
             .par_iter()
@@ -334,10 +414,9 @@ impl Group<'_, '_> {
             .map(|((band, model), absorption)| {
                 let mut gradient = vec![0.0; absorption.len()];
                 let residual = band.residual(model, &absorption, &mut gradient)?;
-                gradient.iter_mut().zip(&band.standard_deviation).for_each(|(g, sd)| *g *= sd);
                 Some((residual, gradient))
             })
-            .collect()
+            .collect::<Vec<_>>()
     }
 }
 
@@ -351,12 +430,16 @@ impl Objective for Rounds<'_, '_, '_> {
         let residuals = self.group.residuals(&self.models, x);
         for (b, residual) in residuals.iter().enumerate() {
             if let Some((r, _)) = residual {
-                cost += 0.5 * self.weight[b] * (r + self.shift[b]).powi(2);
+                let missing = (1.0 + r) / self.aim[b] - 1.0;
+                cost += 0.5 * self.weight[b] * (missing + self.shift[b]).powi(2);
             }
         }
-        for (g, &(b, k)) in gradient.iter_mut().zip(&self.group.free) {
+        for (i, g) in gradient.iter_mut().enumerate() {
+            let (b, k) = self.group.free[i];
             if let Some((r, by)) = &residuals[b] {
-                *g += self.weight[b] * (r + self.shift[b]) * by[k];
+                let missing = (1.0 + r) / self.aim[b] - 1.0;
+                let by = by[k] * self.group.scales[i].by_variable(x[i]) / self.aim[b];
+                *g += self.weight[b] * (missing + self.shift[b]) * by;
             }
         }
         cost

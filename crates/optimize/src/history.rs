@@ -159,10 +159,7 @@ impl History {
         moments.fill(0.0);
         for (bin, out) in energy.iter_mut().enumerate() {
             *out = 0.0;
-            for path in self.starts[bin] as usize..self.starts[bin + 1] as usize {
-                let counts = &self.counts[path * k..(path + 1) * k];
-                let gains = counts.iter().enumerate().map(|(m, &n)| powers[m * stride + usize::from(n)]);
-                let e = gains.fold(f64::from(weights[path]), |e, gain| e * gain);
+            for (e, counts, _) in self.paths(bin, weights, &powers, stride) {
                 *out += e;
                 if !moments.is_empty() {
                     let row = &mut moments[bin * k..(bin + 1) * k];
@@ -171,23 +168,38 @@ impl History {
             }
         }
     }
+
+    /// Energy, hits and batch of each path of a bin.
+    fn paths<'s>(
+        &'s self,
+        bin: usize,
+        weights: &'s [f32],
+        powers: &'s [f64],
+        stride: usize,
+    ) -> impl Iterator<Item = (f64, &'s [u16], u8)> {
+        let range = self.starts[bin] as usize..self.starts[bin + 1] as usize;
+        let k = self.materials;
+        let counts = self.counts[range.start * k..range.end * k].chunks_exact(k);
+        weights[range.clone()].iter().zip(&self.batches[range]).zip(counts).map(
+            move |((weight, batch), counts)| {
+                let gains =
+                    counts.iter().zip(powers.chunks_exact(stride)).map(|(&n, row)| row[usize::from(n)]);
+                (gains.fold(f64::from(*weight), |e, gain| e * gain), counts, *batch)
+            },
+        )
+    }
 }
 
 impl History {
     /// Monte-Carlo variance of a linear functional of the bins' energies, from the scatter between batches of rays.
     pub fn variance(&self, weights: &[f32], absorption: &[f64], functional: &[f64]) -> f64 {
         let (powers, stride) = self.powers(absorption);
-        let k = self.materials;
         let batches = usize::from(PathSet::BATCHES);
         // The last place is for exact paths, which do not scatter.
         let mut parts = vec![0.0; batches + 1];
         for (bin, factor) in functional.iter().enumerate().filter(|(_, f)| **f != 0.0) {
-            for path in self.starts[bin] as usize..self.starts[bin + 1] as usize {
-                let mut e = f64::from(weights[path]);
-                for (m, &n) in self.counts[path * k..(path + 1) * k].iter().enumerate() {
-                    e *= powers[m * stride + usize::from(n)];
-                }
-                parts[usize::from(self.batches[path])] += factor * e;
+            for (e, _, batch) in self.paths(bin, weights, &powers, stride) {
+                parts[usize::from(batch)] += factor * e;
             }
         }
         let parts = &parts[..batches];

@@ -44,6 +44,7 @@ pub(crate) trait SlopeModel: Send + Sync {
 pub struct SlopeEvaluation {
     model: Box<dyn SlopeModel>,
     materials: usize,
+    band_hz: f64,
     target_slope_db_per_s: f64,
 }
 
@@ -93,7 +94,22 @@ impl SlopeEvaluation {
             SlopeObjective::Paper => Box::new(SinglePathSlope::through_mean(&pairs)),
             SlopeObjective::Li2018 => Box::new(SinglePathSlope::through_first(&pairs)),
         };
-        Ok(Self { model, materials: materials.len(), target_slope_db_per_s: -60.0 / target_t60_s })
+        Ok(Self {
+            model,
+            materials: materials.len(),
+            band_hz: bands.nominal_hz(band),
+            target_slope_db_per_s: -60.0 / target_t60_s,
+        })
+    }
+
+    /// Nominal centre of the band, in Hz.
+    pub fn band_hz(&self) -> f64 {
+        self.band_hz
+    }
+
+    /// Slope m' that is wanted, in dB/s.
+    pub fn target_slope_db_per_s(&self) -> f64 {
+        self.target_slope_db_per_s
     }
 
     /// Slope m in dB/s at an absorption of each material, its derivatives going to `gradient`; `None` in a band without energy.

@@ -54,8 +54,11 @@ impl MeshReport {
         let (mut degenerate_triangles, mut duplicate_triangles) = (Vec::new(), Vec::new());
         for (i, triangle) in scene.triangles().iter().enumerate() {
             let [a, b, c] = triangle.vertices.map(|v| welded[v as usize]);
-            if mesh.surfaces.triangles[i].is_degenerate() || a == b || b == c || c == a {
+            if mesh.surfaces.triangles[i].is_degenerate() {
                 degenerate_triangles.push(i);
+            }
+            // A needle along an edge may close it, where it joins three points of a line.
+            if a == b || b == c || c == a {
                 continue;
             }
             let mut corners = [a, b, c];
@@ -92,6 +95,33 @@ impl MeshReport {
     /// Whether every edge joins two triangles.
     pub fn is_closed(&self) -> bool {
         self.open_edges_m.is_empty() && self.crowded_edges_m.is_empty()
+    }
+
+    /// What is worth telling, in words; empty for a sound mesh.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        let at = |edges: &[[[f64; 3]; 2]]| {
+            edges.first().map(|[a, b]| format!(", the longest from {a:?} to {b:?} m")).unwrap_or_default()
+        };
+        if self.escape_rate > 0.0 {
+            warnings.push(format!("{:.3} % of rays between surfaces escape", 100.0 * self.escape_rate));
+        }
+        if !self.open_edges_m.is_empty() {
+            let (count, example) = (self.open_edges_m.len(), at(&self.open_edges_m));
+            warnings.push(format!("{count} edges belong to one triangle only{example}"));
+        }
+        if !self.crowded_edges_m.is_empty() {
+            let (count, example) = (self.crowded_edges_m.len(), at(&self.crowded_edges_m));
+            warnings.push(format!("{count} edges are shared by three or more triangles{example}"));
+        }
+        for (what, list) in
+            [("have no area", &self.degenerate_triangles), ("repeat earlier ones", &self.duplicate_triangles)]
+        {
+            if let Some(first) = list.first() {
+                warnings.push(format!("{} triangles {what}, the first being triangle {first}", list.len()));
+            }
+        }
+        warnings
     }
 
     /// Refuses a mesh through which more than one ray in 1,000 escapes from surface to surface.

@@ -18,8 +18,10 @@ const PULSE_REACH: isize = 32;
 const RINGING_PERIODS: f64 = 8.0;
 /// Fade of the noise at the end of the response, in seconds.
 const FADE_S: f64 = 5e-3;
-/// Rounds of measuring the noise and correcting it.
-const MATCHING_ROUNDS: usize = 4;
+/// Rounds of measuring the noise and correcting it window by window ...
+const WINDOW_ROUNDS: usize = 3;
+/// ... and then as a whole.
+const WHOLE_ROUNDS: usize = 2;
 /// Bandwidth times window: about as many independent values as the window holds.
 const WINDOW_VALUES: f64 = 6.0;
 /// Shortest window in which noise is matched, in seconds.
@@ -131,7 +133,8 @@ impl PressureRenderer {
         let speed_m_s = air.speed_of_sound_m_s();
         let duration_s = self.config.duration_s.unwrap_or(paths.max_length_m() / speed_m_s);
         let rate = f64::from(sample_rate_hz);
-        let samples = ((duration_s * rate).ceil() as usize).max(1);
+        // A millionth of a sample is rounding.
+        let samples = ((duration_s * rate - 1e-6).ceil() as usize).max(1);
         let lowest_hz = materials[0].bands().exact_hz(0);
         let margin = (RINGING_PERIODS / lowest_hz * rate) as usize + PULSE_REACH as usize;
         let stage = Rendering {
@@ -235,8 +238,8 @@ impl Rendering<'_> {
         let mut corrections = vec![vec![1.0; steps]; self.masks.len()];
         let mut noise = self.shaped(&carriers, &envelopes, &corrections);
         if config.statistics == Statistics::DecayMatched {
-            for _ in 0..MATCHING_ROUNDS {
-                self.correct(&noise, &envelopes, &mut corrections);
+            for round in 0..WINDOW_ROUNDS + WHOLE_ROUNDS {
+                self.correct(&noise, &envelopes, &mut corrections, round < WINDOW_ROUNDS);
                 noise = self.shaped(&carriers, &envelopes, &corrections);
             }
         }
@@ -279,8 +282,15 @@ impl Rendering<'_> {
             .collect()
     }
 
-    /// Measures the noise with octave filters and corrects the energy of each band's carrier, window by window.
-    fn correct(&self, noise: &[f64], envelopes: &[EnergyEnvelope], corrections: &mut [Vec<f64>]) {
+    /// Measures the noise with octave filters and corrects the energy of each band's carrier: window by window, or as a
+    /// whole.
+    fn correct(
+        &self,
+        noise: &[f64],
+        envelopes: &[EnergyEnvelope],
+        corrections: &mut [Vec<f64>],
+        by_window: bool,
+    ) {
         let mut padded = vec![0.0; self.margin];
         padded.extend_from_slice(noise);
         let lines = self.spectrum.lines(padded);
@@ -296,6 +306,14 @@ impl Rendering<'_> {
                 .map(|line| self.masks.measuring(band, self.spectrum.frequency_hz(line)).powi(2))
                 .sum::<f64>()
                 / (self.spectrum.length() / 2) as f64;
+            if !by_window {
+                let (wanted, found): (f64, f64) = (envelopes[band].steps.iter().sum(), found.iter().sum());
+                if wanted > 0.0 && found > 0.0 {
+                    let gain = (wanted * passed / found).clamp(1.0 / MOST_CORRECTION, MOST_CORRECTION);
+                    correction.iter_mut().for_each(|g| *g *= gain);
+                }
+                return;
+            }
             let window_s = (WINDOW_VALUES / self.masks.width_hz(band)).max(LEAST_WINDOW_S);
             let reach = (window_s / STEP_S).round() as usize;
             let wanted = moving_mean(&envelopes[band].steps, reach);

@@ -40,3 +40,49 @@ pub(crate) fn lambert(random: &mut impl Rng, normal: Vec3) -> Vec3 {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vector::dot;
+
+    /// Pearson's statistic of counts that are all equally likely.
+    fn chi_squared(counts: &[u32]) -> f64 {
+        let expected = f64::from(counts.iter().sum::<u32>()) / counts.len() as f64;
+        counts.iter().map(|&c| (f64::from(c) - expected).powi(2) / expected).sum()
+    }
+
+    #[test]
+    fn scattered_directions_follow_lambert() {
+        // Under Lambert's law the square of the sine is uniform, and so is the azimuth.
+        let normal = crate::vector::unit([1.0, -2.0, 0.5]);
+        let right = crate::vector::unit(crate::vector::cross(normal, [0.0, 0.0, 1.0]));
+        let up = crate::vector::cross(right, normal);
+        let mut random = generator(3, 0);
+        let mut counts = vec![0u32; 20 * 20];
+        for _ in 0..200_000 {
+            let d = lambert(&mut random, normal);
+            let cosine = dot(d, normal);
+            assert!(cosine >= 0.0);
+            let ring = ((1.0 - cosine * cosine) * 20.0) as usize;
+            let sector = ((dot(d, up).atan2(dot(d, right)) / TAU).rem_euclid(1.0) * 20.0) as usize;
+            counts[ring.min(19) * 20 + sector.min(19)] += 1;
+        }
+        // 399 degrees of freedom: mean 399, standard deviation sqrt(2 x 399) = 28; four of them.
+        let statistic = chi_squared(&counts);
+        assert!((statistic - 399.0).abs() < 4.0 * 28.3, "chi-squared {statistic}");
+    }
+
+    #[test]
+    fn emitted_directions_are_uniform() {
+        let mut counts = vec![0u32; 20 * 20];
+        for ray in 0..200_000 {
+            let [x, y, z] = direction(&mut generator(11, ray));
+            let ring = ((z + 1.0) * 10.0) as usize;
+            let sector = ((y.atan2(x) / TAU).rem_euclid(1.0) * 20.0) as usize;
+            counts[ring.min(19) * 20 + sector.min(19)] += 1;
+        }
+        let statistic = chi_squared(&counts);
+        assert!((statistic - 399.0).abs() < 4.0 * 28.3, "chi-squared {statistic}");
+    }
+}

@@ -91,3 +91,90 @@ impl ReceiverSphere {
         4.0 / 3.0 * std::f64::consts::PI * self.radius_m.powi(3)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh_scene::MeshScene;
+    use crate::random::{direction, generator};
+    use crate::vector::unit;
+    use sabine_acoustics::{Material, OctaveBands, Scene};
+
+    const SIZE_M: Vec3 = [10.0, 7.0, 3.0];
+
+    fn the_box() -> MeshScene {
+        let m = Material::uniform(OctaveBands::T60, 0.1, 0.5).unwrap();
+        MeshScene::new(&Scene::shoebox(SIZE_M, std::array::from_fn(|_| m.clone())).unwrap()).unwrap()
+    }
+
+    /// Follows a ray over `legs` surfaces and returns the length of each leg; panics if the ray is lost.
+    fn follow(
+        scene: &MeshScene,
+        from: Vec3,
+        towards: Vec3,
+        scattering: f64,
+        legs: usize,
+        ray: u64,
+    ) -> Vec<f64> {
+        let mut random = generator(5, ray);
+        let (mut origin, mut heading) = (from, unit(sub(towards, from)));
+        (0..legs)
+            .map(|leg| {
+                let hit = next_hit(scene, origin, &mut heading, &mut random)
+                    .unwrap_or_else(|| panic!("lost after {leg} legs from {origin:?} along {heading:?}"));
+                let surface = &scene.surfaces.triangles[hit.triangle as usize];
+                origin = before_hit(origin, heading, hit.distance);
+                for axis in 0..3 {
+                    assert!(origin[axis] > 0.0 && origin[axis] < SIZE_M[axis], "outside at {origin:?}");
+                }
+                let scattered = random.random::<f64>() < scattering;
+                let reflection = if scattered { Reflection::Scattered } else { Reflection::Specular };
+                heading = reflected(surface, heading, reflection, &mut random);
+                hit.distance
+            })
+            .collect()
+    }
+
+    #[test]
+    fn no_ray_is_lost_in_an_edge_or_a_corner() {
+        let scene = the_box();
+        let from = [2.0, 3.0, 1.5];
+        for corner in 0..8usize {
+            let at: Vec3 = std::array::from_fn(|i| SIZE_M[i] * (corner >> i & 1) as f64);
+            follow(&scene, from, at, 0.0, 200, corner as u64);
+            for axis in 0..3 {
+                for step in 0..=50 {
+                    let mut on_edge = at;
+                    on_edge[axis] = SIZE_M[axis] * f64::from(step) / 50.0;
+                    follow(&scene, from, on_edge, 0.0, 50, 0);
+                    follow(&scene, from, on_edge, 0.5, 50, step as u64);
+                }
+            }
+        }
+        // Along the seams between the two triangles of a wall.
+        for step in 0..=100 {
+            let t = f64::from(step) / 100.0;
+            follow(&scene, from, [t * SIZE_M[0], t * SIZE_M[1], 0.0], 0.0, 50, 0);
+        }
+    }
+
+    #[test]
+    fn the_mean_free_path_of_a_diffuse_room_is_4v_over_s() {
+        let scene = the_box();
+        let (rays, legs) = (400u64, 500);
+        let means: Vec<f64> = (0..rays)
+            .map(|ray| {
+                let mut random = generator(17, ray);
+                let towards = crate::vector::add([5.0, 3.5, 1.5], direction(&mut random));
+                let lengths = follow(&scene, [5.0, 3.5, 1.5], towards, 1.0, legs + 5, ray);
+                lengths[5..].iter().sum::<f64>() / legs as f64
+            })
+            .collect();
+        let mean = means.iter().sum::<f64>() / rays as f64;
+        let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (rays - 1) as f64;
+        let standard_error = (variance / rays as f64).sqrt();
+        let expected = 4.0 * 210.0 / 242.0;
+        assert!((mean - expected).abs() < 4.0 * standard_error, "{mean} +- {standard_error}, not {expected}");
+        assert!(standard_error < 0.005 * expected);
+    }
+}

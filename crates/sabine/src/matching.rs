@@ -3,13 +3,14 @@
 use crate::{Error, Recording, Warning};
 use sabine_acoustics::{
     Air, EnergyDecayCurve, Estimate, FilterBank, ImpulseResponse, Material, MeasuredRoom, Observer,
-    OctaveBands, PathSet, PerBand, Propagator, Reading, RoomEstimator, RoomParameters, RoomTargets, Signal,
+    OctaveBands, PerBand, Propagator, Reading, RoomEstimator, RoomParameters, RoomTargets, Signal,
     equalisation, report, resample,
 };
 use sabine_eqfilter::{AboveBand, EqFilter, EqFilterConfig};
 use sabine_estimator::Estimator;
 use sabine_optimize::{AbsorptionPrior, FitConfig, MaterialFit, MaterialFitter};
 use sabine_propagate::{MeshReport, PathTracer, PressureRenderer, RenderConfig, TracerConfig};
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 /// What to match: a recording, the room it was made in, and the sound to place there.
@@ -97,7 +98,7 @@ pub const DECAY_STEP_S: f64 = 0.005;
 /// Highest magnitude of the matched sound.
 const FULL_SCALE: f32 = 0.95;
 /// How often the fit is corrected by what the rendered response shows.
-const CORRECTIONS: usize = 2;
+const CORRECTIONS: usize = 3;
 /// The rendered response is close enough to its target when every reachable octave is this near.
 const CLOSE: f64 = 0.02;
 /// A reachable target missed by more than this is worth a warning: one just-noticeable difference (ISO 3382-1, Annex A).
@@ -137,9 +138,7 @@ pub fn match_room(
     };
     let source = input.room.source(input.source)?;
     let mesh = MeshReport::inspect(input.room.scene(), source.position_m)?;
-    if !mesh.open_edges_m.is_empty() {
-        warnings.push(Warning::OpenMesh { edges: mesh.open_edges_m.len(), escape_rate: mesh.escape_rate });
-    }
+    warnings.extend(mesh.warnings().into_iter().map(Warning::Mesh));
     match_targets(heard.targets, warnings, clock, &tracer, input, config, observer)
 }
 
@@ -241,6 +240,7 @@ fn match_targets(
         }
     };
     warn_of_misses(targets.t60_s(), &parameters.t30_s, &fit, &mut warnings);
+    warn_of_fit(&fit, room, &mut warnings);
     warnings.extend(fit.unreachable.iter().map(|u| Warning::Unreachable(u.clone())));
     let eq_simulated_db = equalisation(&response, OctaveBands::EQ)?
         .map(|reading| reading.as_ref().map_or(f64::NAN, |estimate| estimate.value));
@@ -316,6 +316,25 @@ fn warn_of_misses(
             }
             Ok(_) => {}
         }
+    }
+}
+
+/// What the fit finds worth knowing, one line for each material.
+fn warn_of_fit(fit: &MaterialFit, room: &MeasuredRoom, warnings: &mut Vec<Warning>) {
+    let mut far: BTreeMap<usize, (Vec<f64>, f64)> = BTreeMap::new();
+    for warning in &fit.warnings {
+        match warning {
+            sabine_optimize::Warning::FarFromPrior { material, band_hz, deviations } => {
+                let (bands_hz, largest) = far.entry(*material).or_default();
+                bands_hz.push(*band_hz);
+                *largest = largest.max(deviations.abs());
+            }
+            other => warnings.push(Warning::Fit(other.clone())),
+        }
+    }
+    for (material, (bands_hz, deviations)) in far {
+        let material = room.scene().materials()[material].name.clone();
+        warnings.push(Warning::FarFromTable { material, bands_hz, deviations });
     }
 }
 

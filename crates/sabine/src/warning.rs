@@ -34,6 +34,22 @@ pub enum Warning {
         /// Sample rate of the estimator in Hz.
         to_hz: u32,
     },
+    /// To meet the targets, a material left what the room file says of it.
+    #[error(
+        "{material}: the fitted absorption is up to {deviations:.0} standard deviations away from the room file's table (at {})",
+        in_hz(bands_hz)
+    )]
+    FarFromTable {
+        /// Name of the material.
+        material: String,
+        /// Nominal octave centres in Hz.
+        bands_hz: Vec<f64>,
+        /// Largest distance, in standard deviations of the table.
+        deviations: f64,
+    },
+    /// What the fit says of the paths.
+    #[error("fit: {0}")]
+    Fit(sabine_optimize::Warning),
     /// A reverberation time that no absorption gives.
     #[error("{0}")]
     Unreachable(Unreachable),
@@ -65,12 +81,12 @@ pub enum Warning {
         /// Greatest gain that is applied, in dB.
         limit_db: f64,
     },
-    /// The mesh is not quite closed.
-    #[error("the room model has {edges} open edges; {:.2} % of the rays escape through them", 100.0 * escape_rate)]
-    OpenMesh {
-        /// Edges with one triangle only.
-        edges: usize,
-        /// Share of rays from the source that meet nothing.
-        escape_rate: f64,
-    },
+    /// The mesh is not quite closed, or not quite clean.
+    #[error("room model: {0}")]
+    Mesh(String),
+}
+
+fn in_hz(bands_hz: &[f64]) -> String {
+    let names: Vec<String> = bands_hz.iter().map(|hz| format!("{hz}")).collect();
+    format!("{} Hz", names.join(", "))
 }

@@ -242,11 +242,16 @@ impl Phonons {
         let mut result = Batch { arrivals: Vec::new(), flown_m: 0.0, reflections: 0, lost: 0 };
         for _ in 0..particles {
             let (mut position, mut direction) = (from, anywhere(&mut random));
+            let mut incoming = direction;
             let (mut energy, mut length, mut first) = (1.0, 0.0, true);
             while length < longest && energy > 1e-12 {
-                let Some((triangle, distance)) =
-                    first_hit(&self.triangles, position, direction, LIFT_OFF_M, f64::INFINITY)
-                else {
+                let mut landing = first_hit(&self.triangles, position, direction, LIFT_OFF_M, f64::INFINITY);
+                if landing.is_none() {
+                    // In an edge, closer to the next wall than the lift-off: start a little way back, inside the room.
+                    position = sub(position, scale(incoming, 10.0 * LIFT_OFF_M));
+                    landing = first_hit(&self.triangles, position, direction, LIFT_OFF_M, f64::INFINITY);
+                }
+                let Some((triangle, distance)) = landing else {
                     result.lost += 1;
                     break;
                 };
@@ -264,6 +269,7 @@ impl Phonons {
                 let (reflected, scattering) = self.surfaces[triangle][band];
                 energy *= reflected;
                 let normal = self.normals[triangle];
+                incoming = direction;
                 let inward = if dot(normal, direction) > 0.0 { scale(normal, -1.0) } else { normal };
                 direction = if random.random::<f64>() < scattering {
                     lambert(&mut random, inward)

@@ -8,6 +8,7 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use sabine_acoustics::{Air, Contribution, PathSet, Reflection};
 
+#[derive(Clone)]
 pub struct Ergodic {
     /// Share of each material in the surface; they sum to 1.
     pub shares: Vec<f64>,
