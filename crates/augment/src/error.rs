@@ -66,6 +66,20 @@ pub enum Error {
         /// Why.
         reason: sabine_acoustics::NoReading,
     },
+    /// A decay too long for the response that may be made, or too short for any octave.
+    #[error(
+        "a reverberation time of {octave_s:.2} s at {centre_hz} Hz does not fit: {least_s} to {most_s} s do"
+    )]
+    T60Unreachable {
+        /// Nominal centre, in Hz.
+        centre_hz: f64,
+        /// What the octave would get, in seconds.
+        octave_s: f64,
+        /// The least that is made, in seconds.
+        least_s: f64,
+        /// The most, in seconds.
+        most_s: f64,
+    },
     /// A filter of this length cannot part an octave from its neighbours that far.
     #[error("the equalisation at {centre_hz} Hz stays {off_db:.1} dB off its target")]
     EqUnreachable {

@@ -147,7 +147,7 @@ impl SyntheticRooms {
         let images = images(&room, rng);
         // Energies of the late part and of a direct sound of amplitude one, both in the colour drawn.
         let (mut late_energy, mut direct_unit) = (0.0, 1e-12);
-        for band in 0..split.bands() {
+        for (band, &band_db) in colour_db.iter().enumerate() {
             let mut track = vec![0.0_f32; samples];
             let step = |t60: f64| (-0.5 * SIXTY_DB / (t60 * rate)).exp() as f32;
             let (fall, slow_fall) =
@@ -169,7 +169,7 @@ impl SyntheticRooms {
                 }
             }
             let spectrum = split.spectrum(&track)?;
-            let gain = 10f32.powf(colour_db[band] as f32 / 20.0);
+            let gain = 10f32.powf(band_db as f32 / 20.0);
             let share = f64::from(split.weights(band).iter().sum::<f32>()) / split.weights(band).len() as f64;
             let coloured = f64::from(gain).powi(2) * share;
             late_energy += track.iter().map(|s| f64::from(s * s)).sum::<f64>() * coloured;

@@ -16,6 +16,10 @@ const NOISE_MARGIN_DB: f64 = 10.0;
 const EFFECTIVE_WIDTH: f64 = 0.8;
 /// Lengthened responses are multiples of this long, in samples.
 const LENGTH_STEP: usize = 2048;
+/// The least reverberation time of an octave that is made, s.
+const LEAST_OCTAVE_S: f64 = 0.03;
+/// The longest one, in lengths of the longest response: 37 dB of it are heard then.
+const MOST_LENGTHS: f64 = 1.6;
 /// Octaves (of eight) in which a decay must be found.
 const LEAST_OCTAVES: usize = 4;
 
@@ -67,7 +71,7 @@ impl T60Augment {
     ///
     /// # Errors
     /// [`Error::NoDirectSound`] and the like for a response that cannot be split, [`Error::NoDecay`] where the decay cannot
-    /// be read.
+    /// be read, [`Error::T60Unreachable`] where an octave would become too long for [`T60Config::longest_s`] or too short.
     pub fn to_s(
         &self,
         response: &ImpulseResponse,
@@ -127,6 +131,13 @@ impl T60Augment {
                 .find_map(|(hz, f)| f.as_ref().err().map(|reason| (hz, reason.clone())))
                 .unwrap_or((1000.0, NoReading::NoDecay));
             return Err(Error::NoDecay { centre_hz, reason });
+        }
+        for (centre_hz, found) in bands.iter_hz().zip(&fits) {
+            let Ok(found) = found else { continue };
+            let (octave_s, most_s) = (found.t60_s().value * factor, MOST_LENGTHS * self.config.longest_s);
+            if !(LEAST_OCTAVE_S..=most_s).contains(&octave_s) {
+                return Err(Error::T60Unreachable { centre_hz, octave_s, least_s: LEAST_OCTAVE_S, most_s });
+            }
         }
         let longest_s = fits.iter().flatten().map(|f| f.t60_s().value).fold(0.0, f64::max) * factor;
         let wanted = ((start_s + longest_s).min(self.config.longest_s) * rate) as usize;

@@ -1,4 +1,5 @@
 //! Does the ratio, or the equalisation, become what was asked for, and does nothing else change?
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
 
 mod material;
 

@@ -1,4 +1,5 @@
 //! Are the rooms that never were plausible?
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
 
 use sabine_augment::{Error, Labels, SyntheticRoomConfig, SyntheticRooms};
 
