@@ -1,5 +1,7 @@
 //! Convolution, offline and block by block, against the plain sum.
 
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
 use proptest::prelude::*;
 use proptest::test_runner::FileFailurePersistence;
 use sabine_eqfilter::{Error, PartitionedConfig, PartitionedConvolver, convolve};

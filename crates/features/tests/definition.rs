@@ -1,5 +1,7 @@
 //! Properties: the fast spectrogram is the defined one, streaming is the same as all at once, the inverse inverts.
 
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
 use ndarray::Array2;
 use proptest::prelude::*;
 use proptest::test_runner::FileFailurePersistence;

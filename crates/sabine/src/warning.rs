@@ -82,7 +82,10 @@ pub enum Warning {
         limit_db: f64,
     },
     /// An equalisation that is hardly heard: what is applied is close to the average of the rooms trained on.
-    #[error("the equalisation at {} is heard with a standard error of {least_db:.0} dB or more: it is mostly the average of the rooms that the network was trained on", in_hz(bands_hz))]
+    #[error(
+        "the equalisation at {} is heard with a standard error of {least_db:.0} dB or more: it is mostly the average of the rooms that the network was trained on",
+        in_hz(bands_hz)
+    )]
     EqUncertain {
         /// Nominal octave centres in Hz.
         bands_hz: Vec<f64>,

@@ -1,5 +1,7 @@
 //! The whole line with an estimator of one's own, so that what is heard is known.
 
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
 use sabine::acoustics::{
     Error, Estimate, MeasuredRoom, NoReading, OctaveBands, PathSet, PerBand, Propagator, RoomEstimator,
     RoomTargets, Signal, equalisation,
