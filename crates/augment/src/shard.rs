@@ -206,6 +206,7 @@ fn kind(reason: &NoReading) -> &'static str {
         NoReading::TooShort { .. } => "too short",
         NoReading::FilterRinging { .. } => "filter ringing",
         NoReading::NoDecay => "no decay",
+        NoReading::Uncertain { .. } => "too uncertain",
         _ => "other",
     }
 }
