@@ -39,7 +39,7 @@ fn octave_gain_db(taps: &[f32], centre_hz: f64, rate_hz: u32) -> f64 {
 }
 
 fn gains(bands: OctaveBands, values: &[f64]) -> PerBand<f64> {
-    PerBand::new(bands, values[..bands.len()].to_vec()).unwrap()
+    PerBand::new(bands, values[..bands.len()].to_vec()).expect("one value for each band")
 }
 
 #[test]

@@ -175,5 +175,5 @@ fn wrong_settings_and_lengths_are_named() {
 }
 
 fn small_scratch() -> sabine_features::LogMelScratch {
-    LogMel::new(LogMelConfig { n_fft: 64, hop: 32, mels: 4, ..Default::default() }).unwrap().scratch()
+    LogMel::new(LogMelConfig { n_fft: 64, hop: 32, mels: 4, ..Default::default() }).expect("valid").scratch()
 }
