@@ -78,4 +78,28 @@ mod tests {
         let found: Vec<f32> = x.to_vec1().unwrap();
         assert!((found[0] - 1.0).abs() < 1e-3 && (found[1] - 0.5).abs() < 1e-3, "{found:?}");
     }
+
+    /// The oracle: candle-nn's own AdamW, which works on tensors and shares no code with the loop above.
+    #[test]
+    fn every_step_is_that_of_candles_adamw() {
+        use candle_nn::{AdamW, Optimizer, ParamsAdamW};
+        let start = || Var::from_vec(vec![0.3f32, -0.2, 0.9, -1.1], 4, &Device::Cpu).unwrap();
+        let target = Tensor::from_vec(vec![0.1f32, 0.5, -0.4, 0.2], 4, &Device::Cpu).unwrap();
+        let (ours, theirs) = (start(), start());
+        let gradients = |x: &Var| (x.as_tensor() - &target).unwrap().sqr().unwrap().sum_all().unwrap().backward().unwrap();
+        let settings =
+            ParamsAdamW { lr: 0.01, beta1: BETA_1, beta2: BETA_2, eps: EPSILON, weight_decay: 0.1 };
+        let mut oracle = AdamW::new(vec![theirs.clone()], settings).unwrap();
+        let mut adam = Adam::default();
+        let variables = BTreeMap::from([("x.weight".to_owned(), ours.clone())]);
+        for step in 0..300 {
+            adam.update(&variables, &gradients(&ours), 0.01, 0.1).unwrap();
+            oracle.step(&gradients(&theirs)).unwrap();
+            let (a, b): (Vec<f32>, Vec<f32>) = (ours.to_vec1().unwrap(), theirs.to_vec1().unwrap());
+            for (a, b) in a.iter().zip(&b) {
+                // Single precision in different order: a few units of the last place for each step.
+                assert!((a - b).abs() < 1e-5, "step {step}: {a} != {b}");
+            }
+        }
+    }
 }

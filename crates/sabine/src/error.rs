@@ -45,9 +45,6 @@ pub enum Error {
     /// The vocabulary, a measure or a file.
     #[error(transparent)]
     Acoustics(#[from] sabine_acoustics::Error),
-    /// The features.
-    #[error(transparent)]
-    Features(#[from] sabine_features::Error),
     /// The equalisation filter.
     #[error(transparent)]
     EqFilter(#[from] sabine_eqfilter::Error),
