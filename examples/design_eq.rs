@@ -80,7 +80,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error + Send + Sync>> {
     let name = |path: &Path| path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let mut out = OutputFolder::create(folder)?;
     out.write(&name(&arguments.out), &encode_wav(&taps, SampleFormat::Float32)?)?;
-    out.write(&name(&svg), plot(&filter).svg()?.as_bytes())?;
+    out.write(&name(&svg), plot(&filter).plain_svg()?.as_bytes())?;
     out.finish()?;
     println!("wrote {} and {}", arguments.out.display(), svg.display());
     Ok(())

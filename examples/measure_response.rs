@@ -3,7 +3,7 @@
 use clap::Parser;
 use sabine::acoustics::{
     BandParameters, Channel, DecayFit, FilterBank, ImpulseResponse, NoReading, OctaveBands, PerBand, Reading,
-    RoomParameters, read_audio, write_atomically,
+    RoomParameters, equalisation, read_audio, write_atomically,
 };
 use sabine_examples::{Chart, Look, OutputFolder, Scale, Series, escape};
 use serde_json::{Value, json};
@@ -66,8 +66,14 @@ fn run(arguments: &Arguments) -> Result<(), Anything> {
         let start = Instant::now();
         let whole = BandParameters::full_band(&response);
         let whole_seconds = start.elapsed().as_secs_f64();
+        let eq_db = equalisation(&response, bands)?;
         print!("{}", table(path, &room, &whole));
+        println!(
+            "eq_db re 1k   {}\n",
+            eq_db.values().iter().map(|e| format!("{:>9}", cell(e))).collect::<String>()
+        );
         let mut result = as_json(path, &room, &whole);
+        result["eq_db"] = eq_db.values().iter().map(|e| e.as_ref().ok().map(|e| e.value)).collect();
         result["seconds"] = json!({ "octaves": octaves_seconds, "full_band": whole_seconds });
         results.push(result);
         if arguments.plots.is_some() {
@@ -273,7 +279,7 @@ fn plot(response: &ImpulseResponse, room: &RoomParameters) -> Result<String, Any
             y + 32,
             PLOT.0,
             PLOT.1 - 40,
-            chart.svg()?
+            chart.plain_svg()?
         );
     }
     page.push_str("</svg>\n");

@@ -32,7 +32,7 @@ pub fn html(
     page.paragraph(&verdict(summary));
     page.warnings(&summary.warnings);
     page.heading("Listen");
-    page.markup("<div class=\"grid\"><section>");
+    page.markup("<div class=\"small\"><section>");
     page.player(&player_wav(input.speech.signal)?, "The recording: what the room sounds like");
     page.markup("</section><section>");
     page.player(&player_wav(input.dry.signal)?, "The dry sound");
@@ -47,7 +47,7 @@ pub fn html(
     page.markup("</section><section>");
     page.heading("Decay of the rendered response");
     page.markup(&decay_chart(&matched.decay, matched.targets.t60_s()).svg()?);
-    page.markup("</section><section>");
+    page.markup("</section></div><div class=\"grid\"><section>");
     page.heading("Spectrogram of the recording");
     page.picture(
         &spectrogram_png(input.speech.signal)?,
@@ -62,8 +62,11 @@ pub fn html(
     page.markup("</section></div>");
     page.heading("Absorption of each material: in the model and as fitted");
     page.markup("<div class=\"small\">");
+    let greatest =
+        summary.materials.values().flat_map(|c| c.before.iter().chain(&c.after)).copied().fold(0.0, f64::max);
+    let top = (5.0 * greatest).ceil().clamp(1.0, 5.0) / 5.0;
     for (name, change) in &summary.materials {
-        let chart = absorption_chart(&summary.bands_hz, change).svg()?;
+        let chart = absorption_chart(&summary.bands_hz, change, top).svg()?;
         page.markup(&format!("<figure><figcaption>{}</figcaption>{chart}</figure>", escape(name)));
     }
     page.markup("</div>");
@@ -194,12 +197,12 @@ fn decay_chart(decay: &PerBand<EnergyDecayCurve>, target_s: &PerBand<Estimate>) 
     }
 }
 
-fn absorption_chart(bands_hz: &[f64], change: &MaterialChange) -> Chart {
+fn absorption_chart(bands_hz: &[f64], change: &MaterialChange, top: f64) -> Chart {
     Chart {
         x_label: String::new(),
         y_label: String::new(),
         x: Scale::Octaves(bands_hz.to_vec()),
-        y: Some((0.0, 1.0)),
+        y: Some((0.0, top)),
         series: vec![
             Series::new("model", Look::Dashed, 0, pairs(bands_hz, &change.before)),
             Series::new("fitted", Look::Dots, 1, pairs(bands_hz, &change.after)),

@@ -91,11 +91,23 @@ impl Series {
 }
 
 impl Chart {
-    /// The chart as one `<svg>` element without a fixed size.
+    /// The chart as one `<svg>` element without a fixed size, for a page: it follows the page into dark mode.
     ///
     /// # Errors
     /// What plotters reports; drawing into memory does not fail by itself.
     pub fn svg(&self) -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
+        self.with_opening(DARK)
+    }
+
+    /// The chart on white, for a file of its own.
+    ///
+    /// # Errors
+    /// As [`Chart::svg`].
+    pub fn plain_svg(&self) -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
+        self.with_opening("<rect width=\"100%\" height=\"100%\" fill=\"white\"/>")
+    }
+
+    fn with_opening(&self, opening: &str) -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
         let mut text = String::new();
         let size = if self.small { SMALL } else { SIZE };
         {
@@ -103,10 +115,10 @@ impl Chart {
             self.draw(&root).map_err(|e| e.to_string())?;
             root.present().map_err(|e| e.to_string())?;
         }
-        let open = format!("<svg width=\"{}\" height=\"{}\"", size.0, size.1);
-        let text = text.replacen(&open, "<svg class=\"chart\" role=\"img\"", 1);
+        let sized = format!("<svg width=\"{}\" height=\"{}\"", size.0, size.1);
+        let text = text.replacen(&sized, "<svg class=\"chart\" role=\"img\"", 1);
         Ok(match text.find('>') {
-            Some(end) => format!("{}{DARK}{}", &text[..=end], &text[end + 1..]),
+            Some(end) => format!("{}{opening}{}", &text[..=end], &text[end + 1..]),
             None => text,
         })
     }

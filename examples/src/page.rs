@@ -7,10 +7,10 @@ const STYLE: &str = ":root{color-scheme:light dark;--ink:#222;--paper:#fff;--lin
 @media (prefers-color-scheme: dark){:root{--ink:#e4e4e4;--paper:#161616;--line:#3a3a3a;--soft:#212121;--warn:#ffc46b;--warnbg:#2c2312}}\
 *{box-sizing:border-box}body{margin:0 auto;max-width:74rem;padding:1rem 1.2rem 3rem;font:16px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper)}\
 h1{font-size:1.7rem;line-height:1.2;margin:.6rem 0 .2rem}h2{font-size:1.15rem;margin:1.6rem 0 .4rem}p{margin:.3rem 0 .8rem;max-width:60rem}\
-.grid{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,26rem),1fr));gap:1rem 2rem}.grid>section,.small>figure{min-width:0}.small{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,14rem),1fr));gap:.6rem 1.2rem}\
+.grid{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,26rem),1fr));gap:1rem 2rem}.grid>section,.small>figure{min-width:0}.small{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,15rem),1fr));gap:.6rem 1.2rem}\
 .scroll{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.92rem}\
 th,td{padding:.25rem .6rem;text-align:right;border-bottom:1px solid var(--line);white-space:nowrap}th:first-child,td:first-child{text-align:left}\
-svg.chart,img{width:100%;height:auto;display:block}img.spectrogram{border:1px solid var(--line);image-rendering:auto}audio{width:100%;margin:.2rem 0 .6rem}\
+svg.chart,img{width:100%;height:auto;display:block}img.spectrogram{border:1px solid var(--line);height:13rem}table{margin-bottom:1rem}audio{width:100%;margin:.2rem 0 .6rem}\
 .warn{border-left:4px solid var(--warn);background:var(--warnbg);padding:.5rem .8rem;margin:.5rem 0}.warn ul{margin:.2rem 0;padding-left:1.2rem}\
 .soft{background:var(--soft);padding:.6rem .8rem}figure{margin:0}figcaption{font-size:.9rem;opacity:.8}";
 

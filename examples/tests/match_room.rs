@@ -1,5 +1,7 @@
 //! The main job as a user runs it: what it writes, and what it says of bad input.
 
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -280,9 +280,11 @@ fn clarity(band: &BandEnergy, limit_s: f64) -> (Reading, Reading) {
         Ok(fit) if limit > band.end => fit.decay_energy_after(limit as f64 * band.step_s, band.step_s),
         _ => band.tail,
     };
-    let late = match positive(late, late_variance, early + late) {
-        Ok(late) => late,
-        Err(reason) => return (Err(reason.clone()), Err(reason)),
+    // Either part may drown in the noise: the late one of a dry response, the early one of a late rise.
+    let total = early.max(0.0) + late.max(0.0);
+    let (early, late) = match (positive(early, early_variance, total), positive(late, late_variance, total)) {
+        (Ok(early), Ok(late)) => (early, late),
+        (Err(reason), _) | (_, Err(reason)) => return (Err(reason.clone()), Err(reason)),
     };
     // Relative variances add up in the logarithm of the ratio.
     let relative = (early_variance / (early * early) + late_variance / (late * late)).sqrt();
@@ -293,10 +295,13 @@ fn clarity(band: &BandEnergy, limit_s: f64) -> (Reading, Reading) {
     )
 }
 
+/// Less than this share of the energy is arithmetic, not sound: no converter has 200 dB of range.
+const LEAST_SHARE: f64 = 1e-20;
+
 /// An energy that stands out of its uncertainty, or how far it sinks below the total.
 fn positive(energy: f64, variance: f64, total: f64) -> Result<f64, NoReading> {
-    let least = 2.0 * variance.sqrt();
-    if energy > least && energy > 0.0 {
+    let least = (2.0 * variance.sqrt()).max(LEAST_SHARE * total);
+    if energy > least {
         return Ok(energy);
     }
     let below_db = |e: f64| if e > 0.0 { 10.0 * (total / e).log10() } else { f64::INFINITY };
@@ -314,6 +319,9 @@ fn centre_time(band: &BandEnergy) -> Reading {
         energy += e - band.noise;
         moment += (e - band.noise) * t;
     }
+    if energy <= 0.0 {
+        return Err(NoReading::NoDecay);
+    }
     let centre_s = moment / energy;
     for (i, &e) in band.energy[band.first..band.end].iter().enumerate() {
         let t = ((i + band.first) as f64 - band.onset as f64) * band.step_s;
@@ -328,6 +336,9 @@ fn direct_to_reverberant(band: &BandEnergy) -> Reading {
     let (total, variance) = band.net(band.first, band.end);
     // What is left when the direct sound is taken out of the pressure: |x - d|^2 = |x|^2 - 2 x d + |d|^2.
     let late = positive(total + band.tail - 2.0 * band.direct_in_all + band.direct, variance, total)?;
+    if band.direct <= 0.0 {
+        return Err(NoReading::NoOnset);
+    }
     Ok(Estimate::new(
         10.0 * (band.direct / late).log10(),
         10.0 / std::f64::consts::LN_10 * variance.sqrt() / late,

@@ -1,5 +1,7 @@
 //! Effects hidden in synthetic energies, and what is found of them.
 
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sabine_acoustics::{EnergyResponse, OctaveBands};

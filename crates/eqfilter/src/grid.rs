@@ -6,7 +6,7 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use sabine_acoustics::OctaveBands;
 use std::sync::Arc;
 
-/// Shape of the Kaiser window on the taps: it halves the resolution of no window at all and leaks 1 % of an amplitude.
+/// Shape of the Kaiser window on the taps: its main lobe is 1.6 times as wide as without a window, its side lobes are 30 dB down.
 const KAISER_BETA: f64 = 4.0;
 
 /// The frequency grid of a plan, and the transforms on it.

@@ -1,5 +1,7 @@
 //! Convolution, offline and block by block, against the plain sum.
 
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
 use proptest::prelude::*;
 use proptest::test_runner::FileFailurePersistence;
 use sabine_eqfilter::{Error, PartitionedConfig, PartitionedConvolver, convolve};
@@ -29,7 +31,7 @@ fn run(convolver: &mut PartitionedConvolver, input: &[f32]) -> Vec<f32> {
     let block = convolver.config().block;
     let mut out = vec![0.0; input.len()];
     for (x, y) in input.chunks_exact(block).zip(out.chunks_exact_mut(block)) {
-        convolver.process_block(x, y).unwrap();
+        convolver.process_block(x, y).expect("whole blocks");
     }
     out
 }

@@ -1,7 +1,7 @@
 //! Training: from a data set to a calibrated model.
 
 use crate::adam::Adam;
-use crate::calibrate::{Score, calibrate, score};
+use crate::calibrate::{Score, calibrate, score, shrink};
 use crate::checkpoint::Checkpoint;
 use crate::config::NetworkConfig;
 use crate::dataset::{Dataset, Partition};
@@ -217,6 +217,7 @@ impl<'a> Trainer<'a> {
             report(observer, &stage, epoch as u64, self.config.epochs as u64)?;
         }
         let mut model = self.model(&state.best);
+        model.parameters = shrink(&model, self.dataset)?;
         model.calibration = calibrate(&model, self.dataset)?;
         Ok(Trained { model, history: state.history, best_epoch: state.best_epoch })
     }

@@ -1,5 +1,7 @@
 //! The pretrained estimator on synthetic recordings, and weights that do not fit.
 
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sabine_acoustics::{RoomEstimator, Signal};

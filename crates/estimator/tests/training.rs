@@ -1,5 +1,7 @@
 //! Training on a small synthetic set: it learns, it is the same however it is run, and it refuses what it must.
 
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
 mod support;
 
 use sabine_acoustics::Error as AcousticsError;

@@ -154,9 +154,11 @@ impl LogMel {
                 self.bin_power(frame, lane, scratch);
             }
             self.bands.apply(&scratch.power, |band, powers| {
-                let levels = powers.map(|power| power_to_db(power, floor));
-                out[band * frames + first..][..lanes].copy_from_slice(&levels[..lanes]);
+                out[band * frames + first..][..lanes].copy_from_slice(&powers[..lanes]);
             });
+        }
+        for value in out {
+            *value = power_to_db(*value, floor);
         }
     }
 

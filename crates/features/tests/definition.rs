@@ -1,5 +1,7 @@
 //! Properties: the fast spectrogram is the defined one, streaming is the same as all at once, the inverse inverts.
 
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
 use ndarray::Array2;
 use proptest::prelude::*;
 use proptest::test_runner::FileFailurePersistence;
@@ -173,5 +175,5 @@ fn wrong_settings_and_lengths_are_named() {
 }
 
 fn small_scratch() -> sabine_features::LogMelScratch {
-    LogMel::new(LogMelConfig { n_fft: 64, hop: 32, mels: 4, ..Default::default() }).unwrap().scratch()
+    LogMel::new(LogMelConfig { n_fft: 64, hop: 32, mels: 4, ..Default::default() }).expect("valid").scratch()
 }

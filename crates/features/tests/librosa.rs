@@ -1,5 +1,7 @@
 //! Levels against librosa's, stored beside the script that made them.
 
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
 use sabine_acoustics::FeatureExtractor;
 use sabine_features::{LogMel, LogMelConfig, NaiveLogMel};
 

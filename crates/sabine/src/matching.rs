@@ -103,6 +103,8 @@ const CORRECTIONS: usize = 3;
 const CLOSE: f64 = 0.02;
 /// A reachable target missed by more than this is worth a warning: one just-noticeable difference (ISO 3382-1, Annex A).
 const MISSED: f64 = 0.05;
+/// Equalisation with a larger standard error says little: rooms differ by about 4 dB in an octave.
+const UNCERTAIN_EQ_DB: f64 = 4.0;
 /// Lowest rate of the matched sound in Hz: the 8 kHz octave ends at 11.2 kHz.
 const LOWEST_RATE_HZ: u32 = 32_000;
 /// Rate that replaces lower ones, in Hz.
@@ -239,6 +241,7 @@ fn match_targets(
             _ => break (fit, response, parameters),
         }
     };
+    warn_of_uncertain_eq(targets.eq_db(), &mut warnings);
     warn_of_misses(targets.t60_s(), &parameters.t30_s, &fit, &mut warnings);
     warn_of_fit(&fit, room, &mut warnings);
     warnings.extend(fit.unreachable.iter().map(|u| Warning::Unreachable(u.clone())));
@@ -298,6 +301,16 @@ fn corrected(
         }
     });
     off.then_some(next)
+}
+
+/// Octaves in which little more than the average of the training rooms is known.
+fn warn_of_uncertain_eq(eq_db: &PerBand<Estimate>, warnings: &mut Vec<Warning>) {
+    let uncertain = || eq_db.iter().filter(|(_, e)| e.standard_error > UNCERTAIN_EQ_DB);
+    let bands_hz: Vec<f64> = uncertain().map(|(hz, _)| hz).collect();
+    if !bands_hz.is_empty() {
+        let least_db = uncertain().map(|(_, e)| e.standard_error).fold(f64::INFINITY, f64::min);
+        warnings.push(Warning::EqUncertain { bands_hz, least_db });
+    }
 }
 
 /// Octaves whose rendered decay is not the one asked for although nothing stands in its way, or cannot be read.

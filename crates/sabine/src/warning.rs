@@ -81,6 +81,17 @@ pub enum Warning {
         /// Greatest gain that is applied, in dB.
         limit_db: f64,
     },
+    /// An equalisation that is hardly heard: what is applied is close to the average of the rooms trained on.
+    #[error(
+        "the equalisation at {} is heard with a standard error of {least_db:.0} dB or more: it is mostly the average of the rooms that the network was trained on",
+        in_hz(bands_hz)
+    )]
+    EqUncertain {
+        /// Nominal octave centres in Hz.
+        bands_hz: Vec<f64>,
+        /// Least standard error among them, in dB.
+        least_db: f64,
+    },
     /// The mesh is not quite closed, or not quite clean.
     #[error("room model: {0}")]
     Mesh(String),
