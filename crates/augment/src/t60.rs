@@ -16,6 +16,8 @@ const NOISE_MARGIN_DB: f64 = 10.0;
 const EFFECTIVE_WIDTH: f64 = 0.8;
 /// Lengthened responses are multiples of this long, in samples.
 const LENGTH_STEP: usize = 2048;
+/// Time after the direct sound at which the fit of the full band begins, s.
+const FULL_BAND_START_S: f64 = 0.002;
 /// The least reverberation time of an octave that is made, s.
 const LEAST_OCTAVE_S: f64 = 0.03;
 /// The longest one, in lengths of the longest response: 37 dB of it are heard then.
@@ -49,7 +51,9 @@ impl Default for T60Config {
 /// single slope, exp(-(t - t0)(tau - tau') / (tau tau')); Bryan 2020). What is added to the response is the difference that
 /// this makes, so that where nothing changes nothing is touched.
 ///
-/// An octave in which no decay can be read takes the factor of the nearest octave that has one, and no noise.
+/// The full band begins at 88 Hz: below, the rumble of a recording would be read. An octave in which no decay can be read
+/// fades with the nearest octave that has one where the decay is shortened, and stays as it is where it is lengthened: its
+/// noise would grow.
 #[derive(Clone, Debug)]
 pub struct T60Augment {
     config: T60Config,
@@ -89,8 +93,16 @@ impl T60Augment {
     pub fn full_band_s(&self, response: &ImpulseResponse) -> Result<f64, Error> {
         let direct = Direct::find(response)?;
         let rate = f64::from(response.sample_rate_hz());
-        let start_s = direct.end as f64 / rate;
-        let fit = fit(response.samples(), rate, start_s, 0.5 * rate)
+        let mut late = response.samples().to_vec();
+        late[..direct.end].fill(0.0);
+        let bank = FilterBank::new(octaves_below(0.5 * rate)?, response.sample_rate_hz())?;
+        let parts = bank.split(&late);
+        let mut full = vec![0.0_f32; late.len()];
+        for part in &parts.values()[1..] {
+            full.iter_mut().zip(part).for_each(|(sum, s)| *sum += s);
+        }
+        let start_s = direct.end as f64 / rate + FULL_BAND_START_S;
+        let fit = fit(&full, rate, start_s, 0.5 * rate)
             .map_err(|reason| Error::NoDecay { centre_hz: 1000.0, reason })?;
         Ok(fit.t60_s().value)
     }
@@ -115,7 +127,7 @@ impl T60Augment {
         late[..direct.end].fill(0.0);
         let parts = bank.split(&late);
         let start_s = direct.end as f64 / rate;
-        let fits: Vec<Result<DecayFit, NoReading>> = (0..bands.len())
+        let mut fits: Vec<Result<DecayFit, NoReading>> = (0..bands.len())
             .map(|band| {
                 let (low_hz, high_hz) = bands.edges_hz(band);
                 let width_hz = EFFECTIVE_WIDTH * (high_hz.min(0.5 * rate) - low_hz);
@@ -132,9 +144,14 @@ impl T60Augment {
                 .unwrap_or((1000.0, NoReading::NoDecay));
             return Err(Error::NoDecay { centre_hz, reason });
         }
+        let most_s = MOST_LENGTHS * self.config.longest_s;
+        // The lowest octave carries no label and is often hum: a decay there that does not fit counts as none.
+        if fits[0].as_ref().is_ok_and(|f| !(LEAST_OCTAVE_S..=most_s).contains(&(f.t60_s().value * factor))) {
+            fits[0] = Err(NoReading::NoDecay);
+        }
         for (centre_hz, found) in bands.iter_hz().zip(&fits) {
             let Ok(found) = found else { continue };
-            let (octave_s, most_s) = (found.t60_s().value * factor, MOST_LENGTHS * self.config.longest_s);
+            let octave_s = found.t60_s().value * factor;
             if !(LEAST_OCTAVE_S..=most_s).contains(&octave_s) {
                 return Err(Error::T60Unreachable { centre_hz, octave_s, least_s: LEAST_OCTAVE_S, most_s });
             }
@@ -157,6 +174,9 @@ impl T60Augment {
                 .filter_map(|other| fits[other].as_ref().ok().map(|f| (band.abs_diff(other), f)))
                 .min_by_key(|(far, _)| *far);
             let Some((_, fit)) = nearest else { continue };
+            if !own && factor > 1.0 {
+                continue;
+            }
             let change = Change::new(fit, factor, self.config.crossfade_s, own);
             change.apply(&parts.values()[band], &noises.values()[band], direct.end, rate, &mut sum);
         }

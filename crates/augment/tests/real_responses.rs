@@ -4,10 +4,11 @@
 mod material;
 
 use material::{quantile, shared_data};
-use sabine_acoustics::ImpulseResponse;
+use sabine_acoustics::{Augment, ImpulseResponse};
 use sabine_augment::{
     EqStatistics, Labels, MeasuredResponse, ResponseCorpus, ResponseFilter, T60Augment, T60Config,
 };
+use std::collections::BTreeMap;
 
 fn corpus() -> Option<ResponseCorpus> {
     let data = shared_data()?;
@@ -114,4 +115,43 @@ fn the_shipped_statistics_are_those_of_the_responses() {
         );
     }
     assert_eq!(fitted.responses(), shipped.responses());
+}
+
+#[test]
+fn most_changes_of_measured_responses_are_granted_and_keep_the_direct_sound_in_front() {
+    let Some(corpus) = corpus() else { return };
+    let chain = sabine_augment::Chain::for_training(16_000).unwrap();
+    let t60 = T60Augment::new(T60Config::default()).unwrap();
+    let (mut granted, mut asked) = (0, 0);
+    for room in corpus.rooms() {
+        let measured = few_of_each(&corpus).into_iter().find(|r| r.room == room).unwrap();
+        let mut reasons = BTreeMap::new();
+        for seed in 0..30 {
+            asked += 1;
+            let outcome = match chain.augment(&measured.response, seed) {
+                Ok(_) => "granted".to_owned(),
+                Err(error) => error.to_string().chars().filter(|c| !c.is_ascii_digit()).collect(),
+            };
+            granted += u32::from(outcome == "granted");
+            *reasons.entry(outcome).or_insert(0) += 1;
+            if let Ok(changed) = t60.augment(&measured.response, seed) {
+                // No late growth: what comes 0.1 s after the largest sample of the recording stays below it.
+                let peak = measured
+                    .response
+                    .samples()
+                    .iter()
+                    .position(|s| s.abs() == measured.response.peak())
+                    .unwrap();
+                let late = changed.samples()[peak + 1600..].iter().fold(0.0_f32, |p, s| p.max(s.abs()));
+                assert!(
+                    late < measured.response.peak(),
+                    "{} seed {seed}: the tail grows to {late}",
+                    measured.path
+                );
+            }
+        }
+        eprintln!("{room}: {reasons:?}");
+    }
+    eprintln!("{granted} of {asked} granted");
+    assert!(granted * 10 > asked * 7, "{granted} of {asked}");
 }
