@@ -86,7 +86,9 @@ mod tests {
         let start = || Var::from_vec(vec![0.3f32, -0.2, 0.9, -1.1], 4, &Device::Cpu).unwrap();
         let target = Tensor::from_vec(vec![0.1f32, 0.5, -0.4, 0.2], 4, &Device::Cpu).unwrap();
         let (ours, theirs) = (start(), start());
-        let gradients = |x: &Var| (x.as_tensor() - &target).unwrap().sqr().unwrap().sum_all().unwrap().backward().unwrap();
+        let gradients = |x: &Var| {
+            (x.as_tensor() - &target).unwrap().sqr().unwrap().sum_all().unwrap().backward().unwrap()
+        };
         let settings =
             ParamsAdamW { lr: 0.01, beta1: BETA_1, beta2: BETA_2, eps: EPSILON, weight_decay: 0.1 };
         let mut oracle = AdamW::new(vec![theirs.clone()], settings).unwrap();
