@@ -1,97 +1,27 @@
 //! Building a data set, shard by shard.
 
 use crate::chain::Chain;
-use crate::clip::{ClipConfig, ClipMaker, ClipScratch};
+use crate::clip::{ClipMaker, ClipScratch};
 use crate::corpus::{
     MeasuredResponse, NoiseCorpus, ResponseCorpus, SpeechCorpus, Utterance, hash_bytes, hash_file,
 };
+use crate::dataset_config::{Built, DatasetConfig, Worker};
 use crate::error::{Error, check};
 use crate::labels::Labels;
 use crate::manifest::{DATASET_FORMAT, Manifest, ShardEntry, read_json, write_json};
 use crate::partition::{Partition, PartitionConfig};
+use crate::plan::{Plan, Sidecar, check_copies, hash_samples};
 use crate::seed::{derive, generator};
 use crate::shard::{LabelStatistics, ShardContent};
-use crate::synthetic::{SyntheticRoomConfig, SyntheticRooms};
+use crate::synthetic::SyntheticRooms;
 use half::f16;
 use rand::Rng;
 use rayon::prelude::*;
 use sabine_acoustics::{Augment, ImpulseResponse, Observer, OctaveBands, report};
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-
-/// What to build.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DatasetConfig {
-    /// Seed of everything.
-    pub seed: u64,
-    /// Clips for training, validation and test. Default 56,500, 19,500 and 18,500 (Tang et al. 2020).
-    pub clips: [usize; 3],
-    /// Clips in a shard, 1 to 65,536. Default 512.
-    pub shard_clips: usize,
-    /// Clips that share a response (with other speech and noise), 1 to 64. Default 4.
-    pub clips_per_response: usize,
-    /// Fraction of the responses that are measured ones, in each partition; the others are simulated. Default 0.3, 0.5, 1:
-    /// the test is real.
-    pub measured_fraction: [f64; 3],
-    /// How clips are made.
-    pub clip: ClipConfig,
-    /// How rooms are simulated.
-    pub synthetic: SyntheticRoomConfig,
-    /// How rooms are dealt out.
-    pub rooms: PartitionConfig,
-    /// How speakers are dealt out.
-    pub speakers: PartitionConfig,
-}
-
-impl Default for DatasetConfig {
-    fn default() -> Self {
-        Self {
-            seed: 1,
-            clips: [56_500, 19_500, 18_500],
-            shard_clips: 512,
-            clips_per_response: 4,
-            measured_fraction: [0.3, 0.5, 1.0],
-            clip: ClipConfig::default(),
-            synthetic: SyntheticRoomConfig::default(),
-            rooms: PartitionConfig::default(),
-            speakers: PartitionConfig::default(),
-        }
-    }
-}
-
-/// Which shards to make: every `of`-th, from the `index`-th (counted from 1).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Worker {
-    /// 1 to `of`.
-    pub index: usize,
-    /// Number of workers.
-    pub of: usize,
-}
-
-impl Default for Worker {
-    /// All of them.
-    fn default() -> Self {
-        Self { index: 1, of: 1 }
-    }
-}
-
-/// What was built.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Built {
-    /// Shards made by this call.
-    pub made: usize,
-    /// Shards found whole and kept.
-    pub kept: usize,
-    /// Shards found damaged and made again.
-    pub mended: usize,
-    /// Augmentations that a response refused; another was drawn each time.
-    pub refused: u64,
-    /// The manifest, if all shards are there.
-    pub manifest: Option<Manifest>,
-}
 
 /// Makes data sets: speech x response x noise -> clips -> shards.
 pub struct DatasetBuilder {
@@ -105,34 +35,6 @@ pub struct DatasetBuilder {
     responses: ResponseCorpus,
     noise: NoiseCorpus,
     refused: AtomicU64,
-}
-
-/// Everything that decides the bytes of the set; kept as `plan.json`, so that a set is resumed with what it was begun.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Plan {
-    format: String,
-    version: String,
-    seed: u64,
-    clips: [usize; 3],
-    shard_clips: usize,
-    clips_per_response: usize,
-    measured_fraction: [f64; 3],
-    clip: ClipConfig,
-    synthetic: String,
-    chain: String,
-    rooms: BTreeMap<String, Partition>,
-    speakers: BTreeMap<String, Partition>,
-    noise: BTreeMap<String, Partition>,
-    /// Hash of the content of each source as it is used.
-    content: BTreeMap<String, String>,
-}
-
-/// Beside each shard: what the manifest needs to know of it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Sidecar {
-    plan_sha256: String,
-    entry: ShardEntry,
-    statistics: LabelStatistics,
 }
 
 /// What became of a shard.
@@ -544,35 +446,4 @@ impl DatasetBuilder {
         }
         Ok(content)
     }
-}
-
-/// The same sound under two names must not come into two partitions.
-fn check_copies(
-    responses: &ResponseCorpus,
-    speech: &SpeechCorpus,
-    rooms: &BTreeMap<String, Partition>,
-    speakers: &BTreeMap<String, Partition>,
-) -> Result<(), Error> {
-    let of_rooms =
-        responses.responses.iter().map(|r| ("room", &r.room, r.response.samples(), rooms.get(&r.room)));
-    let of_speakers = speech
-        .utterances
-        .iter()
-        .map(|u| ("speaker", &u.speaker, &u.speech.samples[..], speakers.get(&u.speaker)));
-    let mut seen: BTreeMap<String, Partition> = BTreeMap::new();
-    for (what, name, samples, partition) in of_rooms.chain(of_speakers) {
-        let Some(&second) = partition else { continue };
-        match seen.insert(hash_samples(samples), second) {
-            Some(first) if first != second => {
-                return Err(Error::Leak { what, name: name.clone(), first, second });
-            }
-            _ => {}
-        }
-    }
-    Ok(())
-}
-
-fn hash_samples(samples: &[f32]) -> String {
-    let bytes: Vec<u8> = samples.iter().flat_map(|s| s.to_le_bytes()).collect();
-    hash_bytes(&bytes)
 }

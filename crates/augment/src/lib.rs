@@ -67,6 +67,7 @@ mod chain;
 mod clip;
 mod corpus;
 mod dataset;
+mod dataset_config;
 mod direct;
 mod drr;
 mod eq;
@@ -76,6 +77,7 @@ mod labels;
 mod manifest;
 mod noise;
 mod partition;
+mod plan;
 mod seed;
 mod shard;
 mod spectral_shape;
@@ -87,7 +89,8 @@ pub use clip::ClipConfig;
 pub use corpus::{
     LeftOut, MeasuredResponse, NoiseCorpus, ResponseCorpus, ResponseFilter, SourceFile, SpeechCorpus,
 };
-pub use dataset::{Built, DatasetBuilder, DatasetConfig, Worker};
+pub use dataset::DatasetBuilder;
+pub use dataset_config::{Built, DatasetConfig, Worker};
 pub use drr::{DrrAugment, DrrConfig};
 pub use eq::{EqAugment, EqConfig};
 pub use eq_statistics::EqStatistics;

@@ -1,0 +1,77 @@
+//! What data set to build, and what came of it.
+
+use crate::clip::ClipConfig;
+use crate::manifest::Manifest;
+use crate::partition::PartitionConfig;
+use crate::synthetic::SyntheticRoomConfig;
+
+/// What to build.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DatasetConfig {
+    /// Seed of everything.
+    pub seed: u64,
+    /// Clips for training, validation and test. Default 56,500, 19,500 and 18,500 (Tang et al. 2020).
+    pub clips: [usize; 3],
+    /// Clips in a shard, 1 to 65,536. Default 512.
+    pub shard_clips: usize,
+    /// Clips that share a response (with other speech and noise), 1 to 64. Default 4.
+    pub clips_per_response: usize,
+    /// Fraction of the responses that are measured ones, in each partition; the others are simulated. Default 0.3, 0.5, 1:
+    /// the test is real.
+    pub measured_fraction: [f64; 3],
+    /// How clips are made.
+    pub clip: ClipConfig,
+    /// How rooms are simulated.
+    pub synthetic: SyntheticRoomConfig,
+    /// How rooms are dealt out.
+    pub rooms: PartitionConfig,
+    /// How speakers are dealt out.
+    pub speakers: PartitionConfig,
+}
+
+impl Default for DatasetConfig {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            clips: [56_500, 19_500, 18_500],
+            shard_clips: 512,
+            clips_per_response: 4,
+            measured_fraction: [0.3, 0.5, 1.0],
+            clip: ClipConfig::default(),
+            synthetic: SyntheticRoomConfig::default(),
+            rooms: PartitionConfig::default(),
+            speakers: PartitionConfig::default(),
+        }
+    }
+}
+
+/// Which shards to make: every `of`-th, from the `index`-th (counted from 1).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Worker {
+    /// 1 to `of`.
+    pub index: usize,
+    /// Number of workers.
+    pub of: usize,
+}
+
+impl Default for Worker {
+    /// All of them.
+    fn default() -> Self {
+        Self { index: 1, of: 1 }
+    }
+}
+
+/// What was built.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Built {
+    /// Shards made by this call.
+    pub made: usize,
+    /// Shards found whole and kept.
+    pub kept: usize,
+    /// Shards found damaged and made again.
+    pub mended: usize,
+    /// Augmentations that a response refused; another was drawn each time.
+    pub refused: u64,
+    /// The manifest, if all shards are there.
+    pub manifest: Option<Manifest>,
+}
