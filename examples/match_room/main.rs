@@ -36,6 +36,9 @@ struct Arguments {
     /// Seed of rays and noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Number of rays to trace [default: 40000]
+    #[arg(long)]
+    rays: Option<usize>,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/match_room")]
     out: PathBuf,
@@ -79,7 +82,10 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error + Send + Sync>> {
         source: &source,
         receiver: &receiver,
     };
-    let config = MatchConfig { seed: arguments.seed, ..MatchConfig::default() };
+    let mut config = MatchConfig { seed: arguments.seed, ..MatchConfig::default() };
+    if let Some(rays) = arguments.rays {
+        config.tracer.rays = rays;
+    }
     let bar = Bar::new();
     let matched = match_room(&input, &config, &bar)?;
     bar.finish();

@@ -50,7 +50,8 @@ impl Default for MatchConfig {
     fn default() -> Self {
         Self {
             seed: 1,
-            tracer: TracerConfig::default(),
+            // Enough that the decay of a living room is uncertain by less than 3 % in every octave.
+            tracer: TracerConfig { rays: 40_000, ..TracerConfig::default() },
             fit: FitConfig::default(),
             duration_factor: 1.25,
             largest_eq_db: 20.0,
