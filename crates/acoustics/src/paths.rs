@@ -19,8 +19,11 @@ pub struct Contribution {
     /// Natural logarithm of the geometric energy weight (1/m2), absorption, scattering and air left out, and divided by the
     /// density with which the tracer samples such a path: a direct path of length d has weight 1/d2.
     pub log_weight: f64,
-    /// Chain of reflections: [`PathSet::DIRECT`] or what [`PathSet::reflect`] returned.
+    /// Chain of reflections from the source on: [`PathSet::DIRECT`] or what [`PathSet::reflect`] returned.
     pub chain: u32,
+    /// Chain of the reflections that follow, listed from the receiver backwards: [`PathSet::DIRECT`] where `chain` is all.
+    /// Tracers that start at both ends join their halves by it, each half being stored once.
+    pub tail: u32,
     /// Unit vector in which the path leaves the source.
     pub departure: [f64; 3],
     /// Unit vector from the receiver towards where the path comes from.
@@ -41,7 +44,9 @@ pub struct Contribution {
 /// let mut paths = PathSet::new(1, 100.0);
 /// let floor = paths.reflect(PathSet::DIRECT, 0, Reflection::Specular);
 /// let up = [0.0, 0.0, 1.0];
-/// paths.push(Contribution { length_m: 5.0, log_weight: -2.0 * 5f64.ln(), chain: floor, departure: up, arrival: up, batch: None });
+/// paths.push(Contribution {
+///     length_m: 5.0, log_weight: -2.0 * 5f64.ln(), chain: floor, tail: PathSet::DIRECT,
+///     departure: up, arrival: up, batch: None });
 /// let hard = Material::uniform(OctaveBands::T60, 0.2, 0.0)?;
 /// let energy = paths.energies(&[hard], &Air::default())?;
 /// // 1/25 of the energy at 1 m, less 20 % in the floor and a little in 5 m of air.
@@ -57,6 +62,7 @@ pub struct PathSet {
     lengths_m: Vec<f32>,
     log_weights: Vec<f32>,
     chains: Vec<u32>,
+    tails: Vec<u32>,
     departures: Vec<u32>,
     arrivals: Vec<u32>,
     batches: Vec<u8>,
@@ -71,7 +77,7 @@ impl PathSet {
     /// Number of independent batches into which a tracer splits its rays, for Monte-Carlo standard errors.
     pub const BATCHES: u8 = 32;
     /// Bytes kept for each contribution; a reflection takes six more, shared by all chains that pass through it.
-    pub const BYTES_PER_CONTRIBUTION: usize = 21;
+    pub const BYTES_PER_CONTRIBUTION: usize = 25;
 
     /// No paths yet, between surfaces of `materials` kinds, all paths up to `max_length_m` being looked for.
     ///
@@ -87,6 +93,7 @@ impl PathSet {
             lengths_m: Vec::new(),
             log_weights: Vec::new(),
             chains: Vec::new(),
+            tails: Vec::new(),
             departures: Vec::new(),
             arrivals: Vec::new(),
             batches: Vec::new(),
@@ -108,13 +115,16 @@ impl PathSet {
     /// Adds a path from source to receiver.
     ///
     /// # Panics
-    /// If its chain does not exist or its batch is not below [`PathSet::BATCHES`].
+    /// If one of its chains does not exist or its batch is not below [`PathSet::BATCHES`].
     pub fn push(&mut self, contribution: Contribution) {
-        assert!((contribution.chain as usize) < self.parents.len(), "unknown chain {}", contribution.chain);
+        for chain in [contribution.chain, contribution.tail] {
+            assert!((chain as usize) < self.parents.len(), "unknown chain {chain}");
+        }
         assert!(contribution.batch.is_none_or(|b| b < Self::BATCHES), "unknown batch");
         self.lengths_m.push(contribution.length_m as f32);
         self.log_weights.push(contribution.log_weight as f32);
         self.chains.push(contribution.chain);
+        self.tails.push(contribution.tail);
         self.departures.push(pack_direction(contribution.departure));
         self.arrivals.push(pack_direction(contribution.arrival));
         self.batches.push(contribution.batch.unwrap_or(EXACT));
@@ -133,6 +143,7 @@ impl PathSet {
         self.lengths_m.extend_from_slice(&other.lengths_m);
         self.log_weights.extend_from_slice(&other.log_weights);
         self.chains.extend(other.chains.iter().map(|&c| shifted(c)));
+        self.tails.extend(other.tails.iter().map(|&c| shifted(c)));
         self.departures.extend_from_slice(&other.departures);
         self.arrivals.extend_from_slice(&other.arrivals);
         self.batches.extend_from_slice(&other.batches);
@@ -168,9 +179,15 @@ impl PathSet {
         &self.log_weights
     }
 
-    /// Chain of each contribution.
+    /// Chain of each contribution from the source on; what the surfaces do to it is what they do along this chain **and**
+    /// along its tail.
     pub fn chains(&self) -> &[u32] {
         &self.chains
+    }
+
+    /// Chain of each contribution from the receiver backwards; see [`Contribution::tail`].
+    pub fn tails(&self) -> &[u32] {
+        &self.tails
     }
 
     /// Number of chains, [`PathSet::DIRECT`] included; a chain's parent has a lower index.
@@ -272,10 +289,12 @@ impl PathSet {
             .map(|band| {
                 let log_gain = self.log_reflectance(materials, band)?;
                 let exponent = exponents.values()[band] as f32;
-                let energy = |((&length, &log_weight), &chain): ((&f32, &f32), &u32)| {
-                    (log_weight + log_gain[chain as usize] - exponent * length).exp()
+                let energy = |(((&length, &log_weight), &chain), &tail): (((&f32, &f32), &u32), &u32)| {
+                    let surfaces = log_gain[chain as usize] + log_gain[tail as usize];
+                    (log_weight + surfaces - exponent * length).exp()
                 };
-                Ok(self.lengths_m.iter().zip(&self.log_weights).zip(&self.chains).map(energy).collect())
+                let columns = self.lengths_m.iter().zip(&self.log_weights).zip(&self.chains).zip(&self.tails);
+                Ok(columns.map(energy).collect())
             })
             .collect()
     }
@@ -365,7 +384,7 @@ mod tests {
     const UP: [f64; 3] = [0.0, 0.0, 1.0];
 
     fn path(length_m: f64, log_weight: f64, chain: u32, batch: Option<u8>) -> Contribution {
-        Contribution { length_m, log_weight, chain, departure: UP, arrival: UP, batch }
+        Contribution { length_m, log_weight, chain, tail: PathSet::DIRECT, departure: UP, arrival: UP, batch }
     }
 
     proptest! {
@@ -395,6 +414,24 @@ mod tests {
         assert!((f64::from(found) / expected - 1.0).abs() < 1e-6);
         assert_eq!(&paths.hit_counts()[ab as usize * 2..], &[1, 1]);
         assert_eq!(paths.last_reflection(ab), Some((a, 1, Reflection::Scattered)));
+    }
+
+    #[test]
+    fn chain_and_tail_both_take_their_share() {
+        let mut left = PathSet::new(2, 100.0);
+        let mut right = left.clone();
+        let out = right.reflect(PathSet::DIRECT, 0, Reflection::Specular);
+        let back = right.reflect(PathSet::DIRECT, 1, Reflection::Scattered);
+        right.push(Contribution { tail: back, ..path(3.0, 0.0, out, None) });
+        left.append(&right);
+        let bands = OctaveBands::new(1000.0, 1000.0).unwrap();
+        let materials =
+            [Material::uniform(bands, 0.5, 0.2).unwrap(), Material::uniform(bands, 0.1, 0.3).unwrap()];
+        let air = Air::default();
+        let in_air = (-3.0 * air.energy_exponent_per_m(bands).values()[0]).exp();
+        let found = left.energies(&materials, &air).unwrap()[0][0];
+        assert!((f64::from(found) / (0.5 * 0.8 * 0.9 * 0.3 * in_air) - 1.0).abs() < 1e-6);
+        assert_eq!((left.chains()[0], left.tails()[0]), (out, back));
     }
 
     #[test]

@@ -48,10 +48,12 @@ impl History {
         let mut counts = Vec::with_capacity(order.len() * materials);
         let mut hits = vec![0u64; materials];
         for &i in &order {
-            let chain = paths.chains()[i as usize] as usize;
-            let row = &by_chain[chain * materials..(chain + 1) * materials];
-            counts.extend_from_slice(row);
-            hits.iter_mut().zip(row).for_each(|(h, &n)| *h += u64::from(n));
+            let row = |chain: u32| &by_chain[chain as usize * materials..][..materials];
+            let (out, back) = (row(paths.chains()[i as usize]), row(paths.tails()[i as usize]));
+            for ((total, n), m) in hits.iter_mut().zip(out).zip(back) {
+                counts.push(n + m);
+                *total += u64::from(n + m);
+            }
         }
         Self {
             materials,
@@ -90,8 +92,8 @@ impl History {
         let exponent = air_exponent_per_m as f32;
         let weight = |&i: &u32| {
             let i = i as usize;
-            let chain = paths.chains()[i] as usize;
-            (paths.log_weights()[i] + scattering[chain] - exponent * paths.lengths_m()[i]).exp()
+            let surfaces = scattering[paths.chains()[i] as usize] + scattering[paths.tails()[i] as usize];
+            (paths.log_weights()[i] + surfaces - exponent * paths.lengths_m()[i]).exp()
         };
         Ok(self.order.iter().map(weight).collect())
     }

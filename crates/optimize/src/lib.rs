@@ -27,7 +27,9 @@
 //!     for hit in 0..114 {
 //!         chain = paths.reflect(chain, 0, Reflection::Specular);
 //!         let length_m = 3.0 * f64::from(hit) + 3.0 * f64::from(ray) / 32.0;
-//!         paths.push(Contribution { length_m, log_weight: 0.0, chain, departure: up, arrival: up, batch: Some(ray) });
+//!         paths.push(Contribution {
+//!             length_m, log_weight: 0.0, chain, tail: PathSet::DIRECT, departure: up, arrival: up, batch: Some(ray),
+//!         });
 //!     }
 //! }
 //! let octaves = OctaveBands::SIMULATION;

@@ -25,7 +25,7 @@ pub(crate) trait SlopeModel: Send + Sync {
 /// let mut paths = PathSet::new(1, 2000.0);
 /// let mut chain = PathSet::DIRECT;
 /// for n in 0..200 {
-///     paths.push(Contribution { length_m: 10.0 * f64::from(n) + 1.0, log_weight: 0.0, chain,
+///     paths.push(Contribution { length_m: 10.0 * f64::from(n) + 1.0, log_weight: 0.0, chain, tail: PathSet::DIRECT,
 ///         departure: [1.0, 0.0, 0.0], arrival: [1.0, 0.0, 0.0], batch: None });
 ///     chain = paths.reflect(chain, 0, Reflection::Specular);
 /// }

@@ -238,6 +238,7 @@ fn a_band_without_energy_is_said_to_have_none() {
         length_m: 1.0,
         log_weight: 0.0,
         chain: PathSet::DIRECT,
+        tail: PathSet::DIRECT,
         departure: up,
         arrival: up,
         batch: None,

@@ -19,6 +19,7 @@ fn paths() -> PathSet {
             length_m: metres_in_10_ms * (n + 1) as f64,
             log_weight: 0.0,
             chain,
+            tail: PathSet::DIRECT,
             departure: up,
             arrival: up,
             batch: None,

@@ -115,7 +115,15 @@ fn decay_times_measured_on_the_response_are_those_of_the_paths() {
 
 fn path(length_m: f64, log_weight: f64, chain: u32, batch: Option<u8>) -> Contribution {
     let ahead = [1.0, 0.0, 0.0];
-    Contribution { length_m, log_weight, chain, departure: ahead, arrival: ahead, batch }
+    Contribution {
+        length_m,
+        log_weight,
+        chain,
+        tail: PathSet::DIRECT,
+        departure: ahead,
+        arrival: ahead,
+        batch,
+    }
 }
 
 /// Sampled paths whose energy decays by 60 dB in 0.5 s, and adds up to one.

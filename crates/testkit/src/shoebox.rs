@@ -227,6 +227,7 @@ impl Propagator for ShoeboxImages {
                 length_m: image.length_m,
                 log_weight: -2.0 * image.length_m.ln(),
                 chain,
+                tail: PathSet::DIRECT,
                 departure: image.departure,
                 arrival: image.arrival,
                 batch: None,

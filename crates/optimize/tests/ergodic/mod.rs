@@ -25,7 +25,15 @@ impl Ergodic {
         let mut paths = PathSet::new(self.shares.len(), length_m);
         let up = [0.0, 0.0, 1.0];
         let push = |paths: &mut PathSet, length_m: f64, log_weight: f64, chain: u32, batch: Option<u8>| {
-            paths.push(Contribution { length_m, log_weight, chain, departure: up, arrival: up, batch });
+            paths.push(Contribution {
+                length_m,
+                log_weight,
+                chain,
+                tail: PathSet::DIRECT,
+                departure: up,
+                arrival: up,
+                batch,
+            });
         };
         push(&mut paths, 1.0, 0.0, PathSet::DIRECT, None);
         for ray in 0..self.rays {

@@ -82,7 +82,10 @@ pub fn batch_energies(
     for i in 0..paths.len() {
         let bin = (f64::from(paths.lengths_m()[i]) / speed_m_s / bin_s) as usize;
         let batch = paths.batch(i).map_or(batches, usize::from);
-        energy[batch][bin] += f64::from(paths.log_weights()[i] + gain[paths.chains()[i] as usize]).exp();
+        energy[batch][bin] += f64::from(
+            paths.log_weights()[i] + gain[paths.chains()[i] as usize] + gain[paths.tails()[i] as usize],
+        )
+        .exp();
     }
     energy
 }
