@@ -76,7 +76,8 @@ impl Default for RenderConfig {
 /// let mut paths = PathSet::new(1, 34.0);
 /// let ahead = [1.0, 0.0, 0.0];
 /// let direct = Contribution {
-///     length_m: 5.0, log_weight: -2.0 * 5f64.ln(), chain: PathSet::DIRECT, tail: PathSet::DIRECT, departure: ahead, arrival: ahead, batch: None,
+///     length_m: 5.0, log_weight: -2.0 * 5f64.ln(), chain: PathSet::DIRECT, tail: PathSet::DIRECT,
+///     departure: ahead, arrival: ahead, batch: None,
 /// };
 /// paths.push(direct);
 /// let wall = Material::uniform(OctaveBands::SIMULATION, 0.1, 0.1)?;
