@@ -1,6 +1,6 @@
 //! Traced paths: the seam between a tracer and everything after it.
 
-use crate::{Air, EnergyResponse, Error, Material, OctaveBands};
+use crate::{Air, Conditions, Directivity, EnergyResponse, Error, Material, OctaveBands, Orientation};
 
 /// What a surface did to a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -278,14 +278,25 @@ impl PathSet {
         Ok(log_gain)
     }
 
-    /// Energy of each contribution in each band of the materials, `[band][contribution]`.
+    /// Energy of each contribution in each band of the materials, `[band][contribution]`, between an omnidirectional source and
+    /// an omnidirectional receiver.
     ///
     /// # Errors
     /// As [`PathSet::log_reflectance`].
     pub fn energies(&self, materials: &[Material], air: &Air) -> Result<Vec<Vec<f32>>, Error> {
+        self.energies_under(&Conditions::new(materials, air))
+    }
+
+    /// Energy of each contribution in each band of the materials, `[band][contribution]`.
+    ///
+    /// # Errors
+    /// As [`PathSet::log_reflectance`]; [`Error::BandMismatch`] for a directivity on other bands than the materials.
+    pub fn energies_under(&self, conditions: &Conditions) -> Result<Vec<Vec<f32>>, Error> {
+        let Conditions { materials, air, .. } = *conditions;
         let bands = self.check_materials(materials)?;
+        conditions.check_bands(bands)?;
         let exponents = air.energy_exponent_per_m(bands);
-        (0..bands.len())
+        let mut energies = (0..bands.len())
             .map(|band| {
                 let log_gain = self.log_reflectance(materials, band)?;
                 let exponent = exponents.values()[band] as f32;
@@ -296,10 +307,18 @@ impl PathSet {
                 let columns = self.lengths_m.iter().zip(&self.log_weights).zip(&self.chains).zip(&self.tails);
                 Ok(columns.map(energy).collect())
             })
-            .collect()
+            .collect::<Result<Vec<Vec<f32>>, Error>>()?;
+        for (ends, directed) in [(&self.departures, conditions.source), (&self.arrivals, conditions.receiver)]
+        {
+            if let Some((directivity, orientation)) = directed {
+                weigh_directions(&mut energies, ends, directivity, &orientation);
+            }
+        }
+        Ok(energies)
     }
 
-    /// Energy in time bins, with Monte-Carlo standard errors from the scatter between batches of rays.
+    /// Energy in time bins between an omnidirectional source and an omnidirectional receiver, with Monte-Carlo standard
+    /// errors from the scatter between batches of rays.
     ///
     /// # Errors
     /// As [`PathSet::log_reflectance`]; [`Error::OutOfRange`] for a bin width that is not positive.
@@ -309,14 +328,26 @@ impl PathSet {
         air: &Air,
         bin_s: f64,
     ) -> Result<EnergyResponse, Error> {
-        let bands = self.check_materials(materials)?;
+        self.energy_response_under(&Conditions::new(materials, air), bin_s)
+    }
+
+    /// Energy in time bins, with Monte-Carlo standard errors from the scatter between batches of rays.
+    ///
+    /// # Errors
+    /// As [`PathSet::energies_under`]; [`Error::OutOfRange`] for a bin width that is not positive.
+    pub fn energy_response_under(
+        &self,
+        conditions: &Conditions,
+        bin_s: f64,
+    ) -> Result<EnergyResponse, Error> {
+        let bands = self.check_materials(conditions.materials)?;
         crate::error::check_range("bin width (s)", bin_s, 1e-6, 10.0, "between 1 us and 10 s")?;
-        let speed = air.speed_of_sound_m_s();
+        let speed = conditions.air.speed_of_sound_m_s();
         let bins = (self.max_length_m / speed / bin_s).ceil() as usize;
         let batches = usize::from(Self::BATCHES);
         let mut energy = Vec::with_capacity(bins * bands.len());
         let mut standard_error = Vec::with_capacity(bins * bands.len());
-        for column in self.energies(materials, air)? {
+        for column in self.energies_under(conditions)? {
             let mut exact = vec![0.0f64; bins];
             let mut sampled = vec![0.0f64; bins * batches];
             for (i, &e) in column.iter().enumerate() {
@@ -349,6 +380,21 @@ impl PathSet {
         match materials.iter().find(|m| m.bands() != bands) {
             Some(other) => Err(Error::BandMismatch { left: bands, right: other.bands() }),
             None => Ok(bands),
+        }
+    }
+}
+
+/// Multiplies energies by the gains of a directivity in packed directions.
+fn weigh_directions(
+    energies: &mut [Vec<f32>],
+    directions: &[u32],
+    directivity: &Directivity,
+    orientation: &Orientation,
+) {
+    for (i, &packed) in directions.iter().enumerate() {
+        let place = directivity.place(orientation.to_local(unpack_direction(packed)));
+        for (band, column) in energies.iter_mut().enumerate() {
+            column[i] *= directivity.gain_at(place, band) as f32;
         }
     }
 }
