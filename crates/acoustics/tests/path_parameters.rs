@@ -27,7 +27,10 @@ fn path(length_m: f64, energy: f64, batch: Option<u8>) -> Contribution {
 /// Direct sound of energy 0.01 and reverberation of energy 0.05, thrown at random times with random strengths.
 fn thrown(seed: u64, count: u32, speed_m_s: f64) -> PathSet {
     let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
-    (0..20).for_each(|_| drop(random.uniform()));
+    // The first numbers of small seeds are small.
+    for _ in 0..20 {
+        random.uniform();
+    }
     let duration_s = 1.0;
     let mut paths = PathSet::new(1, (0.02 + duration_s) * speed_m_s);
     paths.push(path(0.02 * speed_m_s, 0.01, None));
@@ -153,5 +156,5 @@ fn short_traces_say_what_is_missing() {
     direct.push(path(2.0, 0.25, None));
     let dry = PathParameters::read(&direct, &Conditions::new(&black, &air)).unwrap();
     assert!(matches!(dry.c80_db.values()[0], Err(NoReading::DynamicRange { .. })));
-    assert!(matches!(dry.t30_s.values()[0], Err(_)));
+    assert!(dry.t30_s.values()[0].is_err());
 }

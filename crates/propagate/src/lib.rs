@@ -66,8 +66,11 @@
 //! Vorlaender 2008, Auralization (scattering, spherical receivers); Veach 1997 (connections, balance heuristic);
 //! Wilkie et al. 2014 (hero sampling); Savioja and Svensson 2015, JASA 138(2) (overview of geometric room acoustics).
 
+mod ambisonic_renderer;
+mod ambisonic_response;
 mod band_masks;
 mod brute_force_scene;
+mod direction_cells;
 mod energy_envelope;
 mod error;
 mod event_mixture;
@@ -77,13 +80,18 @@ mod mesh_scene;
 mod path_tracer;
 mod placement;
 mod pressure_renderer;
+mod pulse;
 mod random;
 mod reference_tracer;
+mod rendering;
 mod spectrum;
+mod spherical_harmonics;
 mod surfaces;
 mod vector;
 mod walk;
 
+pub use ambisonic_renderer::AmbisonicRenderer;
+pub use ambisonic_response::AmbisonicResponse;
 pub use brute_force_scene::BruteForceScene;
 pub use error::Error;
 pub use mesh_report::MeshReport;
@@ -91,3 +99,4 @@ pub use mesh_scene::MeshScene;
 pub use path_tracer::{PathTracer, TracerConfig};
 pub use pressure_renderer::{PressureRenderer, RenderConfig, Statistics};
 pub use reference_tracer::ReferenceTracer;
+pub use spherical_harmonics::ambisonic_gains;
