@@ -149,6 +149,88 @@ impl PathSet {
         self.batches.extend_from_slice(&other.batches);
     }
 
+    /// Appends the sampled paths of another set between the same surfaces as they would be had the source and the receiver moved
+    /// by these displacements (m): to first order, a path grows by what its ends move against the directions in which it
+    /// leaves and comes. None gets shorter than `least_length_m`, the distance of the new places. Each brings `share` of
+    /// its energy; exact paths stay behind, for they can be found anew.
+    ///
+    /// # Panics
+    /// If the sets have different numbers of materials.
+    pub fn append_displaced(
+        &mut self,
+        other: &PathSet,
+        [source_m, receiver_m]: [[f64; 3]; 2],
+        least_length_m: f64,
+        share: f64,
+    ) {
+        let mut sampled = other.clone();
+        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        for i in 0..sampled.len() {
+            let shorter_m = dot(source_m, other.departure(i)) + dot(receiver_m, other.arrival(i));
+            let length_m = f64::from(sampled.lengths_m[i]) - shorter_m;
+            sampled.lengths_m[i] = length_m.max(least_length_m) as f32;
+            sampled.log_weights[i] += share.ln() as f32;
+        }
+        sampled.retain(|batch| batch != EXACT);
+        self.append(&sampled);
+    }
+
+    /// Appends the exact paths of another set between the same surfaces.
+    ///
+    /// # Panics
+    /// If the sets have different numbers of materials.
+    pub fn append_exact(&mut self, other: &PathSet) {
+        let mut exact = other.clone();
+        exact.retain(|batch| batch == EXACT);
+        self.append(&exact);
+    }
+
+    /// Keeps the contributions of some batches, and the chains that they need.
+    fn retain(&mut self, keep: impl Fn(u8) -> bool) {
+        fn of<T>(column: &mut Vec<T>, kept: &[bool]) {
+            let mut marks = kept.iter();
+            column.retain(|_| marks.next() == Some(&true));
+        }
+        let kept: Vec<bool> = self.batches.iter().map(|&batch| keep(batch)).collect();
+        of(&mut self.lengths_m, &kept);
+        of(&mut self.log_weights, &kept);
+        of(&mut self.chains, &kept);
+        of(&mut self.tails, &kept);
+        of(&mut self.departures, &kept);
+        of(&mut self.arrivals, &kept);
+        of(&mut self.batches, &kept);
+        self.prune_chains();
+    }
+
+    /// Drops the chains that no contribution passes through.
+    fn prune_chains(&mut self) {
+        let mut needed = vec![false; self.parents.len()];
+        needed[Self::DIRECT as usize] = true;
+        for &chain in self.chains.iter().chain(&self.tails) {
+            needed[chain as usize] = true;
+        }
+        for chain in (1..needed.len()).rev() {
+            if needed[chain] {
+                needed[self.parents[chain] as usize] = true;
+            }
+        }
+        let mut renamed = vec![Self::DIRECT; needed.len()];
+        let mut count = 0;
+        for chain in 0..needed.len() {
+            if needed[chain] {
+                renamed[chain] = count as u32;
+                self.parents[count] = renamed[self.parents[chain] as usize];
+                self.events[count] = self.events[chain];
+                count += 1;
+            }
+        }
+        self.parents.truncate(count);
+        self.events.truncate(count);
+        for chain in self.chains.iter_mut().chain(&mut self.tails) {
+            *chain = renamed[*chain as usize];
+        }
+    }
+
     /// Number of contributions.
     pub fn len(&self) -> usize {
         self.lengths_m.len()
@@ -505,6 +587,23 @@ mod tests {
         let counts = left.hit_counts();
         let of = |i: usize| &counts[left.chains()[i] as usize * 2..][..2];
         assert_eq!((of(0), of(1), of(2)), (&[1, 0][..], &[0, 2][..], &[0, 0][..]));
+    }
+
+    #[test]
+    fn displaced_paths_change_their_length_and_share() {
+        let mut frame = PathSet::new(1, 100.0);
+        let early = frame.reflect(PathSet::DIRECT, 0, Reflection::Specular);
+        let hit = frame.reflect(PathSet::DIRECT, 0, Reflection::Scattered);
+        frame.push(path(10.0, 0.0, early, None));
+        frame.push(path(20.0, 0.0, hit, Some(3)));
+        frame.push(path(4.0, 0.0, hit, Some(4)));
+        let mut now = PathSet::new(1, 100.0);
+        // All paths leave and come from above: the source rises by 1 m towards them, the receiver sinks by 0.25 m.
+        now.append_displaced(&frame, [[0.0, 0.0, 1.0], [0.3, 0.0, -0.25]], 3.5, 0.5);
+        assert_eq!((now.len(), now.batch(0), now.chains()[1]), (2, Some(3), 1));
+        assert_eq!(now.last_reflection(1), frame.last_reflection(hit));
+        assert!((now.lengths_m()[0] - 19.25).abs() < 1e-5 && now.lengths_m()[1] == 3.5);
+        assert!((now.log_weights()[0] - 0.5f32.ln()).abs() < 1e-6);
     }
 
     #[test]
