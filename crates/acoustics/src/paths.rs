@@ -1,6 +1,6 @@
 //! Traced paths: the seam between a tracer and everything after it.
 
-use crate::{Air, EnergyResponse, Error, Material, OctaveBands};
+use crate::{Air, Conditions, Directivity, EnergyResponse, Error, Material, OctaveBands, Orientation};
 
 /// What a surface did to a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -149,6 +149,88 @@ impl PathSet {
         self.batches.extend_from_slice(&other.batches);
     }
 
+    /// Appends the sampled paths of another set between the same surfaces as they would be had the source and the receiver moved
+    /// by these displacements (m): to first order, a path grows by what its ends move against the directions in which it
+    /// leaves and comes. None gets shorter than `least_length_m`, the distance of the new places. Each brings `share` of
+    /// its energy; exact paths stay behind, for they can be found anew.
+    ///
+    /// # Panics
+    /// If the sets have different numbers of materials.
+    pub fn append_displaced(
+        &mut self,
+        other: &PathSet,
+        [source_m, receiver_m]: [[f64; 3]; 2],
+        least_length_m: f64,
+        share: f64,
+    ) {
+        let mut sampled = other.clone();
+        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        for i in 0..sampled.len() {
+            let shorter_m = dot(source_m, other.departure(i)) + dot(receiver_m, other.arrival(i));
+            let length_m = f64::from(sampled.lengths_m[i]) - shorter_m;
+            sampled.lengths_m[i] = length_m.max(least_length_m) as f32;
+            sampled.log_weights[i] += share.ln() as f32;
+        }
+        sampled.retain(|batch| batch != EXACT);
+        self.append(&sampled);
+    }
+
+    /// Appends the exact paths of another set between the same surfaces.
+    ///
+    /// # Panics
+    /// If the sets have different numbers of materials.
+    pub fn append_exact(&mut self, other: &PathSet) {
+        let mut exact = other.clone();
+        exact.retain(|batch| batch == EXACT);
+        self.append(&exact);
+    }
+
+    /// Keeps the contributions of some batches, and the chains that they need.
+    fn retain(&mut self, keep: impl Fn(u8) -> bool) {
+        fn of<T>(column: &mut Vec<T>, kept: &[bool]) {
+            let mut marks = kept.iter();
+            column.retain(|_| marks.next() == Some(&true));
+        }
+        let kept: Vec<bool> = self.batches.iter().map(|&batch| keep(batch)).collect();
+        of(&mut self.lengths_m, &kept);
+        of(&mut self.log_weights, &kept);
+        of(&mut self.chains, &kept);
+        of(&mut self.tails, &kept);
+        of(&mut self.departures, &kept);
+        of(&mut self.arrivals, &kept);
+        of(&mut self.batches, &kept);
+        self.prune_chains();
+    }
+
+    /// Drops the chains that no contribution passes through.
+    fn prune_chains(&mut self) {
+        let mut needed = vec![false; self.parents.len()];
+        needed[Self::DIRECT as usize] = true;
+        for &chain in self.chains.iter().chain(&self.tails) {
+            needed[chain as usize] = true;
+        }
+        for chain in (1..needed.len()).rev() {
+            if needed[chain] {
+                needed[self.parents[chain] as usize] = true;
+            }
+        }
+        let mut renamed = vec![Self::DIRECT; needed.len()];
+        let mut count = 0;
+        for chain in 0..needed.len() {
+            if needed[chain] {
+                renamed[chain] = count as u32;
+                self.parents[count] = renamed[self.parents[chain] as usize];
+                self.events[count] = self.events[chain];
+                count += 1;
+            }
+        }
+        self.parents.truncate(count);
+        self.events.truncate(count);
+        for chain in self.chains.iter_mut().chain(&mut self.tails) {
+            *chain = renamed[*chain as usize];
+        }
+    }
+
     /// Number of contributions.
     pub fn len(&self) -> usize {
         self.lengths_m.len()
@@ -286,14 +368,25 @@ impl PathSet {
         Ok(log_gain)
     }
 
-    /// Energy of each contribution in each band of the materials, `[band][contribution]`.
+    /// Energy of each contribution in each band of the materials, `[band][contribution]`, between an omnidirectional source and
+    /// an omnidirectional receiver.
     ///
     /// # Errors
     /// As [`PathSet::log_reflectance`].
     pub fn energies(&self, materials: &[Material], air: &Air) -> Result<Vec<Vec<f32>>, Error> {
+        self.energies_under(&Conditions::new(materials, air))
+    }
+
+    /// Energy of each contribution in each band of the materials, `[band][contribution]`.
+    ///
+    /// # Errors
+    /// As [`PathSet::log_reflectance`]; [`Error::BandMismatch`] for a directivity on other bands than the materials.
+    pub fn energies_under(&self, conditions: &Conditions) -> Result<Vec<Vec<f32>>, Error> {
+        let Conditions { materials, air, .. } = *conditions;
         let bands = self.check_materials(materials)?;
+        conditions.check_bands(bands)?;
         let exponents = air.energy_exponent_per_m(bands);
-        (0..bands.len())
+        let mut energies = (0..bands.len())
             .map(|band| {
                 let log_gain = self.log_reflectance(materials, band)?;
                 let exponent = exponents.values()[band] as f32;
@@ -304,10 +397,18 @@ impl PathSet {
                 let columns = self.lengths_m.iter().zip(&self.log_weights).zip(&self.chains).zip(&self.tails);
                 Ok(columns.map(energy).collect())
             })
-            .collect()
+            .collect::<Result<Vec<Vec<f32>>, Error>>()?;
+        for (ends, directed) in [(&self.departures, conditions.source), (&self.arrivals, conditions.receiver)]
+        {
+            if let Some((directivity, orientation)) = directed {
+                weigh_directions(&mut energies, ends, directivity, &orientation);
+            }
+        }
+        Ok(energies)
     }
 
-    /// Energy in time bins, with Monte-Carlo standard errors from the scatter between batches of rays.
+    /// Energy in time bins between an omnidirectional source and an omnidirectional receiver, with Monte-Carlo standard
+    /// errors from the scatter between batches of rays.
     ///
     /// # Errors
     /// As [`PathSet::log_reflectance`]; [`Error::OutOfRange`] for a bin width that is not positive.
@@ -317,14 +418,26 @@ impl PathSet {
         air: &Air,
         bin_s: f64,
     ) -> Result<EnergyResponse, Error> {
-        let bands = self.check_materials(materials)?;
+        self.energy_response_under(&Conditions::new(materials, air), bin_s)
+    }
+
+    /// Energy in time bins, with Monte-Carlo standard errors from the scatter between batches of rays.
+    ///
+    /// # Errors
+    /// As [`PathSet::energies_under`]; [`Error::OutOfRange`] for a bin width that is not positive.
+    pub fn energy_response_under(
+        &self,
+        conditions: &Conditions,
+        bin_s: f64,
+    ) -> Result<EnergyResponse, Error> {
+        let bands = self.check_materials(conditions.materials)?;
         crate::error::check_range("bin width (s)", bin_s, 1e-6, 10.0, "between 1 us and 10 s")?;
-        let speed = air.speed_of_sound_m_s();
+        let speed = conditions.air.speed_of_sound_m_s();
         let bins = (self.max_length_m / speed / bin_s).ceil() as usize;
         let batches = usize::from(Self::BATCHES);
         let mut energy = Vec::with_capacity(bins * bands.len());
         let mut standard_error = Vec::with_capacity(bins * bands.len());
-        for column in self.energies(materials, air)? {
+        for column in self.energies_under(conditions)? {
             let mut exact = vec![0.0f64; bins];
             let mut sampled = vec![0.0f64; bins * batches];
             for (i, &e) in column.iter().enumerate() {
@@ -357,6 +470,21 @@ impl PathSet {
         match materials.iter().find(|m| m.bands() != bands) {
             Some(other) => Err(Error::BandMismatch { left: bands, right: other.bands() }),
             None => Ok(bands),
+        }
+    }
+}
+
+/// Multiplies energies by the gains of a directivity in packed directions.
+fn weigh_directions(
+    energies: &mut [Vec<f32>],
+    directions: &[u32],
+    directivity: &Directivity,
+    orientation: &Orientation,
+) {
+    for (i, &packed) in directions.iter().enumerate() {
+        let place = directivity.place(orientation.to_local(unpack_direction(packed)));
+        for (band, column) in energies.iter_mut().enumerate() {
+            column[i] *= directivity.gain_at(place, band) as f32;
         }
     }
 }
@@ -467,6 +595,23 @@ mod tests {
         let counts = left.hit_counts();
         let of = |i: usize| &counts[left.chains()[i] as usize * 2..][..2];
         assert_eq!((of(0), of(1), of(2)), (&[1, 0][..], &[0, 2][..], &[0, 0][..]));
+    }
+
+    #[test]
+    fn displaced_paths_change_their_length_and_share() {
+        let mut frame = PathSet::new(1, 100.0);
+        let early = frame.reflect(PathSet::DIRECT, 0, Reflection::Specular);
+        let hit = frame.reflect(PathSet::DIRECT, 0, Reflection::Scattered);
+        frame.push(path(10.0, 0.0, early, None));
+        frame.push(path(20.0, 0.0, hit, Some(3)));
+        frame.push(path(4.0, 0.0, hit, Some(4)));
+        let mut now = PathSet::new(1, 100.0);
+        // All paths leave and come from above: the source rises by 1 m towards them, the receiver sinks by 0.25 m.
+        now.append_displaced(&frame, [[0.0, 0.0, 1.0], [0.3, 0.0, -0.25]], 3.5, 0.5);
+        assert_eq!((now.len(), now.batch(0), now.chains()[1]), (2, Some(3), 1));
+        assert_eq!(now.last_reflection(1), frame.last_reflection(hit));
+        assert!((now.lengths_m()[0] - 19.25).abs() < 1e-5 && now.lengths_m()[1] == 3.5);
+        assert!((now.log_weights()[0] - 0.5f32.ln()).abs() < 1e-6);
     }
 
     #[test]

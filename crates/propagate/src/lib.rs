@@ -69,8 +69,11 @@
 //! (bidirectional tracing of sound); Georgiev et al. 2012, ACM Transactions on Graphics 31(6) (connections and meetings united);
 //! Wilkie et al. 2014 (hero sampling); Savioja and Svensson 2015, JASA 138(2) (overview of geometric room acoustics).
 
+mod ambisonic_renderer;
+mod ambisonic_response;
 mod band_masks;
 mod brute_force_scene;
+mod direction_cells;
 mod energy_envelope;
 mod error;
 mod event_mixture;
@@ -78,23 +81,31 @@ mod image_sources;
 mod joining;
 mod mesh_report;
 mod mesh_scene;
+mod moving_tracer;
 mod patches;
 mod path_tracer;
 mod placement;
 mod pressure_renderer;
+mod pulse;
 mod random;
 mod reference_tracer;
+mod rendering;
 mod spectrum;
+mod spherical_harmonics;
 mod surfaces;
 mod techniques;
 mod tracing;
 mod vector;
 mod walk;
 
+pub use ambisonic_renderer::AmbisonicRenderer;
+pub use ambisonic_response::AmbisonicResponse;
 pub use brute_force_scene::BruteForceScene;
 pub use error::Error;
 pub use mesh_report::MeshReport;
 pub use mesh_scene::MeshScene;
+pub use moving_tracer::{Frame, MovingConfig, MovingTracer};
 pub use path_tracer::{PathTracer, TracerConfig};
 pub use pressure_renderer::{PressureRenderer, RenderConfig, Statistics};
 pub use reference_tracer::ReferenceTracer;
+pub use spherical_harmonics::ambisonic_gains;
