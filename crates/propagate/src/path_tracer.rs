@@ -31,6 +31,8 @@ pub struct TracerConfig {
     /// [`TracerConfig::image_order`],
     /// 1 cm to 10 m; it shrinks to the distance of the nearest surface.
     pub receiver_radius_m: f64,
+    /// Adds the ways around one edge where the direct line is blocked, so that a screen casts a shadow and not a black hole.
+    pub diffraction: bool,
     /// Trace a mesh through whose holes more than one ray in a thousand escapes: what escapes is lost, as through an open
     /// window.
     pub allow_leaks: bool,
@@ -45,6 +47,7 @@ impl Default for TracerConfig {
             seed: 0,
             image_order: 3,
             receiver_radius_m: 0.5,
+            diffraction: false,
             allow_leaks: false,
         }
     }
