@@ -61,13 +61,6 @@ pub fn svg(
         );
     }
     let (s, r) = (at(source.position_m), at(receiver.position_m));
-    if direct {
-        let _ = write!(
-            text,
-            "<line class=\"direct\" stroke-width=\"3\" x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\"/>",
-            s.0, s.1, r.0, r.1
-        );
-    }
     let loudest = reflections.iter().map(|f| f.level_db).fold(f64::NEG_INFINITY, f64::max);
     for (number, reflection) in reflections.iter().enumerate() {
         let (x, y) = at(reflection.point);
@@ -85,6 +78,13 @@ pub fn svg(
             x + 5.0,
             y - 5.0,
             number + 1
+        );
+    }
+    if direct {
+        let _ = write!(
+            text,
+            "<line class=\"direct\" stroke-width=\"3\" x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\"/>",
+            s.0, s.1, r.0, r.1
         );
     }
     for ((x, y), name) in [(s, &source.id), (r, &receiver.id)] {
