@@ -1,6 +1,6 @@
 //! Traced paths: the seam between a tracer and everything after it.
 
-use crate::{Air, EnergyResponse, Error, Material, OctaveBands};
+use crate::{Air, EdgeDiffraction, EnergyResponse, Error, Material, OctaveBands};
 
 /// What a surface did to a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +66,8 @@ pub struct PathSet {
     departures: Vec<u32>,
     arrivals: Vec<u32>,
     batches: Vec<u8>,
+    /// Ways around edges, by contribution, rising.
+    diffractions: Vec<(usize, EdgeDiffraction)>,
 }
 
 /// Batch of contributions that are exact.
@@ -97,6 +99,7 @@ impl PathSet {
             departures: Vec::new(),
             arrivals: Vec::new(),
             batches: Vec::new(),
+            diffractions: Vec::new(),
         }
     }
 
@@ -130,12 +133,31 @@ impl PathSet {
         self.batches.push(contribution.batch.unwrap_or(EXACT));
     }
 
+    /// Adds a path that bends around an edge: its energy in each band is that of the contribution times
+    /// [`EdgeDiffraction::octave_energy_gain`]. The contribution is exact, without reflections, as long as the way around the
+    /// edge, and of the weight of an undisturbed path of that length. Directions are as in [`Contribution`].
+    pub fn push_diffracted(&mut self, departure: [f64; 3], arrival: [f64; 3], diffraction: EdgeDiffraction) {
+        let length_m = diffraction.length_m();
+        self.diffractions.push((self.len(), diffraction));
+        self.push(Contribution {
+            length_m,
+            log_weight: -2.0 * length_m.ln(),
+            chain: Self::DIRECT,
+            tail: Self::DIRECT,
+            departure,
+            arrival,
+            batch: None,
+        });
+    }
+
     /// Appends the paths of another set between the same surfaces; weights stay as they are.
     ///
     /// # Panics
     /// If the sets have different numbers of materials.
     pub fn append(&mut self, other: &PathSet) {
         assert_eq!(self.materials, other.materials, "paths of different scenes");
+        let before = self.len();
+        self.diffractions.extend(other.diffractions.iter().map(|(i, d)| (before + i, d.clone())));
         let offset = self.parents.len() as u32 - 1;
         let shifted = |chain: u32| if chain == Self::DIRECT { chain } else { chain + offset };
         self.parents.extend(other.parents[1..].iter().map(|&p| shifted(p)));
@@ -240,6 +262,12 @@ impl PathSet {
         unpack_direction(self.arrivals[contribution])
     }
 
+    /// Contributions that bend around an edge, each with its diffraction, by rising index. Neither
+    /// [`PathSet::log_weights`] nor [`PathSet::log_reflectance`] contains their gain; [`PathSet::energies`] does.
+    pub fn diffractions(&self) -> &[(usize, EdgeDiffraction)] {
+        &self.diffractions
+    }
+
     /// How often each chain hit each material: `counts[chain * materials + material]`.
     pub fn hit_counts(&self) -> Vec<u16> {
         let mut counts = vec![0u16; self.parents.len() * self.materials];
@@ -285,7 +313,7 @@ impl PathSet {
     pub fn energies(&self, materials: &[Material], air: &Air) -> Result<Vec<Vec<f32>>, Error> {
         let bands = self.check_materials(materials)?;
         let exponents = air.energy_exponent_per_m(bands);
-        (0..bands.len())
+        let mut energies = (0..bands.len())
             .map(|band| {
                 let log_gain = self.log_reflectance(materials, band)?;
                 let exponent = exponents.values()[band] as f32;
@@ -296,7 +324,17 @@ impl PathSet {
                 let columns = self.lengths_m.iter().zip(&self.log_weights).zip(&self.chains).zip(&self.tails);
                 Ok(columns.map(energy).collect())
             })
-            .collect()
+            .collect::<Result<Vec<Vec<f32>>, Error>>()?;
+        self.weigh_diffractions(&mut energies, bands, air.speed_of_sound_m_s());
+        Ok(energies)
+    }
+
+    fn weigh_diffractions(&self, energies: &mut [Vec<f32>], bands: OctaveBands, speed_m_s: f64) {
+        for (contribution, diffraction) in &self.diffractions {
+            for (band, column) in energies.iter_mut().enumerate() {
+                column[*contribution] *= diffraction.octave_energy_gain(bands, band, speed_m_s) as f32;
+            }
+        }
     }
 
     /// Energy in time bins, with Monte-Carlo standard errors from the scatter between batches of rays.
