@@ -68,6 +68,8 @@
 
 mod band_masks;
 mod brute_force_scene;
+mod edge_diffraction;
+mod edge_wedges;
 mod energy_envelope;
 mod error;
 mod event_mixture;
@@ -85,6 +87,7 @@ mod vector;
 mod walk;
 
 pub use brute_force_scene::BruteForceScene;
+pub use edge_diffraction::DiffractingEdges;
 pub use error::Error;
 pub use mesh_report::MeshReport;
 pub use mesh_scene::MeshScene;
