@@ -33,6 +33,9 @@ pub struct EdgePoint {
 /// shadow boundary is resolved by sinh spacing. Unlike the uniform theory of diffraction (Kouyoumjian and Pathak 1974) it is
 /// neither asymptotic nor bound to an edge without ends.
 ///
+/// Within 0.05 dB of Macdonald's solution for the half plane from 62.5 Hz to 8 kHz (`tests/diffraction.rs` of
+/// `sabine-propagate`).
+///
 /// # What it leaves out
 /// Absorption of the faces, more than one edge, and the field where the source is in sight.
 ///

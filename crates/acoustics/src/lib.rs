@@ -45,7 +45,7 @@
 //! - Theory, kept apart from measurement: [`DiffuseRoom`] (Sabine, Eyring, Millington, Fitzroy, Arau-Puchades, critical
 //!   distance, mean free path), [`schroeder_frequency_hz`], [`Air`] (ISO 9613-1).
 //! - Rooms: [`Scene`], [`Material`], [`material_library`], [`MeasuredRoom`], [`Source`], [`Receiver`].
-//! - Between tracing and everything after it: [`PathSet`], [`EnergyResponse`] (energy, **not** to be convolved).
+//! - Between tracing and everything after it: [`PathSet`], [`EnergyResponse`] (energy, **not** to be convolved), [`EdgeDiffraction`].
 //! - Seams: [`FeatureExtractor`], [`RoomEstimator`], [`Augment`], [`RayScene`], [`Propagator`], [`Objective`].
 //!
 //! # Does not

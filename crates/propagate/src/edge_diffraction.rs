@@ -28,18 +28,25 @@ const SIGHT_END_M: f64 = 1e-3;
 /// ([`EdgeDiffraction`]).
 ///
 /// # What it leaves out
-/// - More than one edge: behind a screen thicker than 1 degree of view there may be none that both ends see, and nothing is
-///   added.
-/// - Reflections before or after the edge, but not those of the wedge's own faces.
-/// - The lit side: where the source is in sight nothing changes, though the field falls by 6 dB towards the shadow's border.
-/// - Interference between edges in energies (they add); in rendered pressure it is there, arrival by arrival.
-/// - Absorption of the faces, and obstacles that hide less of an edge than the steps in which its sight is sampled (a fifth of
+/// - Ways over more than one edge. Behind a body there may be no edge that both ends see, be it a screen 5 cm thick with both
+///   ends below its top: then nothing is added. Model thin screens as sheets.
+/// - Reflections before or after the edge, other than in the faces of its own wedge.
+/// - The lit side. Where the source is in sight the direct sound stays as it is, so that the level jumps by 6 dB at the border
+///   of the shadow. The true field rises from -6 dB there to -1 dB at 33, 13 and 4.5 degrees from the border at 125 Hz, 1 and
+///   8 kHz (both ends 3 m from the edge of a screen), and swings about 0 dB by 1 dB beyond. The diffracted field weakens the
+///   direct one there; to add its energy would raise the level by 1 dB where it should fall by 6.
+/// - Interference between edges in energies, which add up. In a rendered pressure they interfere, for each has its arrival.
+/// - Absorption of the faces; and obstacles that hide less of an edge than the steps in which its sight is sampled (a fifth of
 ///   the nearer end's distance).
+///
+/// # Cost
+/// Finding the 3,748 edges of the 5,160 triangles of BRAS CR4 takes 26 ms; the paths over them between two points at most 10 ms
+/// on two cores (100 random pairs, `tests/diffraction.rs`).
 ///
 /// ```
 /// use sabine_acoustics::*;
 /// use sabine_propagate::{DiffractingEdges, MeshScene};
-/// // A screen 1.5 m wide and 2 m high stands in the open; 1 m behind it the sound arrives around three edges and below.
+/// // A screen 1.5 m wide and 2 m high stands in the open; 1 m behind it the sound arrives over all four edges.
 /// let vertices = vec![[0.0, 0.0, 0.0], [0.0, 1.5, 0.0], [0.0, 1.5, 2.0], [0.0, 0.0, 2.0]];
 /// let triangles = [[0, 1, 2], [0, 2, 3]].map(|vertices| Triangle { vertices, material: 0 });
 /// let wood = NamedMaterial { name: "wood".into(), material: Material::uniform(OctaveBands::T60, 0.1, 0.1)? };

@@ -5,7 +5,7 @@ mod wedge_oracles;
 
 use proptest::prelude::*;
 use sabine_acoustics::*;
-use sabine_propagate::*;
+use sabine_propagate::{DiffractingEdges, MeshScene};
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 use wedge_oracles::*;
@@ -41,7 +41,7 @@ const BEHIND_A_SCREEN: [(Cylindrical, Cylindrical); 8] = [
 fn a_long_edge_is_the_half_plane_of_macdonald() {
     let mut worst_db: f64 = 0.0;
     for (source, receiver) in BEHIND_A_SCREEN {
-        let edge = wedge(TAU, source, receiver, [-60.0, 60.0]);
+        let edge = wedge(TAU, source, receiver, [-30.0, 30.0]);
         for hz in OCTAVES_HZ {
             let expected = db(half_plane(TAU * hz / SPEED_M_S, source, receiver));
             let found = db(edge.energy_gain(hz, SPEED_M_S));
@@ -65,7 +65,7 @@ fn a_body_with_a_right_angle_follows_the_uniform_theory() {
         ([2.0, 0.9, 0.0], [5.0, 4.3, 3.0]),
         ([4.0, 0.2, 1.0], [2.0, 3.6, 0.0]),
     ] {
-        let edge = wedge(open, source, receiver, [-60.0, 60.0]);
+        let edge = wedge(open, source, receiver, [-30.0, 30.0]);
         for hz in [500.0, 1000.0, 2000.0, 4000.0, 8000.0] {
             let expected = db(uniform_theory(TAU * hz / SPEED_M_S, 1.5, source, receiver));
             let found = db(edge.energy_gain(hz, SPEED_M_S));
@@ -83,16 +83,17 @@ fn a_body_with_a_right_angle_follows_the_uniform_theory() {
 #[test]
 fn screens_follow_the_chart_of_maekawa() {
     let mut worst_db: f64 = 0.0;
+    // Largest about a Fresnel number of 0.06, where exact theory attenuates by 8.6 dB and the fitted curve by 6.0.
     for bend in [0.05, 0.15, 0.3, 0.5] {
         let (source, receiver) = ([4.0, 0.5 * PI - 0.5 * bend, 0.0], [4.0, 1.5 * PI + 0.5 * bend, 0.0]);
         let direct_m = 8.0 * (0.5 * bend).cos();
-        let edge = wedge(TAU, source, receiver, [-60.0, 60.0]);
+        let edge = wedge(TAU, source, receiver, [-30.0, 30.0]);
         for hz in OCTAVES_HZ {
             let fresnel_number = 2.0 * (8.0 - direct_m) * hz / SPEED_M_S;
             let expected = -kurze_anderson_db(fresnel_number);
             let found = db(edge.energy_gain(hz, SPEED_M_S) * (direct_m / 8.0).powi(2));
             worst_db = worst_db.max((found - expected).abs());
-            assert!((found - expected).abs() < 2.0, "bend {bend} {hz} Hz: {found} != {expected} dB");
+            assert!((found - expected).abs() < 3.0, "bend {bend} {hz} Hz: {found} != {expected} dB");
         }
     }
     eprintln!("worst difference from Kurze and Anderson: {worst_db:.2} dB");
@@ -151,22 +152,28 @@ fn longer_edges_tend_to_the_edge_without_ends() {
             .fold(0.0, f64::max)
     });
     eprintln!("edges of 1, 4, 16, 64 m differ by up to {deviation_db:.2?} dB from an endless one");
-    assert!(deviation_db.windows(2).all(|pair| pair[1] < 0.6 * pair[0]) && deviation_db[3] < 0.1);
+    assert!(
+        deviation_db[1] < 0.3 * deviation_db[0]
+            && deviation_db[2] < 0.3 * deviation_db[1]
+            && deviation_db[3] < 0.1
+    );
 }
 
 #[test]
 fn the_level_falls_from_6_db_at_the_border_into_the_shadow() {
+    let source = [3.0, 0.5 * PI, 0.0];
+    let behind = |bend: f64| [3.0, 1.5 * PI + bend, 0.0];
+    let bends = (0..=40).map(|i| 1e-7 + 0.03 * f64::from(i));
+    let edges: Vec<_> = bends.map(|bend| wedge(TAU, source, behind(bend), [-30.0, 30.0])).collect();
     for hz in OCTAVES_HZ {
-        let level_db = |bend: f64| {
-            db(wedge(TAU, [3.0, 0.5 * PI, 0.0], [3.0, 1.5 * PI + bend, 0.0], [-60.0, 60.0])
-                .energy_gain(hz, SPEED_M_S))
-        };
-        // At the border the faces' mirror image, far in its own shadow, adds what it has there: 0.6 dB at 62.5 Hz.
-        let border_db = level_db(1e-7);
-        assert!((border_db + 6.02).abs() < 0.9, "{hz} Hz: {border_db}");
-        let levels: Vec<f64> = (0..=40).map(|i| level_db(1e-7 + 0.03 * f64::from(i))).collect();
+        let levels: Vec<f64> = edges.iter().map(|edge| db(edge.energy_gain(hz, SPEED_M_S))).collect();
+        let expected = db(half_plane(TAU * hz / SPEED_M_S, source, behind(1e-7)));
+        assert!((levels[0] - expected).abs() < 0.05, "{hz} Hz: {} != {expected} dB", levels[0]);
+        // The mirror image in the screen, deep in its own shadow there, adds its part: little where waves are short.
+        assert!((levels[0] + 6.02).abs() < 2.0 / (hz / 62.5).sqrt(), "{hz} Hz: {}", levels[0]);
+        // Steepest at first, by 0.17 dB per degree at 1 kHz and 0.5 at 8 kHz (steps of 1.7 degrees).
         assert!(
-            levels.windows(2).all(|pair| pair[1] < pair[0] && pair[0] - pair[1] < 10.0),
+            levels.windows(2).all(|pair| (0.0..2.5).contains(&(pair[0] - pair[1]))),
             "{hz} Hz: {levels:?}"
         );
     }
@@ -201,7 +208,7 @@ proptest! {
 #[test]
 fn the_octave_mean_is_the_mean_over_the_octave() {
     for (source, receiver, visible) in
-        [([3.0, 0.9, 0.0], [3.0, 4.5, 0.0], [-60.0, 60.0]), ([1.0, 1.4, 0.7], [1.5, 4.9, 0.9], [0.0, 1.5])]
+        [([3.0, 0.9, 0.0], [3.0, 4.5, 0.0], [-30.0, 30.0]), ([1.0, 1.4, 0.7], [1.5, 4.9, 0.9], [0.0, 1.5])]
     {
         let edge = wedge(TAU, source, receiver, visible);
         for band in 0..8 {
@@ -518,6 +525,12 @@ fn real_rooms_have_edges_and_paths_over_them_only_in_the_shadow() {
         return;
     }
     let mut in_shadow = 0;
+    let mut state = 1u64;
+    // A random number from 0 to 1 (Knuth's multiplier).
+    let mut random = || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    };
     for name in ["bras_cr1_doorangle1", "bras_cr1_doorangle3", "bras_cr2", "bras_cr3", "bras_cr4"] {
         let scene = read_obj(&rooms.join(name).join("room.obj"));
         let toml = std::fs::read_to_string(rooms.join(name).join("room.toml")).unwrap();
@@ -530,6 +543,25 @@ fn real_rooms_have_edges_and_paths_over_them_only_in_the_shadow() {
             edges.len(),
             start.elapsed()
         );
+        // What it costs at worst: between any two points of the box about the room.
+        let bounds: Vec<[f64; 2]> = (0..3)
+            .map(|axis| {
+                let all = scene.vertices().iter().map(|v| v[axis]);
+                [all.clone().fold(f64::INFINITY, f64::min), all.fold(f64::NEG_INFINITY, f64::max)]
+            })
+            .collect();
+        let (mut longest, mut most) = (std::time::Duration::ZERO, 0);
+        for _ in 0..100 {
+            let mut place = || {
+                [0, 1, 2].map(|axis: usize| bounds[axis][0] + random() * (bounds[axis][1] - bounds[axis][0]))
+            };
+            let (mut paths, from, to) = (PathSet::new(1, 200.0), place(), place());
+            let start = std::time::Instant::now();
+            edges.add_paths(&mut paths, &mesh, from, to);
+            longest = longest.max(start.elapsed());
+            most = most.max(paths.len());
+        }
+        eprintln!("  100 random pairs: at most {longest:?} and {most} paths");
         for source in positions(&toml, "[[sources]]") {
             for receiver in positions(&toml, "[[receivers]]") {
                 let start = std::time::Instant::now();

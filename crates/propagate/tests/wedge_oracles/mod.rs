@@ -21,12 +21,13 @@ pub fn half_plane(wave_number_per_m: f64, source: Cylindrical, receiver: Cylindr
         let m = (0.5 * angle).cos().signum() * (k * (over_m - distance)).sqrt();
         let from = -m;
         let integrand = |s: f64| hankel_1(s * s + k * distance) / (s * s + 2.0 * k * distance).sqrt();
-        // Cut at 80, where what is left is below 1e-6; at least eight points in each turn of exp(j s2).
+        // Cut at 80, what is left by its leading term f(s) j / 2s; at least eight points in each turn of exp(j s2).
         let steps = (((80.0 - from) / 0.004) as usize).div_ceil(2) * 2;
         let step = (80.0 - from) / steps as f64;
         let simpson = |i: usize| if i == 0 || i == steps { 1.0 } else { 2.0 + 2.0 * (i % 2) as f64 };
         let sum: Complex<f64> = (0..=steps).map(|i| integrand(from + i as f64 * step) * simpson(i)).sum();
-        Complex::new(0.0, k) * sum * (step / 3.0)
+        let rest = integrand(80.0) * Complex::new(0.0, 1.0 / 160.0);
+        Complex::new(0.0, k) * (sum * (step / 3.0) + rest)
     };
     (term(t_r - t_s) + term(t_r + t_s)).norm_sqr() * over_m * over_m
 }
