@@ -2,7 +2,7 @@
 
 use crate::mesh_report::weld;
 use crate::surfaces::Surfaces;
-use crate::vector::{Vec3, along, cross, dot, norm, sub, unit};
+use crate::vector::{Vec3, along, cross, dot, norm, scale, sub, unit};
 use sabine_acoustics::{EdgePoint, Scene};
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
@@ -69,7 +69,10 @@ pub(crate) fn find_wedges(scene: &Scene, surfaces: &Surfaces) -> Vec<Wedge> {
     let mut tips: BTreeMap<[usize; 2], Vec<Vec3>> = BTreeMap::new();
     for (triangle, surface) in scene.triangles().iter().zip(&surfaces.triangles) {
         let [a, b, c] = triangle.vertices.map(|v| welded[v as usize]);
-        if surface.is_degenerate() || a == b || b == c || c == a {
+        let longest_m =
+            norm(surface.edge1).max(norm(surface.edge2)).max(norm(sub(surface.edge2, surface.edge1)));
+        // A needle has no face to speak of; what it joins lies on one line, and is joined below.
+        if a == b || b == c || c == a || 2.0 * surface.area_m2 < SAME_LINE_M * longest_m {
             continue;
         }
         for [p, q, tip] in [[a, b, c], [b, c, a], [c, a, b]] {
@@ -89,20 +92,23 @@ fn open_wedge([start, end]: [Vec3; 2], tips: &[Vec3]) -> Option<Wedge> {
     let line = sub(end, start);
     let length_m = norm(line);
     let axis = unit(line);
-    let across = |tip: Vec3| {
+    let off_axis = |tip: Vec3| {
         let to_tip = sub(tip, start);
         along(to_tip, axis, -dot(to_tip, axis))
     };
-    let face = unit(across(*tips.first()?));
+    // Closer to the line than its tolerance, a tip has no direction.
+    let off_line = |&&tip: &&Vec3| norm(off_axis(tip)) > 0.1 * SAME_LINE_M;
+    let face = unit(off_axis(*tips.iter().find(off_line)?));
     let normal = cross(axis, face);
     let reference = Wedge { start, length_m, axis, face, normal, open_angle_rad: TAU };
-    let mut angles: Vec<f64> = tips.iter().map(|&tip| reference.locate(tip).angle_rad).collect();
+    let mut angles: Vec<f64> =
+        tips.iter().filter(off_line).map(|&tip| reference.locate(tip).angle_rad).collect();
     angles.sort_by(f64::total_cmp);
     let next = |i: usize| angles.get(i + 1).copied().unwrap_or(angles[0] + TAU);
     let gaps = (0..angles.len()).map(|i| (angles[i], next(i) - angles[i]));
     let (from, open_angle_rad) = gaps.max_by(|a, b| a.1.total_cmp(&b.1))?;
     let (sine, cosine) = from.sin_cos();
-    let turned = |x: f64, y: f64| along(crate::vector::scale(face, x), normal, y);
+    let turned = |x: f64, y: f64| along(scale(face, x), normal, y);
     (open_angle_rad > PI + LEAST_BEND_RAD).then(|| Wedge {
         face: turned(cosine, sine),
         normal: turned(-sine, cosine),
