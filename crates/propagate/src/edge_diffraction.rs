@@ -1,6 +1,5 @@
 //! Sound that bends around one edge into the shadow.
 
-use crate::Error;
 use crate::edge_wedges::{Wedge, find_wedges};
 use crate::mesh_scene::MeshScene;
 use crate::vector::{Vec3, along, norm, scale, sub};
@@ -52,8 +51,9 @@ const SIGHT_END_M: f64 = 1e-3;
 /// let wood = NamedMaterial { name: "wood".into(), material: Material::uniform(OctaveBands::T60, 0.1, 0.1)? };
 /// let scene = Scene::new(vertices, triangles.to_vec(), vec![wood.clone()])?;
 /// let mut paths = PathSet::new(1, 100.0);
-/// let edges = DiffractingEdges::find(&scene)?;
-/// edges.add_paths(&mut paths, &MeshScene::new(&scene)?, [-1.0, 0.75, 1.2], [1.0, 0.75, 1.2]);
+/// let mesh = MeshScene::new(&scene)?;
+/// let edges = DiffractingEdges::find(&scene, &mesh);
+/// edges.add_paths(&mut paths, &mesh, [-1.0, 0.75, 1.2], [1.0, 0.75, 1.2]);
 /// assert_eq!((edges.len(), paths.len()), (4, 4));
 /// // The low octaves pass, the high ones do not.
 /// let energy = paths.energies(&[wood.material], &Air::default())?;
@@ -67,15 +67,8 @@ pub struct DiffractingEdges {
 }
 
 impl DiffractingEdges {
-    /// Looks for the edges.
-    ///
-    /// # Errors
-    /// [`Error::NoSurface`] if all triangles have zero area.
-    pub fn find(scene: &Scene) -> Result<Self, Error> {
-        Ok(Self::on(scene, &MeshScene::new(scene)?))
-    }
-
-    fn on(scene: &Scene, mesh: &MeshScene) -> Self {
+    /// Looks for the edges; `mesh` must be of the same scene.
+    pub fn find(scene: &Scene, mesh: &MeshScene) -> Self {
         Self { wedges: find_wedges(scene, &mesh.surfaces) }
     }
 
@@ -125,7 +118,7 @@ pub(crate) fn add_diffracted_paths(
     source: Vec3,
     receiver: Vec3,
 ) {
-    DiffractingEdges::on(scene, mesh).add_paths(paths, mesh, source, receiver);
+    DiffractingEdges::find(scene, mesh).add_paths(paths, mesh, source, receiver);
 }
 
 /// The path over one edge, and where it bends.

@@ -129,20 +129,27 @@ fn lines(sides: &[Side]) -> Vec<Vec<usize>> {
     }
     let low = |i: usize, axis: usize| sides[i].ends[0][axis].min(sides[i].ends[1][axis]) - SAME_LINE_M;
     let high = |i: usize, axis: usize| sides[i].ends[0][axis].max(sides[i].ends[1][axis]) + SAME_LINE_M;
-    // Sweep along x: only sides that overlap there are compared.
-    let mut order = group.clone();
-    order.sort_by(|&i, &j| low(i, 0).total_cmp(&low(j, 0)));
-    let mut active: Vec<usize> = Vec::new();
-    for i in order {
-        active.retain(|&j| high(j, 0) >= low(i, 0));
-        for &j in &active {
-            let apart = (1..3).any(|axis| low(i, axis) > high(j, axis) || low(j, axis) > high(i, axis));
-            if !apart && on_one_line(&sides[i], &sides[j]) {
-                let (a, b) = (root(&mut group, i), root(&mut group, j));
-                group[a.max(b)] = a.min(b);
+    // Sides of like direction are swept across it, so that only those next to each other are compared.
+    let runs_along = |i: usize, axis: usize| {
+        let line = sub(sides[i].ends[1], sides[i].ends[0]).map(f64::abs);
+        line[axis] >= 0.9 * line[0].max(line[1]).max(line[2])
+    };
+    for along_axis in 0..3 {
+        let swept = (along_axis + 1) % 3;
+        let mut order: Vec<usize> = (0..sides.len()).filter(|&i| runs_along(i, along_axis)).collect();
+        order.sort_by(|&i, &j| low(i, swept).total_cmp(&low(j, swept)));
+        let mut active: Vec<usize> = Vec::new();
+        for i in order {
+            active.retain(|&j| high(j, swept) >= low(i, swept));
+            for &j in &active {
+                let apart = (0..3).any(|axis| low(i, axis) > high(j, axis) || low(j, axis) > high(i, axis));
+                if !apart && on_one_line(&sides[i], &sides[j]) {
+                    let (a, b) = (root(&mut group, i), root(&mut group, j));
+                    group[a.max(b)] = a.min(b);
+                }
             }
+            active.push(i);
         }
-        active.push(i);
     }
     let mut members: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for i in 0..sides.len() {

@@ -287,7 +287,7 @@ fn room_with(faces: impl IntoIterator<Item = Vec<[f64; 3]>>) -> Scene {
 fn around(scene: &Scene, source: [f64; 3], receiver: [f64; 3]) -> PathSet {
     let mut paths = PathSet::new(1, 100.0);
     let mesh = MeshScene::new(scene).unwrap();
-    DiffractingEdges::find(scene).unwrap().add_paths(&mut paths, &mesh, source, receiver);
+    DiffractingEdges::find(scene, &mesh).add_paths(&mut paths, &mesh, source, receiver);
     paths
 }
 
@@ -301,7 +301,7 @@ const RECEIVER: [f64; 3] = [4.6, 3.0, 1.3];
 #[test]
 fn nothing_bends_in_a_box_or_where_the_source_is_in_sight() {
     let empty = room_with([]);
-    let edges = DiffractingEdges::find(&empty).unwrap();
+    let edges = DiffractingEdges::find(&empty, &MeshScene::new(&empty).unwrap());
     for (source, receiver) in [(SOURCE, RECEIVER), ([0.01, 0.01, 0.01], [5.9, 4.9, 2.9])] {
         assert!(around(&empty, source, receiver).is_empty());
     }
@@ -557,9 +557,9 @@ fn real_rooms_have_edges_and_paths_over_them_only_in_the_shadow() {
     for name in ["bras_cr1_doorangle1", "bras_cr1_doorangle3", "bras_cr2", "bras_cr3", "bras_cr4"] {
         let scene = read_obj(&rooms.join(name).join("room.obj"));
         let toml = std::fs::read_to_string(rooms.join(name).join("room.toml")).unwrap();
-        let start = std::time::Instant::now();
-        let edges = DiffractingEdges::find(&scene).unwrap();
         let mesh = MeshScene::new(&scene).unwrap();
+        let start = std::time::Instant::now();
+        let edges = DiffractingEdges::find(&scene, &mesh);
         eprintln!(
             "{name}: {} triangles, {} edges in {:?}",
             scene.triangles().len(),
