@@ -48,6 +48,7 @@
 //! - Between tracing and everything after it: [`PathSet`], [`Conditions`] (what may change without tracing again: materials,
 //!   air, [`Directivity`] and [`Orientation`] of source and receiver), [`EnergyResponse`] (energy, **not** to be convolved),
 //!   [`PathParameters`] with Monte-Carlo standard errors.
+//! - Between tracing and everything after it: [`PathSet`], [`EnergyResponse`] (energy, **not** to be convolved), [`EdgeDiffraction`].
 //! - Seams: [`FeatureExtractor`], [`RoomEstimator`], [`Augment`], [`RayScene`], [`Propagator`], [`Objective`].
 //!
 //! # Does not
@@ -96,6 +97,7 @@ mod conditions;
 mod decay_fit;
 mod directivity;
 mod directivity_table;
+mod edge_diffraction;
 mod energy;
 mod equalisation;
 mod error;
@@ -129,6 +131,7 @@ pub use bands::{OctaveBands, PerBand};
 pub use conditions::Conditions;
 pub use decay_fit::{DecayFit, Slope};
 pub use directivity::Directivity;
+pub use edge_diffraction::{EdgeDiffraction, EdgePoint};
 pub use energy::{EnergyDecayCurve, EnergyResponse};
 pub use equalisation::equalisation;
 pub use error::Error;
