@@ -1,6 +1,6 @@
-//! A bounding volume hierarchy with four children to a node.
+//! A bounding volume hierarchy with eight children to a node.
 
-use crate::hierarchy_builder::Builder;
+use crate::hierarchy_builder::{Builder, MAX_SPLITS};
 use crate::triangle_pack::TrianglePack;
 use crate::vector::Vec3;
 use crate::wide_node::{Child, LocalRay, WideNode};
@@ -11,6 +11,10 @@ use std::ops::ControlFlow;
 pub(crate) const MARGIN: f64 = 4e-6;
 /// The rough test of triangles is as generous: its errors stay below 5e-6.
 const TOLERANCE: f64 = 8e-6;
+
+/// Children that can be left behind on the way down, at most.
+const STACK_LIMIT: usize = 512;
+const _: () = assert!((WideNode::WIDTH - 1) * (MAX_SPLITS as usize + 1) < STACK_LIMIT);
 
 /// Triangles in boxes in boxes, in single precision: finds the few triangles that a ray may meet, nearest box first.
 pub(crate) struct Hierarchy {
@@ -36,11 +40,11 @@ impl Hierarchy {
     /// The way back is kept in an array no larger than the hierarchy needs: clearing it is part of the cost of a ray.
     #[inline]
     pub fn visit(&self, ray: &LocalRay, limit: f32, test: impl FnMut(u32) -> ControlFlow<(), f32>) {
-        // Each level leaves three children behind; the last one may write four.
-        match 3 * self.levels + 1 {
+        // Each level leaves all children but one behind; the last one may leave all.
+        match (WideNode::WIDTH - 1) * self.levels + 1 {
             ..=16 => self.walk::<16>(ray, limit, test),
             17..=64 => self.walk::<64>(ray, limit, test),
-            _ => self.walk::<256>(ray, limit, test),
+            _ => self.walk::<{ STACK_LIMIT }>(ray, limit, test),
         }
     }
 
@@ -64,7 +68,8 @@ impl Hierarchy {
                     while met != 0 {
                         let lane = met.trailing_zeros() as usize;
                         met &= met - 1;
-                        let entry = u64::from(enter[lane & 3].to_bits()) << 32 | u64::from(node.code(lane));
+                        let entry = u64::from(enter[lane / 4 % 2][lane % 4].to_bits()) << 32
+                            | u64::from(node.code(lane));
                         // Sorted in among its siblings, so that the nearest comes out first.
                         let mut at = height;
                         while at > siblings && stack[(at - 1) % STACK] < entry {
@@ -117,7 +122,7 @@ impl Hierarchy {
                 Child::Node(node) => {
                     let node = &self.nodes[node as usize];
                     let squares = node.squared_distances(point);
-                    let mut lanes = [0, 1, 2, 3];
+                    let mut lanes: [usize; WideNode::WIDTH] = std::array::from_fn(|lane| lane);
                     lanes.sort_by(|&i, &j| squares[j].total_cmp(&squares[i]));
                     let finite = lanes.into_iter().filter(|&lane| squares[lane].is_finite());
                     stack

@@ -6,11 +6,9 @@ use crate::wide_node::{Bounds, Child, WideNode};
 
 /// Planes that may split a box are tried at so many equal steps along each axis.
 const BINS: usize = 16;
-/// Children of a node.
-const CHILDREN: usize = 4;
 /// Splits on the way to any pack: beyond what this leaves room for, boxes are halved by count, not by area. It bounds the
 /// recursion, whatever the triangles.
-const MAX_SPLITS: u32 = 60;
+pub(crate) const MAX_SPLITS: u32 = 60;
 
 /// A triangle on its way into the hierarchy.
 #[derive(Clone, Copy)]
@@ -75,7 +73,7 @@ impl<'a> Builder<'a> {
     /// Adds the node of a part with all that stands behind it, and returns how many nodes that is deep.
     fn node(&mut self, part: Part) -> usize {
         let mut parts = vec![part];
-        while parts.len() < CHILDREN {
+        while parts.len() < WideNode::WIDTH {
             // The largest box is the one that rays meet most often.
             let largest = (0..parts.len())
                 .filter(|&i| parts[i].len() > TrianglePack::LANES)

@@ -1,4 +1,4 @@
-//! Four boxes that a ray meets, or misses, at once.
+//! Eight boxes that a ray meets, or misses, in one go.
 
 use wide::f32x4;
 
@@ -69,23 +69,29 @@ pub(crate) enum Child {
     Pack(u32),
 }
 
-/// Four boxes, one to a lane, and what stands behind each: 112 bytes in two cache lines.
+/// Vectors of four lanes in a node.
+const VECTORS: usize = WideNode::WIDTH / 4;
+
+/// Eight boxes, one to a lane, and what stands behind each: 224 bytes in four cache lines, fetched together.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(crate) struct WideNode {
     /// Lower and upper x, lower and upper y, lower and upper z.
-    planes: [f32x4; 6],
+    planes: [[f32x4; VECTORS]; 6],
     /// Shifted left by one; the lowest bit says that it is a pack.
-    children: [u32; 4],
+    children: [u32; Self::WIDTH],
 }
 
 impl WideNode {
-    /// Four children at most; the lanes that are left hold nothing. What stands behind them is a pack all the same: a ray
+    /// Number of lanes. Four would do with as much arithmetic; eight wait less for memory, for the way down is shorter.
+    pub const WIDTH: usize = 8;
+
+    /// Eight children at most; the lanes that are left hold nothing. What stands behind them is a pack all the same: a ray
     /// of NaN meets every box, and must come to an end.
     pub fn new(children: &[(Bounds, Child)]) -> Self {
-        let mut planes = [[0.0f32; 4]; 6];
-        let mut codes = [0u32; 4];
-        for lane in 0..4 {
+        let mut planes = [[0.0f32; Self::WIDTH]; 6];
+        let mut codes = [0u32; Self::WIDTH];
+        for lane in 0..Self::WIDTH {
             let (bounds, child) = children.get(lane).copied().unwrap_or((Bounds::EMPTY, Child::Pack(0)));
             for axis in 0..3 {
                 planes[2 * axis][lane] = bounds.low[axis];
@@ -96,39 +102,51 @@ impl WideNode {
                 Child::Pack(i) => i << 1 | 1,
             };
         }
-        Self { planes: planes.map(f32x4::new), children: codes }
+        let vectors = |row: [f32; Self::WIDTH]| {
+            std::array::from_fn(|k| f32x4::new(std::array::from_fn(|lane| row[4 * k + lane])))
+        };
+        Self { planes: planes.map(vectors), children: codes }
     }
 
     /// Which boxes the ray meets between its origin and `limit`, as bits, and where it enters each.
     #[inline]
-    pub fn entries(&self, ray: &LocalRay, limit: f32) -> (u32, [f32; 4]) {
-        let mut enter = f32x4::ZERO;
-        let mut leave = f32x4::splat(limit);
-        for axis in 0..3 {
-            let (near, far) = (2 * axis + (ray.entry[axis] & 1), 2 * axis + (ray.entry[axis] & 1 ^ 1));
-            let at = |row: usize| (self.planes[row] - ray.origin[axis]) * ray.inverse[axis];
-            enter = at(near).fast_max(enter);
-            leave = at(far).fast_min(leave);
+    pub fn entries(&self, ray: &LocalRay, limit: f32) -> (u32, [[f32; 4]; VECTORS]) {
+        let mut met = 0;
+        let mut entries = [[0.0; 4]; VECTORS];
+        for k in 0..VECTORS {
+            let mut enter = f32x4::ZERO;
+            let mut leave = f32x4::splat(limit);
+            for axis in 0..3 {
+                let side = ray.entry[axis] & 1;
+                let at = |row: usize| (self.planes[row][k] - ray.origin[axis]) * ray.inverse[axis];
+                enter = at(2 * axis + side).fast_max(enter);
+                leave = at(2 * axis + (side ^ 1)).fast_min(leave);
+            }
+            met |= enter.simd_le(leave).to_bitmask() << (4 * k);
+            entries[k] = enter.to_array();
         }
-        (enter.simd_le(leave).to_bitmask(), enter.to_array())
+        (met, entries)
     }
 
     /// Square of the distance of a point from each box; infinite for a lane that holds nothing.
-    pub fn squared_distances(&self, point: [f32; 3]) -> [f32; 4] {
-        let mut sum = f32x4::ZERO;
-        for (axis, &coordinate) in point.iter().enumerate() {
-            let p = f32x4::splat(coordinate);
-            let outside =
-                (self.planes[2 * axis] - p).fast_max(p - self.planes[2 * axis + 1]).fast_max(f32x4::ZERO);
-            sum += outside * outside;
-        }
-        sum.to_array()
+    pub fn squared_distances(&self, point: [f32; 3]) -> [f32; Self::WIDTH] {
+        let squares: [[f32; 4]; VECTORS] = std::array::from_fn(|k| {
+            let mut sum = f32x4::ZERO;
+            for (axis, &coordinate) in point.iter().enumerate() {
+                let p = f32x4::splat(coordinate);
+                let (low, high) = (self.planes[2 * axis][k], self.planes[2 * axis + 1][k]);
+                let outside = (low - p).fast_max(p - high).fast_max(f32x4::ZERO);
+                sum += outside * outside;
+            }
+            sum.to_array()
+        });
+        std::array::from_fn(|lane| squares[lane / 4][lane % 4])
     }
 
     /// What stands behind a lane, as a number that fits beside a distance in 64 bits.
     #[inline]
     pub fn code(&self, lane: usize) -> u32 {
-        self.children[lane & 3]
+        self.children[lane % Self::WIDTH]
     }
 
     #[inline]
