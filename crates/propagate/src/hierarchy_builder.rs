@@ -75,9 +75,12 @@ impl<'a> Builder<'a> {
         let mut parts = vec![part];
         while parts.len() < WideNode::WIDTH {
             // The largest box is the one that rays meet most often.
-            let largest = (0..parts.len())
-                .filter(|&i| parts[i].len() > TrianglePack::LANES)
-                .max_by(|&i, &j| parts[i].bounds.half_area().total_cmp(&parts[j].bounds.half_area()));
+            let size = |i: usize| (parts[i].bounds.half_area(), parts[i].len());
+            let largest =
+                (0..parts.len()).filter(|&i| parts[i].len() > TrianglePack::LANES).max_by(|&i, &j| {
+                    let ((area, count), (other_area, other_count)) = (size(i), size(j));
+                    area.total_cmp(&other_area).then(count.cmp(&other_count))
+                });
             let Some(largest) = largest else { break };
             let halves = self.split(parts[largest]);
             parts.splice(largest..=largest, halves);
@@ -196,4 +199,64 @@ impl Plane {
 /// Chance to be met times packs to be tested.
 fn cost(bounds: &Bounds, count: usize) -> f32 {
     if count == 0 { 0.0 } else { bounds.half_area() * count.div_ceil(TrianglePack::LANES) as f32 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{direction, generator};
+    use crate::vector::scale;
+
+    type Listed = (u32, [Vec3; 3]);
+
+    /// Every triangle is in one pack, and no way down is longer than the stack of a ray allows.
+    fn check(triangles: &[Listed]) -> (usize, usize) {
+        let (nodes, packs, levels) = Builder::new(triangles, 1e-5).build();
+        let mut found: Vec<u32> = packs.iter().flat_map(TrianglePack::triangles).collect();
+        found.sort_unstable();
+        assert_eq!(found, triangles.iter().map(|t| t.0).collect::<Vec<_>>());
+        assert!(levels <= MAX_SPLITS as usize + 1, "{levels} levels");
+        assert!(nodes.len() <= packs.len() + 1);
+        (packs.len(), levels)
+    }
+
+    #[test]
+    fn packs_are_full_and_ways_short() {
+        let mut random = generator(1, 1);
+        let scattered: Vec<Listed> = (0..20_000)
+            .map(|i| {
+                let mut point = |size: f64| scale(direction(&mut random), size);
+                (i, [point(5.0), point(0.1), point(0.1)])
+            })
+            .collect();
+        let (packs, levels) = check(&scattered);
+        assert!(packs < 7_500, "{packs}"); // 5,000 if all were full
+        assert!(levels <= 10, "{levels}");
+    }
+
+    #[test]
+    fn triangles_that_no_plane_divides_are_halved() {
+        let (packs, levels) = check(&vec_of(10_000, |_| ([1.0; 3], 1.0)));
+        assert_eq!((packs, levels), (2_500, 4)); // 8^4 packs hold 16,384
+    }
+
+    /// Sizes and places in geometric progression: a plane cuts off a few at a time.
+    #[test]
+    fn unbalanced_trees_stay_shallow_enough() {
+        for ratio in [0.5f64, 0.9, 0.99] {
+            check(&vec_of(5_000, |i| {
+                let size = ratio.powi(i).max(1e-30);
+                ([size, 0.0, 0.0], size)
+            }));
+        }
+    }
+
+    fn vec_of(count: u32, place: impl Fn(i32) -> (Vec3, f64)) -> Vec<Listed> {
+        (0..count)
+            .map(|i| {
+                let (corner, size) = place(i as i32);
+                (i, [corner, [0.0, size, 0.0], [0.0, 0.0, size]])
+            })
+            .collect()
+    }
 }

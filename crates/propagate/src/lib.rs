@@ -2,8 +2,8 @@
 //!
 //! Where it sits: [`PathTracer`] turns a [`Scene`](sabine_acoustics::Scene), a source and a receiver into a
 //! [`PathSet`](sabine_acoustics::PathSet), in which absorption, air and speed of sound are still free. `sabine-optimize`
-//! fits materials to such paths; [`PressureRenderer`] turns them into a pressure response to convolve sound with. parry
-//! stays inside this crate: plain arrays go in and out.
+//! fits materials to such paths; [`PressureRenderer`] turns them into a pressure response to convolve sound with. Plain
+//! arrays go in and out.
 //!
 //! What it does **not** do: no diffraction (a screen casts a sharp shadow), no room modes (below about
 //! 2000 sqrt(T60 / V) Hz a room is a wave field, not rays: Schroeder 1962), no transmission through walls, no

@@ -91,3 +91,23 @@ fn cross(a: [f32x4; 3], b: [f32x4; 3]) -> [f32x4; 3] {
 fn dot(a: [f32x4; 3], b: [f32x4; 3]) -> f32x4 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn candidates_are_what_the_ray_may_meet() {
+        let at = |x: f64| [[x, -1.0, -1.0], [0.0, 3.0, 0.0], [0.0, 0.0, 3.0]];
+        let pack = TrianglePack::new(&[(7, at(1.0)), (3, at(4.0)), (5, at(-2.0))]);
+        let mask = |direction: [f32; 3], limit: f32| {
+            pack.candidates(&LocalRay::new([0.0; 3], direction), limit, 1e-4)
+        };
+        assert_eq!(mask([1.0, 0.0, 0.0], 10.0), 0b011); // the empty lane never
+        assert_eq!(mask([1.0, 0.0, 0.0], 2.0), 0b001);
+        assert_eq!(mask([-1.0, 0.0, 0.0], 10.0), 0b100);
+        assert_eq!(mask([0.0, 1.0, 0.0], 10.0), 0);
+        assert_eq!((pack.triangle(0), pack.triangle(1), pack.triangle(2)), (7, 3, 5));
+        assert_eq!(pack.triangles().collect::<Vec<_>>(), [7, 3, 5]);
+    }
+}

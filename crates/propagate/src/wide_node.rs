@@ -113,7 +113,7 @@ impl WideNode {
     pub fn entries(&self, ray: &LocalRay, limit: f32) -> (u32, [[f32; 4]; VECTORS]) {
         let mut met = 0;
         let mut entries = [[0.0; 4]; VECTORS];
-        for k in 0..VECTORS {
+        for (k, entry) in entries.iter_mut().enumerate() {
             let mut enter = f32x4::ZERO;
             let mut leave = f32x4::splat(limit);
             for axis in 0..3 {
@@ -123,7 +123,7 @@ impl WideNode {
                 leave = at(2 * axis + (side ^ 1)).fast_min(leave);
             }
             met |= enter.simd_le(leave).to_bitmask() << (4 * k);
-            entries[k] = enter.to_array();
+            *entry = enter.to_array();
         }
         (met, entries)
     }
@@ -152,5 +152,61 @@ impl WideNode {
     #[inline]
     pub fn decode(code: u32) -> Child {
         if code & 1 == 1 { Child::Pack(code >> 1) } else { Child::Node(code >> 1) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ray_meets_the_boxes_in_front_of_it_up_to_the_limit() {
+        let at = |x: f32| Bounds { low: [x, -1.0, -1.0], high: [x + 1.0, 1.0, 1.0] };
+        // Ahead, behind, around the origin, and a flat one.
+        let flat = Bounds { low: [5.0, -1.0, -1.0], high: [5.0, 1.0, 1.0] };
+        let boxes = [at(2.0), at(-3.0), at(-0.5), flat].map(|bounds| (bounds, Child::Node(1)));
+        let node = WideNode::new(&boxes);
+        let (met, enter) = node.entries(&LocalRay::new([0.0; 3], [1.0, 0.0, 0.0]), 10.0);
+        assert_eq!(met, 0b1101); // not the one behind, nor any of the empty lanes
+        assert_eq!([enter[0][0], enter[0][2], enter[0][3]], [2.0, 0.0, 5.0]);
+        assert_eq!(node.entries(&LocalRay::new([0.0; 3], [1.0, 0.0, 0.0]), 4.9).0, 0b0101);
+        assert_eq!(node.entries(&LocalRay::new([0.0; 3], [-1.0, -0.0, 0.0]), 10.0).0, 0b0110);
+    }
+
+    /// 0 times infinity: a ray within the plane of a face, along an axis. (The upper face is not part of a box; boxes are
+    /// wider than what they hold.)
+    #[test]
+    fn a_ray_along_a_face_meets_the_box() {
+        let node = WideNode::new(&[(Bounds { low: [1.0; 3], high: [2.0; 3] }, Child::Node(1))]);
+        for axis in 0..3 {
+            for sign in [1.0, -1.0] {
+                for on in [1.0, 1.5, 2f32.next_down()] {
+                    let (mut origin, mut direction) = ([on; 3], [0.0; 3]);
+                    (origin[axis], direction[axis]) = (1.5 - 3.0 * sign, sign);
+                    assert_eq!(
+                        node.entries(&LocalRay::new(origin, direction), 10.0).0,
+                        1,
+                        "{origin:?} {direction:?}"
+                    );
+                    origin[(axis + 1) % 3] = 2.5;
+                    assert_eq!(
+                        node.entries(&LocalRay::new(origin, direction), 10.0).0,
+                        0,
+                        "{origin:?} {direction:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn distances_of_boxes_are_those_to_their_faces_edges_and_corners() {
+        let node = WideNode::new(&[(Bounds { low: [0.0; 3], high: [1.0; 3] }, Child::Pack(3))]);
+        for (point, expected) in [([0.5, 0.5, 0.5], 0.0), ([0.5, 0.5, 3.0], 4.0), ([-1.0, 2.0, -1.0], 3.0)] {
+            let squares = node.squared_distances(point);
+            assert_eq!(squares[0], expected);
+            assert!(squares[1..].iter().all(|s| s.is_infinite()));
+        }
+        assert_eq!(WideNode::decode(node.code(0)), Child::Pack(3));
     }
 }
