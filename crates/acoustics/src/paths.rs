@@ -223,9 +223,10 @@ impl PathSet {
         of(&mut self.departures, &kept);
         of(&mut self.arrivals, &kept);
         of(&mut self.batches, &kept);
-        let mut place = 0;
-        let places: Vec<usize> =
-            kept.iter().map(|&kept| std::mem::replace(&mut place, place + usize::from(kept))).collect();
+        let places: Vec<usize> = kept
+            .iter()
+            .scan(0, |next, &kept| Some(std::mem::replace(next, *next + usize::from(kept))))
+            .collect();
         self.diffractions.retain_mut(|(contribution, _)| {
             let stays = kept[*contribution];
             *contribution = places[*contribution];
