@@ -3,7 +3,7 @@
 use crate::error::check_range;
 use crate::scene::{cross, norm, sub};
 use crate::{Error, Scene, Triangle};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::fmt;
 
 /// Triangles smaller than this have no normal that a tracer could use (m2).
