@@ -67,11 +67,13 @@
 //! Wilkie et al. 2014 (hero sampling); Savioja and Svensson 2015, JASA 138(2) (overview of geometric room acoustics).
 
 mod band_masks;
+mod box_tree;
 mod brute_force_scene;
 mod energy_envelope;
 mod error;
 mod event_mixture;
 mod image_sources;
+mod mesh_edges;
 mod mesh_report;
 mod mesh_scene;
 mod path_tracer;
@@ -86,8 +88,10 @@ mod walk;
 
 pub use brute_force_scene::BruteForceScene;
 pub use error::Error;
+pub use mesh_edges::MeshEdge;
 pub use mesh_report::MeshReport;
 pub use mesh_scene::MeshScene;
 pub use path_tracer::{PathTracer, TracerConfig};
+pub use placement::check_placement;
 pub use pressure_renderer::{PressureRenderer, RenderConfig, Statistics};
 pub use reference_tracer::ReferenceTracer;

@@ -56,7 +56,7 @@ impl Surroundings {
 ///
 /// Single sheets (screens) and double walls change how many surfaces rays cross, so a count alone condemns no point: it
 /// takes escaping rays to be outside, and a certain difference between source and receiver to be inside a body.
-pub(crate) fn check_placement(scene: &MeshScene, source: &Source, receiver: &Receiver) -> Result<f64, Error> {
+pub fn check_placement(scene: &MeshScene, source: &Source, receiver: &Receiver) -> Result<f64, Error> {
     let distance_m = norm(sub(source.position_m, receiver.position_m));
     if distance_m < CONTACT_M {
         let (source_id, receiver_id) = (source.id.clone(), receiver.id.clone());

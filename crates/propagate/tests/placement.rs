@@ -141,7 +141,7 @@ fn a_screen_blocks_the_direct_sound_and_nothing_else() {
 #[test]
 fn the_report_lists_what_is_odd() {
     let closed = MeshReport::inspect(&box_with(&[], &[]), HERE).unwrap();
-    assert!(closed.is_closed() && closed.escape_rate == 0.0 && closed.planes == 6);
+    assert!(closed.is_closed() && closed.escaped_rays == 0 && closed.planes == 6);
     assert!((closed.volume_m3 - 72.0).abs() < 1e-9);
     assert!(closed.warnings().is_empty());
     // A flap at a wall's seam: an edge with three triangles and two open ones. A needle. A wall triangle twice.
@@ -150,8 +150,8 @@ fn the_report_lists_what_is_odd() {
     let needle = [a, b, [0.0, 0.0, 1.0]];
     let twice = [[0.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 4.0, 3.0]];
     let odd = MeshReport::inspect(&box_with(&[flap, needle, twice], &[]), [3.0, 1.0, 1.5]).unwrap();
-    assert_eq!(odd.crowded_edges_m, vec![[a, b]]);
-    assert_eq!(odd.open_edges_m.len(), 4); // two of the flap, two of the needle
+    assert_eq!(odd.crowded_edges.iter().map(|e| e.ends_m).collect::<Vec<_>>(), vec![[a, b]]);
+    assert_eq!(odd.open_edges.len(), 2); // of the flap
     assert_eq!(odd.degenerate_triangles, vec![13]);
     assert_eq!(odd.duplicate_triangles, vec![14]);
     assert_eq!(odd.warnings().len(), 4);
