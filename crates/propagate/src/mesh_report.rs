@@ -33,7 +33,7 @@ const LISTED: usize = 5;
 /// let room = Scene::shoebox([10.0, 7.0, 3.0], std::array::from_fn(|_| plaster.clone()))?;
 /// let report = MeshReport::inspect(&room, [2.0, 3.0, 1.5])?;
 /// assert!(report.is_closed() && (report.volume_m3 - 210.0).abs() < 1e-9);
-/// println!("{report}"); // 12 triangles in 6 planes around 210.0 m3 ...
+/// assert!(report.to_string().starts_with("12 triangles in 6 planes around 210.0 m3.\nHolds sound"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -147,11 +147,7 @@ impl MeshReport {
 impl fmt::Display for MeshReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (triangles, planes, rays) = (self.triangles, self.planes, self.rays);
-        write!(f, "{triangles} triangles in {planes} planes")?;
-        match self.flipped_edges {
-            0 => writeln!(f, " around {:.1} m3", self.volume_m3)?,
-            n => writeln!(f, "; at {n} edges two of them are turned against each other: no volume")?,
-        }
+        writeln!(f, "{triangles} triangles in {planes} planes around {:.1} m3.", self.volume_m3)?;
         match self.escaped_rays {
             0 => writeln!(f, "Holds sound: none of {rays} rays from surface to surface escapes.")?,
             n => {
@@ -163,32 +159,44 @@ impl fmt::Display for MeshReport {
                 )?;
             }
         }
-        for (edges, what) in [
-            (&self.open_edges, "of one triangle: the rim of a hole or of a free-standing screen"),
+        for (edges, what, listed) in [
+            (
+                &self.open_edges,
+                "of one triangle, closed by nothing: the rim of a hole or of a free screen",
+                LISTED,
+            ),
             (
                 &self.crowded_edges,
                 "of three or more triangles: where a partition meets a wall, or faces lie in each other",
+                LISTED,
             ),
             (
                 &self.resting_edges,
-                "of one triangle on other faces: T-junctions and bodies that stand on a face, closed",
+                "of one triangle, closed by other faces: T-junctions, bodies that stand on a face",
+                1,
             ),
         ] {
             let Some(longest) = edges.first() else { continue };
             let total_m: f64 = edges.iter().map(MeshEdge::length_m).sum();
-            writeln!(f, "{} edges ({total_m:.2} m) {what}.", edges.len())?;
-            let listed = if std::ptr::eq(edges, &self.resting_edges) { 1 } else { LISTED };
+            writeln!(f, "Edges {what}: {}, {total_m:.2} m in all.", edges.len())?;
             writeln!(f, "  the longest: {longest}")?;
             for edge in edges.iter().take(listed).skip(1) {
                 writeln!(f, "               {edge}")?;
             }
+        }
+        if self.flipped_edges > 0 {
+            let edges = self.flipped_edges;
+            writeln!(
+                f,
+                "Edges between triangles that are turned against each other: {edges}; the volume may be wrong."
+            )?;
         }
         for (list, what) in [
             (&self.degenerate_triangles, "without area"),
             (&self.duplicate_triangles, "on the corners of an earlier one"),
         ] {
             if let Some(first) = list.first() {
-                writeln!(f, "{} triangles {what}, the first being triangle {first}.", list.len())?;
+                writeln!(f, "Triangles {what}: {}, the first being triangle {first}.", list.len())?;
             }
         }
         Ok(())
