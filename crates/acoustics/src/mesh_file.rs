@@ -196,3 +196,51 @@ impl MeshDraft {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::OctaveBands;
+
+    /// A square without name beside one of glass.
+    fn squares() -> Mesh {
+        let mut draft = MeshDraft::new(Path::new("two.obj"));
+        draft.mesh.vertices_m = vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        draft.face(None, &[0, 1, 2, 3]).unwrap();
+        draft.face(Some("glass"), &[3, 2, 1, 0]).unwrap();
+        draft.face(Some("paint"), &[0, 1, 0]).unwrap(); // no area: its material is in no use
+        draft.mesh
+    }
+
+    #[test]
+    fn materials_and_names_must_match() {
+        let scene = |names: &[&str]| {
+            let material = Material::uniform(OctaveBands::T60, 0.1, 0.1).unwrap();
+            squares().into_scene(&names.iter().map(|&name| (name.to_owned(), material.clone())).collect())
+        };
+        let whole = scene(&["glass", "default"]).unwrap();
+        assert_eq!(
+            whole.materials().iter().map(|m| m.name.as_str()).collect::<Vec<_>>(),
+            ["default", "glass"]
+        );
+        assert_eq!((whole.triangles().len(), squares().faces_without_area()), (4, 1));
+        assert!(matches!(scene(&["glass"]), Err(Error::FacesWithoutMaterial { faces: 1, .. })));
+        assert!(
+            matches!(scene(&["default"]), Err(Error::MaterialWithoutTable { material, .. }) if material == "glass")
+        );
+        let message = scene(&["default", "glass", "paint"]).unwrap_err().to_string();
+        assert!(message.starts_with("two.obj: material `paint`: no face"), "{message}");
+    }
+
+    #[test]
+    fn only_known_endings_are_read() {
+        assert!(matches!(Mesh::read("room.step"), Err(Error::UnknownMeshFormat { .. })));
+        assert!(matches!(Mesh::read("/nowhere/room.OBJ"), Err(Error::Io { .. })));
+        let binary = Mesh::read("/nowhere/room.glb");
+        if cfg!(feature = "gltf") {
+            assert!(matches!(binary, Err(Error::Io { .. })));
+        } else {
+            assert!(matches!(binary, Err(Error::GltfFeature { .. })));
+        }
+    }
+}

@@ -201,7 +201,9 @@ fn lists_strips_and_fans_of_all_indices_are_triangles() {
     ];
     let fan: &[[u32; 3]] = &[[1, 2, 0], [2, 3, 0], [3, 4, 0]];
     let strip: &[[u32; 3]] = &[[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]];
-    let cases: [(&[[f64; 3]], u32, Option<(u32, Vec<u32>)>, &[[u32; 3]]); 6] = [
+    // Points, mode, type and list of the indices, what must come out.
+    type Case<'a> = (&'a [[f64; 3]], u32, Option<(u32, Vec<u32>)>, &'a [[u32; 3]]);
+    let cases: [Case<'_>; 6] = [
         (&apex, 6, None, fan),
         (&apex, 6, Some((5121, vec![0, 1, 2, 3, 4])), fan),
         (&ring, 5, None, strip),

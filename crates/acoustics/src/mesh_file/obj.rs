@@ -168,7 +168,7 @@ mod tests {
             ("usemtl", "line 1"),
             ("surf 0 1 0 1", "line 1"),
         ] {
-            let message = parse(text).err().expect(text).to_string();
+            let message = parse(text).expect_err(text).to_string();
             assert!(message.starts_with(&format!("room.obj: {line}: ")), "{text:?} gave {message}");
         }
         let crossed = format!("{CORNERS}usemtl a\nf 1 3 2 4");

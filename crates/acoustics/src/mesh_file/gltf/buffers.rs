@@ -147,8 +147,11 @@ fn kind(accessor: &Accessor) -> Option<ComponentType> {
     }
 }
 
+/// Reads a number from its bytes.
+type Number = fn(&[u8]) -> u32;
+
 /// Size in bytes and reader of a whole number.
-fn whole(kind: ComponentType) -> Option<(u64, fn(&[u8]) -> u32)> {
+fn whole(kind: ComponentType) -> Option<(u64, Number)> {
     match kind {
         ComponentType::U8 => Some((1, |b| u32::from(b[0]))),
         ComponentType::U16 => Some((2, |b| u32::from(u16::from_le_bytes([b[0], b[1]])))),
