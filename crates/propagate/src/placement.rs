@@ -79,7 +79,7 @@ fn differ(one: f64, other: f64) -> bool {
 ///
 /// Rays from both count the surfaces that they cross, whichever way these are turned. Single sheets (screens) and double
 /// walls change how many there are, so a count alone condemns no point: it takes escaping rays to be outside, and a
-/// certain difference between source and receiver to be inside a body. Where the count is undecided (a body on the floor
+/// certain difference between source and receiver to be inside a body. Where the count is in doubt (a body on the floor
 /// shares a face with it), solid angles decide, if the triangles are turned alike.
 ///
 /// # Errors
@@ -110,8 +110,9 @@ pub fn check_placement(scene: &MeshScene, source: &Source, receiver: &Receiver) 
         let (what, id, position_m) = points[inner];
         let odd = around[inner].odd;
         let opposed = odd < 1.0 - CERTAIN && around[outer].odd > CERTAIN;
-        let undecided = (1.0 - CERTAIN..=CERTAIN).contains(&odd);
-        if opposed || undecided && differ(winding(scene, position_m), winding(scene, points[outer].2)) {
+        // Of the two the one that is less surely in the room.
+        let doubtful = odd <= CERTAIN && odd <= around[outer].odd;
+        if opposed || doubtful && differ(winding(scene, position_m), winding(scene, points[outer].2)) {
             return Err(Error::InsideBody { what, id: id.clone(), position_m, even: 1.0 - odd });
         }
     }
