@@ -109,18 +109,6 @@ impl DiffractingEdges {
     }
 }
 
-/// Adds all paths over one edge between two points that do not see each other: [`DiffractingEdges`] used once.
-#[allow(dead_code)] // the tracer is being rewritten; it calls this when `TracerConfig` asks for it
-pub(crate) fn add_diffracted_paths(
-    paths: &mut PathSet,
-    scene: &Scene,
-    mesh: &MeshScene,
-    source: Vec3,
-    receiver: Vec3,
-) {
-    DiffractingEdges::find(scene, mesh).add_paths(paths, mesh, source, receiver);
-}
-
 /// The path over one edge, and where it bends.
 fn around(
     wedge: &Wedge,

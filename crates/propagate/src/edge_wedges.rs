@@ -1,6 +1,5 @@
 //! Edges of a mesh around which sound may bend.
 
-use crate::mesh_report::weld;
 use crate::surfaces::Surfaces;
 use crate::vector::{Vec3, along, cross, dot, norm, scale, sub, unit};
 use sabine_acoustics::{EdgePoint, Scene};
@@ -65,7 +64,9 @@ struct Side {
 /// the positions of their corners; where a corner lies on the side of another triangle, the side is cut there. Pieces of one
 /// straight edge become one again.
 pub(crate) fn find_wedges(scene: &Scene, surfaces: &Surfaces) -> Vec<Wedge> {
-    let welded = weld(scene.vertices());
+    // Only a tolerance out of range is refused; this one is not.
+    let alone = |_| (0..scene.vertices().len()).collect();
+    let welded: Vec<usize> = scene.vertex_twins(Scene::WELD_TOLERANCE_M).unwrap_or_else(alone);
     let mut tips: BTreeMap<[usize; 2], Vec<Vec3>> = BTreeMap::new();
     for (triangle, surface) in scene.triangles().iter().zip(&surfaces.triangles) {
         let [a, b, c] = triangle.vertices.map(|v| welded[v as usize]);

@@ -5,9 +5,12 @@
 //! fits materials to such paths; [`PressureRenderer`] turns them into a pressure response to convolve sound with. Plain
 //! arrays go in and out.
 //!
-//! What it does **not** do: no diffraction but over a single edge into its shadow ([`DiffractingEdges`]), no room modes
-//! (below about 2000 sqrt(T60 / V) Hz a room is a wave field, not rays: Schroeder 1962), no transmission through walls, no
-//! directivity, no phase at reflections, and no reading of files.
+//! Directivity of source and receiver enters with the [`Conditions`](sabine_acoustics::Conditions) under which paths are
+//! weighed or rendered; [`AmbisonicRenderer`] keeps directions, [`MovingTracer`] follows whoever moves.
+//!
+//! What it does **not** do: no diffraction but, if asked for, over a single edge into its shadow ([`DiffractingEdges`]), no
+//! room modes (below about 2000 sqrt(T60 / V) Hz a room is a wave field, not rays: Schroeder 1962), no transmission through
+//! walls, no phase at reflections, and no reading of files.
 //!
 //! # Example
 //!
@@ -68,13 +71,13 @@
 //! Krokstad, Strom and Sorsdal 1968 (ray tracing of rooms); Allen and Berkley 1979, Borish 1984 (image sources);
 //! Vorlaender 2008, Auralization (scattering, spherical receivers); Veach 1997 (connections, balance heuristic); Cao et al. 2016
 //! (bidirectional tracing of sound); Georgiev et al. 2012, ACM Transactions on Graphics 31(6) (connections and meetings united);
-//! Wilkie et al. 2014 (hero sampling); Savioja and Svensson 2015, JASA 138(2) (overview of geometric room acoustics).
-//! Vorlaender 2008, Auralization (scattering, spherical receivers); Veach 1997 (connections, balance heuristic);
-//! Svensson, Fred and Vanderkooy 1999 (edge diffraction); Wilkie et al. 2014 (hero sampling); Savioja and Svensson 2015, JASA 138(2) (overview of geometric room acoustics).
+//! Wilkie et al. 2014 (hero sampling); Svensson, Fred and Vanderkooy 1999 (edge diffraction); Savioja and Svensson 2015,
+//! JASA 138(2) (overview of geometric room acoustics).
 
 mod ambisonic_renderer;
 mod ambisonic_response;
 mod band_masks;
+mod box_tree;
 mod brute_force_scene;
 mod direction_cells;
 mod edge_diffraction;
@@ -86,12 +89,14 @@ mod hierarchy;
 mod hierarchy_builder;
 mod image_sources;
 mod joining;
+mod mesh_edges;
 mod mesh_report;
 mod mesh_scene;
 mod moving_tracer;
 mod patches;
 mod path_tracer;
 mod placement;
+mod prepared_scene;
 mod pressure_renderer;
 mod pulse;
 mod random;
@@ -112,10 +117,13 @@ pub use ambisonic_response::AmbisonicResponse;
 pub use brute_force_scene::BruteForceScene;
 pub use edge_diffraction::DiffractingEdges;
 pub use error::Error;
+pub use mesh_edges::MeshEdge;
 pub use mesh_report::MeshReport;
 pub use mesh_scene::MeshScene;
 pub use moving_tracer::{Frame, MovingConfig, MovingTracer};
 pub use path_tracer::{PathTracer, TracerConfig};
+pub use placement::check_placement;
+pub use prepared_scene::PreparedScene;
 pub use pressure_renderer::{PressureRenderer, RenderConfig, Statistics};
 pub use reference_tracer::ReferenceTracer;
 pub use spherical_harmonics::ambisonic_gains;

@@ -2,9 +2,10 @@
 
 use crate::error::check_range;
 use crate::vector::{norm, sub};
-use crate::{Error, PathTracer, TracerConfig};
-use sabine_acoustics::{Air, Observer, PathSet, Propagator, Receiver, Scene, Source};
+use crate::{Error, PathTracer, PreparedScene, TracerConfig};
+use sabine_acoustics::{Air, Observer, PathSet, Receiver, Scene, Source};
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 /// Settings of [`MovingTracer`].
 #[derive(Clone, Debug, PartialEq)]
@@ -66,6 +67,7 @@ pub struct Frame {
 #[derive(Clone, Debug)]
 pub struct MovingTracer {
     scene: Scene,
+    prepared: Arc<PreparedScene>,
     air: Air,
     config: MovingConfig,
     /// The newest first.
@@ -87,12 +89,12 @@ impl MovingTracer {
     /// Takes the room and checks the settings.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for a setting outside its range.
+    /// [`Error::OutOfRange`] for a setting outside its range, [`Error::NoSurface`] if all triangles have zero area.
     pub fn new(scene: Scene, air: Air, config: MovingConfig) -> Result<Self, Error> {
-        config.tracer.check()?;
+        let prepared = Arc::new(PathTracer::new(config.tracer.clone())?.prepare(&scene)?);
         check_range("memory_m", config.memory_m, 1e-3, 1e3, "between 1 mm and 1 km")?;
         check_range("most_frames", config.most_frames as f64, 1.0, 1e3, "between 1 and 1000")?;
-        Ok(Self { scene, air, config, past: VecDeque::new(), count: 0 })
+        Ok(Self { scene, prepared, air, config, past: VecDeque::new(), count: 0 })
     }
 
     /// The settings.
@@ -127,7 +129,10 @@ impl MovingTracer {
         let seed = self.config.tracer.seed.wrapping_add(self.count);
         self.count += 1;
         let tracer = PathTracer::new(TracerConfig { seed, ..self.config.tracer.clone() })?;
-        let paths = tracer.trace(&self.scene, source, receiver, &self.air, observer)?;
+        if self.count == 1 && !self.config.tracer.allow_leaks {
+            self.prepared.check_leaks(&self.scene, source.position_m)?;
+        }
+        let paths = tracer.trace_prepared(&self.prepared, source, receiver, &self.air, observer)?;
         let (source_m, receiver_m) = (source.position_m, receiver.position_m);
         if let Some(last) = self.past.front() {
             let moved_m = norm(sub(source_m, last.source_m)) + norm(sub(receiver_m, last.receiver_m));

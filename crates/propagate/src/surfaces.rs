@@ -139,26 +139,40 @@ fn merge_coplanar(triangles: &mut [Surface]) -> Vec<Plane> {
     let mut order: Vec<usize> = (0..triangles.len()).filter(|&i| !triangles[i].is_degenerate()).collect();
     order.sort_by(|&i, &j| triangles[j].area_m2.total_cmp(&triangles[i].area_m2).then(i.cmp(&j)));
     let mut planes: Vec<Plane> = Vec::new();
-    // Planes by rounded normal, under both signs.
-    let mut by_normal: HashMap<[i32; 3], Vec<u32>> = HashMap::new();
-    let key = |normal: Vec3| normal.map(|c| (c / (2.0 * COPLANAR_RAD)).round() as i32);
-    for i in order {
+    // Planes by normal and distance from the middle, under both signs. A triangle of the same plane differs by less than half
+    // a cell in the normal, and therefore in the distance by less than half a slot.
+    let mut cells: HashMap<[i64; 4], Vec<u32>> = HashMap::new();
+    let corners = || order.iter().flat_map(|&i| triangles[i].corners());
+    let bound = |k: usize, pick: fn(f64, f64) -> f64| corners().map(|c| c[k]).reduce(pick).unwrap_or(0.0);
+    let middle: Vec3 = std::array::from_fn(|k| 0.5 * (bound(k, f64::min) + bound(k, f64::max)));
+    let reach_m = corners().map(|c| norm(sub(c, middle))).fold(0.0, f64::max);
+    // Sines stand for angles.
+    let half_cell = 1.01 * COPLANAR_RAD;
+    let half_slot_m = half_cell * reach_m + COPLANAR_M;
+    let key = |normal: Vec3, on: Vec3, shift: f64| -> [i64; 4] {
+        let [x, y, z] = normal.map(|c| (0.5 * (c / half_cell + shift)).floor() as i64);
+        [x, y, z, (0.5 * (dot(normal, sub(on, middle)) / half_slot_m + shift)).floor() as i64]
+    };
+    for &i in &order {
         let triangle = &triangles[i];
         let corners = triangle.corners();
-        let [x, y, z] = key(triangle.normal);
-        let same = (0..27).find_map(|n| {
-            let near = [x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1];
-            by_normal.get(&near)?.iter().copied().find(|&p| {
-                let plane = &planes[p as usize];
-                norm(cross(plane.normal, triangle.normal)) < COPLANAR_RAD
-                    && corners.iter().all(|&c| plane.height(c).abs() < COPLANAR_M)
-            })
-        });
+        let (low, high) =
+            (key(triangle.normal, triangle.corner, -1.0), key(triangle.normal, triangle.corner, 1.0));
+        let near = (0..16)
+            .filter(|n| (0..4).all(|k| n >> k & 1 == 0 || low[k] != high[k]))
+            .map(|n| std::array::from_fn(|k| if n >> k & 1 == 0 { low[k] } else { high[k] }));
+        let fits = |p: &u32| {
+            let plane = &planes[*p as usize];
+            norm(cross(plane.normal, triangle.normal)) < COPLANAR_RAD
+                && corners.iter().all(|&c| plane.height(c).abs() < COPLANAR_M)
+        };
+        let same = near.filter_map(|cell| cells.get(&cell)?.iter().copied().find(fits)).min();
         let plane = same.unwrap_or_else(|| {
             let (normal, id) = (triangle.normal, planes.len() as u32);
             planes.push(Plane { normal, offset_m: dot(normal, triangle.corner) });
-            by_normal.entry(key(normal)).or_default().push(id);
-            by_normal.entry(key(scale(normal, -1.0))).or_default().push(id);
+            for facing in [normal, scale(normal, -1.0)] {
+                cells.entry(key(facing, triangle.corner, 0.0)).or_default().push(id);
+            }
             id
         });
         triangles[i].plane = plane;
