@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 
 /// Boxes are wider than their triangles by this share of the size of the scene: more than single precision can be wrong
 /// by for a ray that starts within three sizes of the centre (about 1e-6).
-pub(crate) const MARGIN: f64 = 4e-6;
+const MARGIN: f64 = 4e-6;
 /// The rough test of triangles is as generous: its errors stay below 5e-6.
 const TOLERANCE: f64 = 8e-6;
 
