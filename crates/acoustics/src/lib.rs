@@ -117,6 +117,7 @@ mod path_parameters;
 mod paths;
 mod progress;
 mod resample;
+mod reweighting;
 mod scene;
 mod signal;
 mod spectrum;

@@ -1,8 +1,10 @@
 //! Traced paths: the seam between a tracer and everything after it.
 
+use crate::reweighting::{LANES, Lanes, exp, sums_along};
 use crate::{
     Air, Conditions, Directivity, EdgeDiffraction, EnergyResponse, Error, Material, OctaveBands, Orientation,
 };
+use rayon::prelude::*;
 
 /// What a surface did to a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,6 +74,8 @@ pub struct PathSet {
     diffractions: Vec<(usize, EdgeDiffraction)>,
 }
 
+/// Paths that are weighed at a time.
+const BLOCK: usize = 256;
 /// Batch of contributions that are exact.
 const EXACT: u8 = u8::MAX;
 
@@ -390,23 +394,12 @@ impl PathSet {
     /// [`Error::MaterialCount`] if the number of materials is not that of the paths, [`Error::Index`] for an unknown band.
     pub fn log_reflectance(&self, materials: &[Material], band: usize) -> Result<Vec<f32>, Error> {
         self.check_materials(materials)?;
-        // Index event = material * 2 + scattered. ln 0 is minus infinity: the path carries nothing, as it should.
-        let mut step = Vec::with_capacity(2 * materials.len());
-        for material in materials {
-            let count = material.bands().len();
-            if band >= count {
-                return Err(Error::Index { what: "band", index: band, count });
-            }
-            let reflected = 1.0 - material.absorption().values()[band];
-            let scattered = material.scattering().values()[band];
-            step.push((reflected * (1.0 - scattered)).ln() as f32);
-            step.push((reflected * scattered).ln() as f32);
+        let count = materials[0].bands().len();
+        if band >= count {
+            return Err(Error::Index { what: "band", index: band, count });
         }
-        let mut log_gain = vec![0.0f32; self.parents.len()];
-        for chain in 1..self.parents.len() {
-            log_gain[chain] = log_gain[self.parents[chain] as usize] + step[usize::from(self.events[chain])];
-        }
-        Ok(log_gain)
+        let sums = sums_along(&self.parents, &self.events, &log_steps(materials, band, count));
+        Ok(sums.into_iter().map(|lanes| lanes[0]).collect())
     }
 
     /// Energy of each contribution in each band of the materials, `[band][contribution]`, between an omnidirectional source and
@@ -427,18 +420,34 @@ impl PathSet {
         let bands = self.check_materials(materials)?;
         conditions.check_bands(bands)?;
         let exponents = air.energy_exponent_per_m(bands);
-        let mut energies = (0..bands.len())
-            .map(|band| {
-                let log_gain = self.log_reflectance(materials, band)?;
-                let exponent = exponents.values()[band] as f32;
-                let energy = |(((&length, &log_weight), &chain), &tail): (((&f32, &f32), &u32), &u32)| {
-                    let surfaces = log_gain[chain as usize] + log_gain[tail as usize];
-                    (log_weight + surfaces - exponent * length).exp()
-                };
-                let columns = self.lengths_m.iter().zip(&self.log_weights).zip(&self.chains).zip(&self.tails);
-                Ok(columns.map(energy).collect())
+        let groups: Vec<usize> = (0..bands.len()).step_by(LANES).collect();
+        let mut energies: Vec<Vec<f32>> = groups
+            .into_par_iter()
+            .flat_map_iter(|first| {
+                let exponents = lanes(first, bands.len(), |band| exponents.values()[band] as f32);
+                let sums = sums_along(&self.parents, &self.events, &log_steps(materials, first, bands.len()));
+                let mut columns = [const { Vec::new() }; LANES];
+                columns.iter_mut().for_each(|column| column.resize(self.len(), 0.0));
+                let mut block = [[0.0; LANES]; BLOCK];
+                for start in (0..self.len()).step_by(BLOCK) {
+                    let range = start..self.len().min(start + BLOCK);
+                    let paths = self.lengths_m[range.clone()].iter().zip(&self.log_weights[range.clone()]);
+                    let chains = self.chains[range.clone()].iter().zip(&self.tails[range.clone()]);
+                    for (x, ((&length, &log_weight), (&chain, &tail))) in
+                        block.iter_mut().zip(paths.zip(chains))
+                    {
+                        let (out, back) = (sums[chain as usize], sums[tail as usize]);
+                        *x = std::array::from_fn(|i| log_weight + out[i] + back[i] - exponents[i] * length);
+                    }
+                    block.iter_mut().for_each(|x| *x = exp(*x));
+                    for (i, column) in columns.iter_mut().enumerate() {
+                        column[range.clone()].iter_mut().zip(&block).for_each(|(e, lanes)| *e = lanes[i]);
+                    }
+                }
+                let used = LANES.min(bands.len() - first);
+                columns.into_iter().take(used)
             })
-            .collect::<Result<Vec<Vec<f32>>, Error>>()?;
+            .collect();
         for (ends, directed) in [(&self.departures, conditions.source), (&self.arrivals, conditions.receiver)]
         {
             if let Some((directivity, orientation)) = directed {
@@ -537,6 +546,24 @@ fn weigh_directions(
             column[i] *= directivity.gain_at(place, band) as f32;
         }
     }
+}
+
+/// A value for each of the bands from `first` on, as far as there are any.
+fn lanes(first: usize, bands: usize, value: impl Fn(usize) -> f32) -> Lanes {
+    std::array::from_fn(|i| if first + i < bands { value(first + i) } else { 0.0 })
+}
+
+/// Logarithm of what each event leaves of the energy, `material * 2 + scattered`, in the bands from `first` on. That of nothing
+/// is minus infinity: the path carries nothing, as it should.
+fn log_steps(materials: &[Material], first: usize, bands: usize) -> Vec<Lanes> {
+    let event = |material: &Material, scattered: bool| {
+        lanes(first, bands, |band| {
+            let scattering = material.scattering().values()[band];
+            let share = if scattered { scattering } else { 1.0 - scattering };
+            ((1.0 - material.absorption().values()[band]) * share).ln() as f32
+        })
+    };
+    materials.iter().flat_map(|material| [event(material, false), event(material, true)]).collect()
 }
 
 /// Octahedral map to two 16-bit integers (Cigolle et al. 2014, JCGT 3(2)): four bytes for a direction.

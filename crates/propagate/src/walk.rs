@@ -62,7 +62,7 @@ pub(crate) fn visible(scene: &impl RayScene, from: Vec3, to: Vec3) -> bool {
         return true;
     }
     let direction = crate::vector::scale(line, 1.0 / distance);
-    scene.closest_hit(from, direction, distance - STEP_BACK_M).is_none()
+    !scene.any_hit(from, direction, distance - STEP_BACK_M)
 }
 
 /// A sphere about one end of the paths that counts the rays from the other end: the mean energy density inside is the sum of

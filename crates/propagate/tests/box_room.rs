@@ -163,7 +163,7 @@ fn six_materials_in_eight_octaves_decay_as_image_sources_do() {
     let scene = Scene::shoebox(SIZE_M, walls).unwrap();
     let paths = trace(
         &scene,
-        TracerConfig { rays: 30_000, duration_s: 1.0, seed: 4, receiver_radius_m: 1.0, ..Default::default() },
+        TracerConfig { rays: 60_000, duration_s: 1.0, seed: 4, receiver_radius_m: 1.0, ..Default::default() },
         SOURCE_M,
         RECEIVER_M,
     );
@@ -191,7 +191,7 @@ fn six_materials_in_eight_octaves_decay_as_image_sources_do() {
                 bands.nominal_hz(band),
                 level.standard_error
             );
-            // Later the energy of this uneven room rests on a few grazing paths, and 30,000 rays say less of it.
+            // Later the energy of this uneven room rests on a few grazing paths, and 60,000 rays say less of it.
             assert!(at_s > 0.1 || level.standard_error < 0.3, "{at_s} s: {level:?}");
             assert!(level.standard_error < 2.0, "{at_s} s: {level:?}");
         }
