@@ -122,9 +122,21 @@ pub fn write_wav_channels(
 /// # Errors
 /// [`Error::OutOfRange`] for a sample beyond full scale in an integer format.
 pub fn encode_wav(signal: &Signal, format: SampleFormat) -> Result<Vec<u8>, Error> {
-    check_writable(&[signal.samples()], signal.sample_rate_hz(), format)?;
+    encode_wav_channels(&[signal.samples()], signal.sample_rate_hz(), format)
+}
+
+/// The bytes of a WAV file of several channels.
+///
+/// # Errors
+/// As [`write_wav_channels`], without a file to name.
+pub fn encode_wav_channels(
+    channels: &[&[f32]],
+    sample_rate_hz: u32,
+    format: SampleFormat,
+) -> Result<Vec<u8>, Error> {
+    check_writable(channels, sample_rate_hz, format)?;
     let mut bytes = std::io::Cursor::new(Vec::new());
-    encode(&mut bytes, &[signal.samples()], signal.sample_rate_hz(), format)
+    encode(&mut bytes, channels, sample_rate_hz, format)
         .map_err(|source| Error::implementation("WAV encoder", source))?;
     Ok(bytes.into_inner())
 }

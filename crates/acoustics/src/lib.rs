@@ -122,7 +122,8 @@ mod traits;
 pub use air::Air;
 pub use atomic_file::write_atomically;
 pub use audio::{
-    AudioInfo, Channel, SampleFormat, encode_wav, probe_wav, read_audio, write_wav, write_wav_channels,
+    AudioInfo, Channel, SampleFormat, encode_wav, encode_wav_channels, probe_wav, read_audio, write_wav,
+    write_wav_channels,
 };
 pub use bands::{OctaveBands, PerBand};
 pub use conditions::Conditions;

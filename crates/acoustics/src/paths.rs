@@ -290,6 +290,14 @@ impl PathSet {
         Some((self.parents[chain as usize], u32::from(event >> 1), reflection))
     }
 
+    /// Whether a contribution met no surface.
+    ///
+    /// # Panics
+    /// If there is no such contribution.
+    pub fn is_direct(&self, contribution: usize) -> bool {
+        self.chains[contribution] == Self::DIRECT && self.tails[contribution] == Self::DIRECT
+    }
+
     /// Whether a contribution was found exactly and renders as a coherent reflection.
     ///
     /// # Panics

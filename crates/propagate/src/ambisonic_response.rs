@@ -4,7 +4,7 @@ use crate::Error;
 use crate::direction_cells::DirectionCells;
 use crate::error::check_range;
 use crate::spherical_harmonics::{MOST_CHANNELS, MOST_ORDER, harmonics};
-use sabine_acoustics::{ImpulseResponse, Orientation, SampleFormat, write_wav_channels};
+use sabine_acoustics::{ImpulseResponse, Orientation, SampleFormat, encode_wav_channels, write_wav_channels};
 use std::path::Path;
 
 /// Pressure and its directional parts at a listener: ambisonics of order 1 to 3 in the channel order ACN with the
@@ -91,8 +91,19 @@ impl AmbisonicResponse {
     /// # Errors
     /// [`Error::Acoustics`], naming the file, if it cannot be written, or if a sample is beyond full scale in an integer format.
     pub fn write_wav(&self, path: impl AsRef<Path>, format: SampleFormat) -> Result<(), Error> {
-        let channels: Vec<&[f32]> = self.channels.iter().map(Vec::as_slice).collect();
-        Ok(write_wav_channels(path, &channels, self.sample_rate_hz, format)?)
+        Ok(write_wav_channels(path, &self.slices(), self.sample_rate_hz, format)?)
+    }
+
+    /// The bytes of such a file.
+    ///
+    /// # Errors
+    /// [`Error::Acoustics`] for a sample beyond full scale in an integer format.
+    pub fn encode_wav(&self, format: SampleFormat) -> Result<Vec<u8>, Error> {
+        Ok(encode_wav_channels(&self.slices(), self.sample_rate_hz, format)?)
+    }
+
+    fn slices(&self) -> Vec<&[f32]> {
+        self.channels.iter().map(Vec::as_slice).collect()
     }
 }
 
