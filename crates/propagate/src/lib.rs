@@ -74,6 +74,7 @@ mod ambisonic_response;
 mod band_masks;
 mod brute_force_scene;
 mod direction_cells;
+mod early_memory;
 mod energy_envelope;
 mod error;
 mod event_mixture;

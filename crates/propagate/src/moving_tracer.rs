@@ -1,6 +1,8 @@
 //! Paths between a source and a listener that move.
 
+use crate::early_memory::EarlyMemory;
 use crate::error::check_range;
+use crate::mesh_scene::MeshScene;
 use crate::vector::{norm, sub};
 use crate::{Error, PathTracer, TracerConfig};
 use sabine_acoustics::{Air, Observer, PathSet, Propagator, Receiver, Scene, Source};
@@ -40,7 +42,7 @@ pub struct Frame {
 /// Follows a moving source and a moving listener with few rays for each frame.
 ///
 /// Exact paths (the direct sound, image sources) are found anew in every frame, with the delays and directions of the
-/// moment. Sampled paths are averaged over the last frames, each traced with its own seed: a frame counts by
+/// moment; in a room of so many planes that rays have to find the image sources, what older frames found is validated again. Sampled paths are averaged over the last frames, each traced with its own seed: a frame counts by
 /// exp(-moved / `memory_m`), `moved` being how far source and listener have gone since. Whoever stands still gathers up to
 /// `most_frames` frames; for one who walks at 1.4 m/s the default memory is a time constant of 0.36 s, and at ten frames a second seven
 /// of them count. Older paths are shifted to the new places to first order
@@ -63,11 +65,12 @@ pub struct Frame {
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Debug)]
 pub struct MovingTracer {
     scene: Scene,
+    mesh: MeshScene,
     air: Air,
     config: MovingConfig,
+    early: EarlyMemory,
     /// The newest first.
     past: VecDeque<Past>,
     count: u64,
@@ -87,12 +90,14 @@ impl MovingTracer {
     /// Takes the room and checks the settings.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for a setting outside its range.
+    /// [`Error::OutOfRange`] for a setting outside its range, [`Error::NoSurface`] if all triangles have zero area.
     pub fn new(scene: Scene, air: Air, config: MovingConfig) -> Result<Self, Error> {
         config.tracer.check()?;
         check_range("memory_m", config.memory_m, 1e-3, 1e3, "between 1 mm and 1 km")?;
         check_range("most_frames", config.most_frames as f64, 1.0, 1e3, "between 1 and 1000")?;
-        Ok(Self { scene, air, config, past: VecDeque::new(), count: 0 })
+        let mesh = MeshScene::new(&scene)?;
+        let early = EarlyMemory::default();
+        Ok(Self { scene, mesh, air, config, early, past: VecDeque::new(), count: 0 })
     }
 
     /// The settings.
@@ -103,6 +108,7 @@ impl MovingTracer {
     /// Forgets all frames: after a leap, or when the room has changed.
     pub fn clear(&mut self) {
         self.past.clear();
+        self.early.clear();
     }
 
     /// Traces the frame of these places.
@@ -127,8 +133,9 @@ impl MovingTracer {
         let seed = self.config.tracer.seed.wrapping_add(self.count);
         self.count += 1;
         let tracer = PathTracer::new(TracerConfig { seed, ..self.config.tracer.clone() })?;
-        let paths = tracer.trace(&self.scene, source, receiver, &self.air, observer)?;
+        let mut paths = tracer.trace(&self.scene, source, receiver, &self.air, observer)?;
         let (source_m, receiver_m) = (source.position_m, receiver.position_m);
+        self.early.complete(&mut paths, &self.mesh, [source_m, receiver_m]);
         if let Some(last) = self.past.front() {
             let moved_m = norm(sub(source_m, last.source_m)) + norm(sub(receiver_m, last.receiver_m));
             self.past.iter_mut().for_each(|past| past.moved_m += moved_m);
