@@ -38,9 +38,12 @@ struct Arguments {
     /// The sound to be written
     #[arg(long, value_name = "F.wav", default_value = "walk.wav")]
     out: PathBuf,
-    /// Channels: one; 16 of third-order ambisonics (ACN, SN3D); or two ears
+    /// Channels: one; those of ambisonics (ACN, SN3D); or two ears
     #[arg(long, value_enum, default_value_t = Mode::Mono)]
     mode: Mode,
+    /// Ambisonic order, 1 to 3, also that behind the two ears
+    #[arg(long, default_value_t = 3)]
+    order: usize,
     /// Head-related impulse responses for `--mode binaural`
     #[arg(long, value_name = "F.sofa")]
     head: Option<PathBuf>,
@@ -150,6 +153,7 @@ fn run(arguments: &Arguments) -> Result<(), Anything> {
             channel.process(&samples)?;
         }
     }
+    bar.finish();
     let seconds = whole.elapsed().as_secs_f64();
     let mut sound: Vec<Vec<f32>> = channels.into_iter().map(|channel| channel.output).collect();
     let peak = sound.iter().flatten().fold(f32::MIN_POSITIVE, |peak, s| peak.max(s.abs()));
@@ -231,12 +235,12 @@ impl Renderer {
         };
         Ok(match arguments.mode {
             Mode::Mono => Self::Mono(PressureRenderer::new(config)?),
-            Mode::Ambisonic => Self::Ambisonic(AmbisonicRenderer::new(3, config)?),
+            Mode::Ambisonic => Self::Ambisonic(AmbisonicRenderer::new(arguments.order, config)?),
             Mode::Binaural => {
                 let path =
                     arguments.head.as_ref().ok_or("--mode binaural: give the head by --head F.sofa")?;
                 let head = HeadResponses::read_sofa(path)?.resampled(arguments.rate)?;
-                Self::Binaural(AmbisonicRenderer::new(3, config)?, head)
+                Self::Binaural(AmbisonicRenderer::new(arguments.order, config)?, head)
             }
         })
     }

@@ -13,7 +13,7 @@ const UPDATE_BLOCKS: usize = 48;
 fn response(update: usize) -> Vec<f32> {
     let mut samples = vec![0.0f32; LENGTH];
     let mut pulse = |position: f64, amplitude: f64| {
-        for i in 0..LENGTH {
+        for (i, sample) in samples.iter_mut().enumerate() {
             let x = i as f64 - position;
             if x.abs() < 16.0 {
                 let sinc = if x == 0.0 {
@@ -21,8 +21,7 @@ fn response(update: usize) -> Vec<f32> {
                 } else {
                     (std::f64::consts::PI * x).sin() / (std::f64::consts::PI * x)
                 };
-                samples[i] +=
-                    (amplitude * sinc * (0.5 + 0.5 * (std::f64::consts::PI * x / 16.0).cos())) as f32;
+                *sample += (amplitude * sinc * (0.5 + 0.5 * (std::f64::consts::PI * x / 16.0).cos())) as f32;
             }
         }
     };

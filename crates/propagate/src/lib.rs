@@ -2,12 +2,13 @@
 //!
 //! Where it sits: [`PathTracer`] turns a [`Scene`](sabine_acoustics::Scene), a source and a receiver into a
 //! [`PathSet`](sabine_acoustics::PathSet), in which absorption, air and speed of sound are still free. `sabine-optimize`
-//! fits materials to such paths; [`PressureRenderer`] turns them into a pressure response to convolve sound with. parry
-//! stays inside this crate: plain arrays go in and out.
+//! fits materials to such paths; [`PressureRenderer`] turns them into a pressure response to convolve sound with,
+//! [`AmbisonicRenderer`] into one with directions, and [`HeadResponses`] that into what two ears hear. [`MovingTracer`] follows
+//! sources and listeners that move. parry stays inside this crate: plain arrays go in and out.
 //!
 //! What it does **not** do: no diffraction (a screen casts a sharp shadow), no room modes (below about
 //! 2000 sqrt(T60 / V) Hz a room is a wave field, not rays: Schroeder 1962), no transmission through walls, no
-//! directivity, no phase at reflections, and no reading of files.
+//! phase at reflections or of directivities, no Doppler shift within a response, and no reading of meshes.
 //!
 //! # Example
 //!
@@ -55,6 +56,10 @@
 //! | rays from both ends against rays from one | equal in the mean, half the variance, also through a doorway | `tests/agreement.rs` |
 //! | octaves of different scattering in one trace | equal in the mean to a trace for each | `tests/agreement.rs` |
 //! | T20, T30 measured on the rendered response | 3 % of the paths' own, 125 Hz to 4 kHz | `tests/rendering.rs` |
+//! | reverberation of a directional source | 1 / directivity factor, within three standard errors | `tests/directivity.rs` |
+//! | ambisonics: an exact path | its spherical harmonics in all channels | `tests/ambisonics.rs` |
+//! | ambisonics: a diffuse field | SN3D energies, 1 / (2l + 1), within 1 % in each channel; T30 of W as in mono | `tests/ambisonics.rs` |
+//! | a listener who walks | direct sound exact; reverberation within four standard errors of a long trace | `tests/moving.rs` |
 //! | same seed, other number of threads | the same paths and samples, bit for bit | `tests/agreement.rs` |
 //! | edges and corners | no ray lost | `walk.rs` |
 //!
@@ -62,12 +67,16 @@
 //! as much space, and so do the patches of wall (0.35 m) on which rays from both ends meet; that concerns paths of several
 //! reflections only, some of them mirror-like.
 //!
+//! # Features
+//!
+//! `sofa`: [`HeadResponses`] are read from AES69 (SOFA) files, by the crate `sofar` (pure Rust).
+//!
 //! # References
 //!
 //! Krokstad, Strom and Sorsdal 1968 (ray tracing of rooms); Allen and Berkley 1979, Borish 1984 (image sources);
 //! Vorlaender 2008, Auralization (scattering, spherical receivers); Veach 1997 (connections, balance heuristic); Cao et al. 2016
 //! (bidirectional tracing of sound); Georgiev et al. 2012, ACM Transactions on Graphics 31(6) (connections and meetings united);
-//! Wilkie et al. 2014 (hero sampling); Savioja and Svensson 2015, JASA 138(2) (overview of geometric room acoustics).
+//! Wilkie et al. 2014 (hero sampling); Nachbar et al. 2011 (AmbiX); Savioja and Svensson 2015, JASA 138(2) (overview of geometric room acoustics).
 
 mod ambisonic_renderer;
 mod ambisonic_response;

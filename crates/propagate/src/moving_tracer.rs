@@ -33,7 +33,7 @@ impl Default for MovingConfig {
 pub struct Frame {
     /// All paths of the moment, to be re-weighted and rendered as any others.
     pub paths: PathSet,
-    /// Rays traced for this frame.
+    /// Rays asked for in this frame ([`TracerConfig::rays`]).
     pub rays: usize,
     /// Rays of this and older frames as they count: as many equally weighted ones would have the same variance.
     pub effective_rays: f64,
@@ -42,10 +42,13 @@ pub struct Frame {
 /// Follows a moving source and a moving listener with few rays for each frame.
 ///
 /// Exact paths (the direct sound, image sources) are found anew in every frame, with the delays and directions of the
-/// moment; in a room of so many planes that rays have to find the image sources, what older frames found is validated again. Sampled paths are averaged over the last frames, each traced with its own seed: a frame counts by
-/// exp(-moved / `memory_m`), `moved` being how far source and listener have gone since. Whoever stands still gathers up to
-/// `most_frames` frames; for one who walks at 1.4 m/s the default memory is a time constant of 0.36 s, and at ten frames a second seven
-/// of them count. Older paths are shifted to the new places to first order
+/// moment. In a room of so many planes that rays have to find the image sources, what older frames found is validated
+/// again, so that early reflections do not flicker.
+///
+/// Sampled paths are averaged over the last frames, each traced with its own seed: a frame counts by
+/// exp(-moved / `memory_m`), `moved` being how far source and listener have gone since. Whoever stands still gathers
+/// `most_frames` frames. For one who walks at 1.4 m/s the default memory is a time constant of 0.36 s; at ten frames a second
+/// the average is worth seven frames. Older paths are shifted to the new places to first order
 /// ([`PathSet::append_displaced`]), so that their delays neither jump nor precede the direct sound.
 ///
 /// The result depends on the seed and on the sequence of places, not on the time that passes or on the number of threads.
