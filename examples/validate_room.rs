@@ -5,7 +5,7 @@
 use clap::Parser;
 use sabine::acoustics::{
     Conditions, Estimate, Material, MeasuredRoom, OctaveBands, PathParameters, PathSet, PerBand, Propagator,
-    Reading,
+    Reading, Scene, library_material,
 };
 use sabine::optimize::{AbsorptionPrior, FitConfig, MaterialFitter};
 use sabine::propagate::{PathTracer, TracerConfig};
@@ -26,6 +26,12 @@ struct Arguments {
     /// Fit the materials to the measured T20 first; all comparisons are then made on rays of another seed
     #[arg(long)]
     fit: bool,
+    /// What a surface is thought to be: a name of the material library instead of the room file's table
+    #[arg(long, value_name = "SURFACE=LIBRARY_NAME")]
+    material: Vec<String>,
+    /// Scattering coefficient of all surfaces without one in the library, instead of the room file's
+    #[arg(long, value_name = "0..1")]
+    scattering: Option<f64>,
     /// Rays for each pair
     #[arg(long, default_value_t = 10_000)]
     rays: usize,
@@ -75,13 +81,14 @@ fn run(arguments: &Arguments) -> Result<(), Anything> {
     let measured = third_octaves(&file)?;
     let bands = room.bands();
     let bar = Bar::new();
-    let mut materials: Vec<Material> = room.scene().materials().iter().map(|m| m.material.clone()).collect();
+    let mut materials = room_materials(&room, &arguments.material, arguments.scattering)?;
+    let scene = room.scene().with_materials(materials.clone())?;
     if arguments.fit {
-        let paths = trace_all(&room, arguments, arguments.seed + 1000, &bar)?;
+        let paths = trace_all(&room, &scene, arguments, arguments.seed + 1000, &bar)?;
         materials = fitted(&room, &materials, &measured, &paths, &bar)?;
     }
     let air = room.air();
-    let traced = trace_all(&room, arguments, arguments.seed, &bar)?;
+    let traced = trace_all(&room, &scene, arguments, arguments.seed, &bar)?;
     bar.finish();
     let parameters: Vec<PathParameters> = traced
         .iter()
@@ -119,9 +126,37 @@ fn run(arguments: &Arguments) -> Result<(), Anything> {
     Ok(())
 }
 
+/// The room file's materials, or those of the library where the user knows better.
+fn room_materials(
+    room: &MeasuredRoom,
+    choices: &[String],
+    scattering: Option<f64>,
+) -> Result<Vec<Material>, Anything> {
+    let named = room.scene().materials();
+    let mut materials: Vec<Material> = named.iter().map(|m| m.material.clone()).collect();
+    if let Some(scattering) = scattering {
+        for material in &mut materials {
+            let scattering = PerBand::uniform(room.bands(), scattering);
+            *material = Material::new(material.absorption().clone(), scattering)?;
+        }
+    }
+    for choice in choices {
+        let (surface, library) = choice
+            .split_once('=')
+            .ok_or_else(|| format!("--material {choice}: SURFACE=LIBRARY_NAME is expected"))?;
+        let at = named
+            .iter()
+            .position(|m| m.name == surface)
+            .ok_or_else(|| format!("--material {choice}: the room has no surface of that name"))?;
+        materials[at] = library_material(library)?.material(room.bands())?;
+    }
+    Ok(materials)
+}
+
 /// Paths of every pair, each with a seed of its own.
 fn trace_all(
     room: &MeasuredRoom,
+    scene: &Scene,
     arguments: &Arguments,
     seed: u64,
     bar: &Bar,
@@ -136,7 +171,7 @@ fn trace_all(
                 allow_leaks: arguments.allow_leaks,
                 ..TracerConfig::default()
             };
-            traced.push(PathTracer::new(config)?.trace(room.scene(), source, receiver, &room.air(), bar)?);
+            traced.push(PathTracer::new(config)?.trace(scene, source, receiver, &room.air(), bar)?);
         }
     }
     Ok(traced)

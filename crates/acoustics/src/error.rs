@@ -159,12 +159,75 @@ pub enum Error {
         /// The offending word.
         text: String,
     },
-    /// A face before the first `usemtl`, so that its material is unknown.
-    #[error("a face without material: there is no `usemtl` before it")]
-    NoMaterial,
+    /// Faces that name no material where the room has no table `default` for them.
+    #[error("{faces} faces of the mesh {} name no material, and there is no table `default` for them", mesh.display())]
+    FacesWithoutMaterial {
+        /// Number of such faces.
+        faces: usize,
+        /// The mesh.
+        mesh: PathBuf,
+    },
     /// A polygon that cannot be cut into triangles, because its outline crosses itself.
     #[error("the outline of this polygon crosses itself")]
     CrossedPolygon,
+    /// A mesh file whose ending is none of those that can be read.
+    #[error("{}: neither .obj nor .gltf nor .glb", path.display())]
+    UnknownMeshFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A glTF file, but this build cannot read it.
+    #[error("{}: glTF meshes need the feature `gltf`", path.display())]
+    GltfFeature {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A mesh file that is not what its ending says.
+    #[error("{}: {source}", path.display())]
+    MeshFormat {
+        /// The file.
+        path: PathBuf,
+        /// The decoder's cause.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// A mesh with more vertices or triangles than can be meant.
+    #[error("{found} {what}; at most {limit} are read")]
+    MeshTooLarge {
+        /// "vertices" or "triangles".
+        what: &'static str,
+        /// How many the file asks for, as far as it was read.
+        found: u64,
+        /// The limit.
+        limit: u64,
+    },
+    /// Numbers of a mesh that are said to lie where its file has none.
+    #[error("ends at byte {needed_bytes} of {found_bytes}")]
+    BeyondBuffer {
+        /// Where the numbers would end.
+        needed_bytes: u64,
+        /// How many bytes there are.
+        found_bytes: u64,
+    },
+    /// A buffer of a mesh that lies neither in the file nor beside it.
+    #[error("cannot read `{uri}`: neither base64 data nor a file beside the mesh")]
+    BufferUri {
+        /// The address, or its beginning.
+        uri: String,
+    },
+    /// A part of a mesh file that is not read, and without which the mesh would not be whole.
+    #[error("`{found}` where only {expected} can be read")]
+    UnsupportedMesh {
+        /// What was found.
+        found: String,
+        /// What is read.
+        expected: &'static str,
+    },
+    /// A node of a mesh file that is its own ancestor, or has two parents.
+    #[error("node {node} hangs in the tree of nodes twice")]
+    NodeTwice {
+        /// Index of the node.
+        node: usize,
+    },
     /// A material of the mesh without a table in the room file.
     #[error("the mesh {} uses the material `{material}`, for which there is no table", mesh.display())]
     MaterialWithoutTable {

@@ -48,6 +48,9 @@
 //! - Between tracing and everything after it: [`PathSet`], [`Conditions`] (what may change without tracing again: materials,
 //!   air, [`Directivity`] and [`Orientation`] of source and receiver), [`EnergyResponse`] (energy, **not** to be convolved),
 //!   [`PathParameters`] with Monte-Carlo standard errors.
+//! - Between tracing and everything after it: [`PathSet`], [`EnergyResponse`] (energy, **not** to be convolved), [`EdgeDiffraction`].
+//! - Rooms: [`Scene`], [`Mesh`] (OBJ, glTF), [`Material`], [`material_library`], [`MeasuredRoom`], [`Source`], [`Receiver`].
+//! - Between tracing and everything after it: [`PathSet`], [`EnergyResponse`] (energy, **not** to be convolved).
 //! - Seams: [`FeatureExtractor`], [`RoomEstimator`], [`Augment`], [`RayScene`], [`Propagator`], [`Objective`].
 //!
 //! # Does not
@@ -77,7 +80,8 @@
 //! `docs/validation/measures.md` has the tables and how to repeat them.
 //!
 //! # Features
-//! `symphonia`: [`read_audio`] reads FLAC, Ogg Vorbis and AIFF besides WAV.
+//! - `symphonia`: [`read_audio`] reads FLAC, Ogg Vorbis and AIFF besides WAV.
+//! - `gltf`: [`Mesh::read`] reads glTF and GLB besides OBJ.
 //!
 //! # References
 //! - ISO 3382-1:2009 and 3382-2:2008 (parameters), IEC 61260-1:2014 (bands), ISO 9613-1:1993 (air).
@@ -98,6 +102,7 @@ mod conditions;
 mod decay_fit;
 mod directivity;
 mod directivity_table;
+mod edge_diffraction;
 mod energy;
 mod equalisation;
 mod error;
@@ -106,6 +111,7 @@ mod filter_bank;
 mod material;
 mod material_library;
 mod measured_room;
+mod mesh_file;
 mod onset;
 mod orientation;
 mod parameters;
@@ -120,6 +126,7 @@ mod targets;
 mod theory;
 mod third_octaves;
 mod traits;
+mod weld;
 
 pub use air::Air;
 pub use atomic_file::write_atomically;
@@ -131,6 +138,7 @@ pub use bands::{OctaveBands, PerBand};
 pub use conditions::Conditions;
 pub use decay_fit::{DecayFit, Slope};
 pub use directivity::Directivity;
+pub use edge_diffraction::{EdgeDiffraction, EdgePoint};
 pub use energy::{EnergyDecayCurve, EnergyResponse};
 pub use equalisation::equalisation;
 pub use error::Error;
@@ -141,6 +149,7 @@ pub use material_library::{LibraryMaterial, library_material, material_library};
 pub use measured_room::{
     Levels, MaterialPrior, MeasuredRoom, Measurement, NewResponse, NewRoom, ResponseEntry, TimeZero,
 };
+pub use mesh_file::Mesh;
 pub use onset::Onset;
 pub use orientation::Orientation;
 pub use parameters::{BandParameters, RoomParameters};
@@ -154,3 +163,4 @@ pub use targets::RoomTargets;
 pub use theory::{DiffuseRoom, schroeder_frequency_hz};
 pub use third_octaves::ThirdOctaveBands;
 pub use traits::{Augment, FeatureExtractor, Objective, Propagator, RayHit, RayScene, RoomEstimator};
+pub use weld::WeldReport;

@@ -1,17 +1,13 @@
 //! A room as it was measured: mesh, materials as far as they are known, places and responses, from a folder.
 
 mod file;
-mod obj;
-mod polygon;
 mod write;
 
 pub use write::{NewResponse, NewRoom};
 
 use crate::audio::{Channel, probe_wav, read_audio};
 use crate::error::check_range;
-use crate::{
-    Air, Error, ImpulseResponse, Material, NamedMaterial, OctaveBands, PerBand, Receiver, Scene, Source,
-};
+use crate::{Air, Error, ImpulseResponse, Material, Mesh, OctaveBands, PerBand, Receiver, Scene, Source};
 use file::{AirTable, MaterialTable, PlaceTable, ResponseTable, RoomFile};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashSet};
@@ -136,19 +132,17 @@ impl MeasuredRoom {
     ///
     /// # Errors
     /// [`Error::Io`] and [`Error::Toml`] (grammar, unknown or missing keys, wrong types);
-    /// [`Error::MaterialWithoutTable`]; [`Error::InFile`] naming file and field, with the cause [`Error::TableWithoutMaterial`],
-    /// [`Error::BandCount`], [`Error::Length`], [`Error::OutOfRange`], [`Error::UnknownBand`], [`Error::BandOrder`],
-    /// [`Error::DuplicateId`], [`Error::UnknownId`], [`Error::Empty`], [`Error::ObjSyntax`], [`Error::NoMaterial`] or
-    /// [`Error::CrossedPolygon`]; for the responses what [`probe_wav`] gives and, where sample 0 is the emission,
+    /// for the mesh as [`Mesh::read`] and [`Mesh::into_scene`]; [`Error::InFile`] naming file and field, with the cause
+    /// [`Error::TableWithoutMaterial`], [`Error::BandCount`], [`Error::Length`], [`Error::OutOfRange`],
+    /// [`Error::UnknownBand`], [`Error::BandOrder`], [`Error::DuplicateId`], [`Error::UnknownId`] or [`Error::Empty`]; for
+    /// the responses what [`probe_wav`] gives and, where sample 0 is the emission,
     /// [`Error::ShorterThanDirectSound`].
     pub fn read(folder: impl AsRef<Path>) -> Result<Self, Error> {
         let folder = folder.as_ref();
         let path = folder.join("room.toml");
         let file: RoomFile = toml::from_str(&read_text(&path)?)
             .map_err(|source| Error::Toml { path: path.clone(), source: Box::new(source) })?;
-        let mesh_path = folder.join(&file.room.mesh);
-        let mesh = read_text(&mesh_path)?;
-        let mut room = Self::assemble(&path, &file, &mesh_path, &mesh)?;
+        let mut room = Self::assemble(&path, &file, &folder.join(&file.room.mesh))?;
         for (i, table) in file.responses.iter().enumerate() {
             let entry = room.entry(&file, i, table, folder)?;
             room.responses.push(entry);
@@ -157,16 +151,17 @@ impl MeasuredRoom {
     }
 
     /// Everything but the responses.
-    fn assemble(path: &Path, file: &RoomFile, mesh_path: &Path, mesh: &str) -> Result<Self, Error> {
+    fn assemble(path: &Path, file: &RoomFile, mesh_path: &Path) -> Result<Self, Error> {
         let bands = bands(&file.bands.centres_hz).map_err(|e| e.in_file(path, "bands.centres_hz"))?;
-        let mesh = obj::parse_obj(mesh_path, mesh)?;
-        if let Some(name) = file.materials.keys().find(|name| !mesh.materials.contains(name)) {
+        let mesh = Mesh::read(mesh_path)?;
+        if let Some(name) = file.materials.keys().find(|name| !mesh.material_names().contains(name)) {
             let error = Error::TableWithoutMaterial { mesh: mesh_path.to_owned() };
             return Err(error.in_file(path, format!("materials.{name}")));
         }
-        let (materials, priors) = materials(path, bands, &file.materials, &mesh.materials, mesh_path)?;
-        let scene = Scene::new(mesh.vertices, mesh.triangles, materials)
-            .map_err(|error| error.in_file(mesh_path, "mesh"))?;
+        let (materials, mut priors) = materials(path, bands, &file.materials)?;
+        let faces_without_area = mesh.faces_without_area();
+        let scene = mesh.into_scene(&materials)?;
+        let priors = scene.materials().iter().filter_map(|named| priors.remove(&named.name)).collect();
         let air = match &file.air {
             Some(AirTable { temperature_c, relative_humidity_percent, pressure_kpa }) => {
                 Air::new(*temperature_c, *relative_humidity_percent, *pressure_kpa)
@@ -193,7 +188,7 @@ impl MeasuredRoom {
         Ok(Self {
             file: path.to_owned(),
             scene,
-            faces_without_area: mesh.faces_without_area,
+            faces_without_area,
             priors,
             air,
             air_assumed: file.air.is_none(),
@@ -365,17 +360,15 @@ fn bands(centres_hz: &[f64]) -> Result<OctaveBands, Error> {
     OctaveBands::from_centres_hz(centres_hz)
 }
 
+type ByName<T> = BTreeMap<String, T>;
+
 fn materials(
     path: &Path,
     bands: OctaveBands,
-    tables: &BTreeMap<String, MaterialTable>,
-    names: &[String],
-    mesh: &Path,
-) -> Result<(Vec<NamedMaterial>, Vec<MaterialPrior>), Error> {
-    let one = |name: &String| {
-        let table = tables
-            .get(name)
-            .ok_or_else(|| Error::MaterialWithoutTable { material: name.clone(), mesh: mesh.to_owned() })?;
+    tables: &ByName<MaterialTable>,
+) -> Result<(ByName<Material>, ByName<MaterialPrior>), Error> {
+    let mut found = (BTreeMap::new(), BTreeMap::new());
+    for (name, table) in tables {
         let column = |field: &'static str, values: &Option<Vec<f64>>, low: f64, range: &'static str| {
             let checked = |values: &Vec<f64>| {
                 values.iter().try_for_each(|&v| check_range(field, v, low, 1.0, range))?;
@@ -398,10 +391,10 @@ fn materials(
         let material = Material::new(mean, scattering.unwrap_or_else(|| uniform(DEFAULT_SCATTERING)))
             .map_err(|error| error.in_file(path, format!("materials.{name}")))?;
         let prior = MaterialPrior { absorption, absorption_sd: sd.unwrap_or_else(|| uniform(default_sd)) };
-        Ok((NamedMaterial { name: name.clone(), material }, prior))
-    };
-    let both: Result<Vec<_>, Error> = names.iter().map(one).collect();
-    Ok(both?.into_iter().unzip())
+        found.0.insert(name.clone(), material);
+        found.1.insert(name.clone(), prior);
+    }
+    Ok(found)
 }
 
 /// Sources or receivers: the file says the same of both.

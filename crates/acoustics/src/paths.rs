@@ -1,6 +1,8 @@
 //! Traced paths: the seam between a tracer and everything after it.
 
-use crate::{Air, Conditions, Directivity, EnergyResponse, Error, Material, OctaveBands, Orientation};
+use crate::{
+    Air, Conditions, Directivity, EdgeDiffraction, EnergyResponse, Error, Material, OctaveBands, Orientation,
+};
 
 /// What a surface did to a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +68,8 @@ pub struct PathSet {
     departures: Vec<u32>,
     arrivals: Vec<u32>,
     batches: Vec<u8>,
+    /// Ways around edges, by contribution, rising.
+    diffractions: Vec<(usize, EdgeDiffraction)>,
 }
 
 /// Batch of contributions that are exact.
@@ -97,6 +101,7 @@ impl PathSet {
             departures: Vec::new(),
             arrivals: Vec::new(),
             batches: Vec::new(),
+            diffractions: Vec::new(),
         }
     }
 
@@ -130,12 +135,31 @@ impl PathSet {
         self.batches.push(contribution.batch.unwrap_or(EXACT));
     }
 
+    /// Adds a path that bends around an edge: its energy in each band is that of the contribution times
+    /// [`EdgeDiffraction::octave_energy_gain`]. The contribution is exact, without reflections, as long as the way around the
+    /// edge, and of the weight of an undisturbed path of that length. Directions are as in [`Contribution`].
+    pub fn push_diffracted(&mut self, departure: [f64; 3], arrival: [f64; 3], diffraction: EdgeDiffraction) {
+        let length_m = diffraction.length_m();
+        self.diffractions.push((self.len(), diffraction));
+        self.push(Contribution {
+            length_m,
+            log_weight: -2.0 * length_m.ln(),
+            chain: Self::DIRECT,
+            tail: Self::DIRECT,
+            departure,
+            arrival,
+            batch: None,
+        });
+    }
+
     /// Appends the paths of another set between the same surfaces; weights stay as they are.
     ///
     /// # Panics
     /// If the sets have different numbers of materials.
     pub fn append(&mut self, other: &PathSet) {
         assert_eq!(self.materials, other.materials, "paths of different scenes");
+        let before = self.len();
+        self.diffractions.extend(other.diffractions.iter().map(|(i, d)| (before + i, d.clone())));
         let offset = self.parents.len() as u32 - 1;
         let shifted = |chain: u32| if chain == Self::DIRECT { chain } else { chain + offset };
         self.parents.extend(other.parents[1..].iter().map(|&p| shifted(p)));
@@ -199,6 +223,15 @@ impl PathSet {
         of(&mut self.departures, &kept);
         of(&mut self.arrivals, &kept);
         of(&mut self.batches, &kept);
+        let places: Vec<usize> = kept
+            .iter()
+            .scan(0, |next, &kept| Some(std::mem::replace(next, *next + usize::from(kept))))
+            .collect();
+        self.diffractions.retain_mut(|(contribution, _)| {
+            let stays = kept[*contribution];
+            *contribution = places[*contribution];
+            stays
+        });
         self.prune_chains();
     }
 
@@ -290,12 +323,14 @@ impl PathSet {
         Some((self.parents[chain as usize], u32::from(event >> 1), reflection))
     }
 
-    /// Whether a contribution met no surface.
+    /// Whether a contribution met no surface and no edge.
     ///
     /// # Panics
     /// If there is no such contribution.
     pub fn is_direct(&self, contribution: usize) -> bool {
-        self.chains[contribution] == Self::DIRECT && self.tails[contribution] == Self::DIRECT
+        let met_nothing =
+            self.chains[contribution] == Self::DIRECT && self.tails[contribution] == Self::DIRECT;
+        met_nothing && self.diffractions.binary_search_by_key(&contribution, |(i, _)| *i).is_err()
     }
 
     /// Whether a contribution was found exactly and renders as a coherent reflection.
@@ -328,6 +363,12 @@ impl PathSet {
     /// If there is no such contribution.
     pub fn arrival(&self, contribution: usize) -> [f64; 3] {
         unpack_direction(self.arrivals[contribution])
+    }
+
+    /// Contributions that bend around an edge, each with its diffraction, by rising index. Neither
+    /// [`PathSet::log_weights`] nor [`PathSet::log_reflectance`] contains their gain; [`PathSet::energies`] does.
+    pub fn diffractions(&self) -> &[(usize, EdgeDiffraction)] {
+        &self.diffractions
     }
 
     /// How often each chain hit each material: `counts[chain * materials + material]`.
@@ -404,7 +445,16 @@ impl PathSet {
                 weigh_directions(&mut energies, ends, directivity, &orientation);
             }
         }
+        self.weigh_diffractions(&mut energies, bands, conditions.air.speed_of_sound_m_s());
         Ok(energies)
+    }
+
+    fn weigh_diffractions(&self, energies: &mut [Vec<f32>], bands: OctaveBands, speed_m_s: f64) {
+        for (contribution, diffraction) in &self.diffractions {
+            for (band, column) in energies.iter_mut().enumerate() {
+                column[*contribution] *= diffraction.octave_energy_gain(bands, band, speed_m_s) as f32;
+            }
+        }
     }
 
     /// Energy in time bins between an omnidirectional source and an omnidirectional receiver, with Monte-Carlo standard

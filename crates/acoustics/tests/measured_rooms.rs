@@ -98,7 +98,7 @@ fn air_that_is_not_stated_is_assumed_and_says_so() {
 /// (what is changed in room.toml, into what, the file at fault, the words that must be there)
 type Case = (&'static str, &'static str, &'static str, &'static [&'static str]);
 
-const TOML_FAULTS: [Case; 39] = [
+const TOML_FAULTS: [Case; 41] = [
     ("[materials.floor]\n", "", "", &["`floor`", "room.obj", "no table"]),
     ("[materials.floor]", "[materials.floor]\n[materials.roof]", "room.toml", &["materials.roof", "no face"]),
     (
@@ -155,6 +155,8 @@ const TOML_FAULTS: [Case; 39] = [
     ("levels = \"common\"", "levels = 3", "room.toml", &["levels"]),
     ("mesh = \"room.obj\"", "mesh = \"other.obj\"", "other.obj", &["No such file"]),
     ("mesh = \"room.obj\"", "mesh = ", "room.toml", &["line 3"]),
+    ("mesh = \"room.obj\"", "mesh = \"room.dxf\"", "room.dxf", &["neither .obj nor"]),
+    ("mesh = \"room.obj\"", "mesh = \".obj\"", ".obj", &["neither .obj nor"]),
     (
         "centres_hz = [500, 1000]",
         "centres_hz = [500, 2000]",
@@ -245,7 +247,7 @@ fn each_fault_of_the_toml_is_named_with_file_and_field() {
 #[test]
 fn each_fault_of_the_mesh_is_named_with_its_line() {
     for (old, new, words) in [
-        ("usemtl floor\n", "", "line 9: a face without material"),
+        ("v 4 3 0", "v 4 3", "line 3: cannot read ``"),
         ("v 4 0 0", "v 4 nan 0", "line 2: vertex coordinate"),
         ("f 1 2 3 4", "f 1 2 3 44", "line 10: cannot read `44`"),
         ("f 1 2 3 4", "f 1 3 2 4", "line 10: the outline"),
@@ -256,6 +258,10 @@ fn each_fault_of_the_mesh_is_named_with_its_line() {
         let start = format!("{}: {words}", folder.path().join("room.obj").display());
         assert!(message.starts_with(&start), "{new:?} gave: {message}");
     }
+    let unnamed = folder(&TOML.replace("[materials.floor]\n", ""), &OBJ.replace("usemtl floor\n", ""));
+    let text = message(unnamed.path());
+    let end = "room.obj name no material, and there is no table `default` for them";
+    assert!(text.starts_with("1 faces of the mesh") && text.ends_with(end), "{text}");
     let folder = folder(&TOML.replace("[materials.floor]\n", "").replace("[materials.wall]\nabsorption = [0.1, 0.2]\nabsorption_sd = [0.05, 0.06]\nscattering = [0.3, 0.4]\n", ""), "# nothing\n");
     let message = message(folder.path());
     assert!(message.contains("room.obj: mesh: list of vertices is empty"), "{message}");

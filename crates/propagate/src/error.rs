@@ -33,7 +33,7 @@ pub enum Error {
         escaping: f64,
     },
     /// The source or the receiver stands inside a closed body within the room, or in a wall.
-    #[error("{what} {id:?} at {position_m:?} m is inside a closed body: {:.0} % of rays from there cross an even number of surfaces", 100.0 * even)]
+    #[error("{what} {id:?} at {position_m:?} m is inside a closed body or a wall: {:.0} % of rays from there cross an even number of surfaces", 100.0 * even)]
     InsideBody {
         /// "source" or "receiver".
         what: &'static str,

@@ -48,7 +48,7 @@ impl Tracing<'_> {
                 if cosines[0] <= 0.0
                     || cosines[1] <= 0.0
                     || length_m > self.max_length_m
-                    || !visible(self.mesh, a.point, b.point)
+                    || !visible(&self.scene.mesh, a.point, b.point)
                 {
                     continue;
                 }
@@ -56,8 +56,8 @@ impl Tracing<'_> {
                 let share = a.ways_on().share_of_joint(&b.ways_on(), distance_m, product, used);
                 // 16 pi g for each pair of rays, of which the share of a ray holds 4 pi.
                 let spread = share / used.lines * 4.0 * product / (PI * distance_m * distance_m);
-                let mixture = a.mixture_on(&self.probabilities);
-                let log_density = mixture.joint_log_density(&b.mixture_on(&self.probabilities));
+                let mixture = a.mixture_on(&self.scene.probabilities);
+                let log_density = mixture.joint_log_density(&b.mixture_on(&self.scene.probabilities));
                 let log_weight = log_share + spread.ln() - log_density;
                 let (out_depth, back_depth) = (a.depth, b.depth);
                 let (chain, tail) = (out.chain(out_depth, paths), back.chain(back_depth, paths));
@@ -108,14 +108,14 @@ impl Tracing<'_> {
                         continue;
                     }
                     let eye = |point, normal| along(point, normal, EYE_LEVEL_M);
-                    if !visible(self.mesh, eye(a.point, a.normal), eye(b.point, b.normal)) {
+                    if !visible(&self.scene.mesh, eye(a.point, a.normal), eye(b.point, b.normal)) {
                         continue;
                     }
                     let used = self.usage(reflections);
                     let share = a.ways_on().share_of_meeting(&b.ways, area_m2, used);
                     // 16 pi for each pair of rays and over the area; a ray meets all its rivals.
                     let spread = share * 4.0 / (used.meetings * area_m2);
-                    let log_density = a.mixture_on(&self.probabilities).joint_log_density(&b.mixture);
+                    let log_density = a.mixture_on(&self.scene.probabilities).joint_log_density(&b.mixture);
                     let log_weight = log_share + spread.ln() - log_density;
                     let (out_depth, back_depth) = (a.depth, b.depth - 1);
                     let (chain, tail) = (walk.chain(out_depth, paths), other.chain(back_depth, paths));

@@ -2,11 +2,11 @@
 
 use crate::early_memory::EarlyMemory;
 use crate::error::check_range;
-use crate::mesh_scene::MeshScene;
 use crate::vector::{norm, sub};
-use crate::{Error, PathTracer, TracerConfig};
-use sabine_acoustics::{Air, Observer, PathSet, Propagator, Receiver, Scene, Source};
+use crate::{Error, PathTracer, PreparedScene, TracerConfig};
+use sabine_acoustics::{Air, Observer, PathSet, Receiver, Scene, Source};
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 /// Settings of [`MovingTracer`].
 #[derive(Clone, Debug, PartialEq)]
@@ -68,9 +68,12 @@ pub struct Frame {
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+#[derive(Clone, Debug)]
 pub struct MovingTracer {
     scene: Scene,
-    mesh: MeshScene,
+    prepared: Arc<PreparedScene>,
+    /// Whether the room has been looked over for holes.
+    closed: bool,
     air: Air,
     config: MovingConfig,
     early: EarlyMemory,
@@ -95,12 +98,11 @@ impl MovingTracer {
     /// # Errors
     /// [`Error::OutOfRange`] for a setting outside its range, [`Error::NoSurface`] if all triangles have zero area.
     pub fn new(scene: Scene, air: Air, config: MovingConfig) -> Result<Self, Error> {
-        config.tracer.check()?;
+        let prepared = Arc::new(PathTracer::new(config.tracer.clone())?.prepare(&scene)?);
         check_range("memory_m", config.memory_m, 1e-3, 1e3, "between 1 mm and 1 km")?;
         check_range("most_frames", config.most_frames as f64, 1.0, 1e3, "between 1 and 1000")?;
-        let mesh = MeshScene::new(&scene)?;
         let early = EarlyMemory::default();
-        Ok(Self { scene, mesh, air, config, early, past: VecDeque::new(), count: 0 })
+        Ok(Self { scene, prepared, closed: false, air, config, early, past: VecDeque::new(), count: 0 })
     }
 
     /// The settings.
@@ -136,9 +138,13 @@ impl MovingTracer {
         let seed = self.config.tracer.seed.wrapping_add(self.count);
         self.count += 1;
         let tracer = PathTracer::new(TracerConfig { seed, ..self.config.tracer.clone() })?;
-        let mut paths = tracer.trace(&self.scene, source, receiver, &self.air, observer)?;
+        if !self.closed && !self.config.tracer.allow_leaks {
+            self.prepared.check_leaks(&self.scene, source.position_m)?;
+            self.closed = true;
+        }
+        let mut paths = tracer.trace_prepared(&self.prepared, source, receiver, &self.air, observer)?;
         let (source_m, receiver_m) = (source.position_m, receiver.position_m);
-        self.early.complete(&mut paths, &self.mesh, [source_m, receiver_m]);
+        self.early.complete(&mut paths, &self.prepared.mesh, [source_m, receiver_m]);
         if let Some(last) = self.past.front() {
             let moved_m = norm(sub(source_m, last.source_m)) + norm(sub(receiver_m, last.receiver_m));
             self.past.iter_mut().for_each(|past| past.moved_m += moved_m);

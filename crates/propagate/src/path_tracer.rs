@@ -1,17 +1,19 @@
 //! The path tracer.
 
+use crate::Error;
 use crate::error::check_range;
 use crate::image_sources::add_exact_paths;
-use crate::mesh_scene::MeshScene;
 use crate::placement::check_placement;
+use crate::prepared_scene::PreparedScene;
 use crate::tracing::Tracing;
-use crate::{Error, MeshReport};
 use rayon::prelude::*;
 use sabine_acoustics::{Air, Observer, PathSet, Propagator, Receiver, Scene, Source, report};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Parts of the rays between which their paths are gathered.
 const PARTS_AT_ONCE: usize = 64;
+/// Side of the patches on which rays meet, as a share of the radius of the spheres: about as blurred.
+const PATCH_SIDE: f64 = 0.7;
 
 /// Settings of [`PathTracer`].
 #[derive(Clone, Debug, PartialEq)]
@@ -31,7 +33,8 @@ pub struct TracerConfig {
     /// [`TracerConfig::image_order`],
     /// 1 cm to 10 m; it shrinks to the distance of the nearest surface.
     pub receiver_radius_m: f64,
-    /// Adds the ways around one edge where the direct line is blocked, so that a screen casts a shadow and not a black hole.
+    /// Adds the ways around one edge where the direct line is blocked ([`DiffractingEdges`](crate::DiffractingEdges)), so that a
+    /// screen casts a shadow and not a black hole.
     pub diffraction: bool,
     /// Trace a mesh through whose holes more than one ray in a thousand escapes: what escapes is lost, as through an open
     /// window.
@@ -102,29 +105,50 @@ impl PathTracer {
         &self.config
     }
 
-    fn run(
+    /// Makes a scene ready for traces with these settings.
+    ///
+    /// # Errors
+    /// [`Error::NoSurface`] if all triangles have zero area.
+    pub fn prepare(&self, scene: &Scene) -> Result<PreparedScene, Error> {
+        PreparedScene::new(scene, PATCH_SIDE * self.config.receiver_radius_m, self.config.diffraction)
+    }
+
+    /// As [`Propagator::trace`], in a scene that was prepared with the same settings but for rays, duration and seed. Holes are
+    /// not looked for: see [`PreparedScene::check_leaks`].
+    ///
+    /// # Errors
+    /// For a source or receiver that cannot be traced, and `Cancelled`.
+    pub fn trace_prepared(
         &self,
-        scene: &Scene,
+        scene: &PreparedScene,
         source: &Source,
         receiver: &Receiver,
         air: &Air,
         observer: &dyn Observer,
     ) -> Result<PathSet, Error> {
-        let mesh = MeshScene::new(scene)?;
-        let receiver_clearance_m = check_placement(&mesh, source, receiver)?;
-        let clearances_m = [mesh.nearest(source.position_m).1, receiver_clearance_m];
-        let leaks = MeshReport::new(scene, &mesh, source.position_m)?;
-        if !self.config.allow_leaks {
-            leaks.check()?;
-        }
+        check_placement(&scene.mesh, source, receiver)?;
+        self.trace_placed(scene, source, receiver, air, observer)
+    }
+
+    fn trace_placed(
+        &self,
+        scene: &PreparedScene,
+        source: &Source,
+        receiver: &Receiver,
+        air: &Air,
+        observer: &dyn Observer,
+    ) -> Result<PathSet, Error> {
         let max_length_m = self.config.duration_s * air.speed_of_sound_m_s();
-        let mut paths = PathSet::new(scene.materials().len(), max_length_m);
+        let mut paths = PathSet::new(scene.materials, max_length_m);
         let (from, to) = (source.position_m, receiver.position_m);
         let (order, rays, seed) = (self.config.image_order, self.config.rays, self.config.seed);
         report(observer, "image sources", 0, 1)?;
-        add_exact_paths(&mut paths, &mesh, from, to, order, rays.min(1 << 17), seed);
-        let tracing =
-            Tracing::new(&mesh, scene.materials(), &self.config, [from, to], clearances_m, max_length_m);
+        add_exact_paths(&mut paths, &scene.mesh, from, to, order, rays.min(1 << 17), seed);
+        if let Some(edges) = &scene.edges {
+            report(observer, "edges", 0, 1)?;
+            edges.add_paths(&mut paths, &scene.mesh, from, to);
+        }
+        let tracing = Tracing::new(scene, &self.config, [from, to], max_length_m);
         let total = tracing.rays() as u64;
         let done = AtomicU64::new(0);
         report(observer, "tracing", 0, total)?;
@@ -163,6 +187,12 @@ impl Propagator for PathTracer {
         air: &Air,
         observer: &dyn Observer,
     ) -> Result<PathSet, sabine_acoustics::Error> {
-        Ok(self.run(scene, source, receiver, air, observer)?)
+        let prepared = self.prepare(scene)?;
+        // A place that no sound can reach is the better answer than the holes through which it would get there.
+        check_placement(&prepared.mesh, source, receiver)?;
+        if !self.config.allow_leaks {
+            prepared.check_leaks(scene, source.position_m)?;
+        }
+        Ok(self.trace_placed(&prepared, source, receiver, air, observer)?)
     }
 }

@@ -9,13 +9,18 @@ use std::collections::HashMap;
 const LEAST_AREA_M2: f64 = 1e-12;
 /// Overlap of neighbouring triangles, as a share of their sides: closes the gap that rounding opens along shared edges.
 const OVERLAP: f64 = 1e-8;
+/// The two ways to compute where a ray meets a triangle, along the ray and across the triangle, agree to this share of the
+/// size of the scene. They always do, but for rays so nearly in the plane of a sliver that the distance is noise; a point
+/// far from its triangle would be found or not, depending on who looks for it.
+const AGREEMENT: f64 = 1e-6;
 /// Triangles within this distance of a common plane mirror as one (m) ...
 const COPLANAR_M: f64 = 1e-4;
 /// ... if their normals agree to this angle (rad).
 const COPLANAR_RAD: f64 = 2e-3;
 
-/// One triangle, two-sided.
+/// One triangle, two-sided: two cache lines, which is what a ray that meets it waits for.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub(crate) struct Surface {
     pub corner: Vec3,
     pub edge1: Vec3,
@@ -26,6 +31,8 @@ pub(crate) struct Surface {
     pub material: u32,
     /// Index of the plane that it shares with its coplanar neighbours.
     pub plane: u32,
+    /// [`AGREEMENT`] in metres.
+    pub agreement_m: f64,
 }
 
 impl Surface {
@@ -38,7 +45,7 @@ impl Surface {
         let p = cross(direction, self.edge2);
         let determinant = dot(self.edge1, p);
         // Twice the area times the cosine of incidence: rays in the plane miss.
-        if determinant.abs() <= 2e-12 * self.area_m2 {
+        if determinant.abs() <= 2e-12 * self.area_m2 || self.is_degenerate() {
             return None;
         }
         let inverse = 1.0 / determinant;
@@ -53,7 +60,11 @@ impl Surface {
             return None;
         }
         let distance = dot(self.edge2, q) * inverse;
-        (distance > 0.0).then_some(distance)
+        let agrees = |axis: usize| {
+            let apart = s[axis] + distance * direction[axis] - u * self.edge1[axis] - v * self.edge2[axis];
+            apart.abs() <= self.agreement_m
+        };
+        (distance > 0.0 && agrees(0) && agrees(1) && agrees(2)).then_some(distance)
     }
 
     pub fn corners(&self) -> [Vec3; 3] {
@@ -85,6 +96,10 @@ impl Plane {
 pub(crate) struct Surfaces {
     pub triangles: Vec<Surface>,
     pub planes: Vec<Plane>,
+    /// Middle of the box around all triangles that have an area.
+    pub centre_m: Vec3,
+    /// Diagonal of that box.
+    pub size_m: f64,
 }
 
 impl Surfaces {
@@ -98,14 +113,24 @@ impl Surfaces {
                 let area_m2 = 0.5 * length;
                 let normal = if area_m2 < LEAST_AREA_M2 { [0.0; 3] } else { scale(normal, 1.0 / length) };
                 let material = scene.triangles()[i].material;
-                Surface { corner: a, edge1, edge2, normal, area_m2, material, plane: 0 }
+                Surface { corner: a, edge1, edge2, normal, area_m2, material, plane: 0, agreement_m: 0.0 }
             })
             .collect();
         if triangles.iter().all(Surface::is_degenerate) {
             return Err(Error::NoSurface { triangles: triangles.len() });
         }
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for corner in triangles.iter().filter(|s| !s.is_degenerate()).flat_map(Surface::corners) {
+            low = std::array::from_fn(|axis| low[axis].min(corner[axis]));
+            high = std::array::from_fn(|axis| high[axis].max(corner[axis]));
+        }
+        let size_m = norm(sub(high, low));
+        for triangle in &mut triangles {
+            triangle.agreement_m = AGREEMENT * size_m;
+        }
         let planes = merge_coplanar(&mut triangles);
-        Ok(Self { triangles, planes })
+        let centre_m = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
+        Ok(Self { triangles, planes, centre_m, size_m })
     }
 }
 
@@ -114,26 +139,40 @@ fn merge_coplanar(triangles: &mut [Surface]) -> Vec<Plane> {
     let mut order: Vec<usize> = (0..triangles.len()).filter(|&i| !triangles[i].is_degenerate()).collect();
     order.sort_by(|&i, &j| triangles[j].area_m2.total_cmp(&triangles[i].area_m2).then(i.cmp(&j)));
     let mut planes: Vec<Plane> = Vec::new();
-    // Planes by rounded normal, under both signs.
-    let mut by_normal: HashMap<[i32; 3], Vec<u32>> = HashMap::new();
-    let key = |normal: Vec3| normal.map(|c| (c / (2.0 * COPLANAR_RAD)).round() as i32);
-    for i in order {
+    // Planes by normal and distance from the middle, under both signs. A triangle of the same plane differs by less than half
+    // a cell in the normal, and therefore in the distance by less than half a slot.
+    let mut cells: HashMap<[i64; 4], Vec<u32>> = HashMap::new();
+    let corners = || order.iter().flat_map(|&i| triangles[i].corners());
+    let bound = |k: usize, pick: fn(f64, f64) -> f64| corners().map(|c| c[k]).reduce(pick).unwrap_or(0.0);
+    let middle: Vec3 = std::array::from_fn(|k| 0.5 * (bound(k, f64::min) + bound(k, f64::max)));
+    let reach_m = corners().map(|c| norm(sub(c, middle))).fold(0.0, f64::max);
+    // Sines stand for angles.
+    let half_cell = 1.01 * COPLANAR_RAD;
+    let half_slot_m = half_cell * reach_m + COPLANAR_M;
+    let key = |normal: Vec3, on: Vec3, shift: f64| -> [i64; 4] {
+        let [x, y, z] = normal.map(|c| (0.5 * (c / half_cell + shift)).floor() as i64);
+        [x, y, z, (0.5 * (dot(normal, sub(on, middle)) / half_slot_m + shift)).floor() as i64]
+    };
+    for &i in &order {
         let triangle = &triangles[i];
         let corners = triangle.corners();
-        let [x, y, z] = key(triangle.normal);
-        let same = (0..27).find_map(|n| {
-            let near = [x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1];
-            by_normal.get(&near)?.iter().copied().find(|&p| {
-                let plane = &planes[p as usize];
-                norm(cross(plane.normal, triangle.normal)) < COPLANAR_RAD
-                    && corners.iter().all(|&c| plane.height(c).abs() < COPLANAR_M)
-            })
-        });
+        let (low, high) =
+            (key(triangle.normal, triangle.corner, -1.0), key(triangle.normal, triangle.corner, 1.0));
+        let near = (0..16)
+            .filter(|n| (0..4).all(|k| n >> k & 1 == 0 || low[k] != high[k]))
+            .map(|n| std::array::from_fn(|k| if n >> k & 1 == 0 { low[k] } else { high[k] }));
+        let fits = |p: &u32| {
+            let plane = &planes[*p as usize];
+            norm(cross(plane.normal, triangle.normal)) < COPLANAR_RAD
+                && corners.iter().all(|&c| plane.height(c).abs() < COPLANAR_M)
+        };
+        let same = near.filter_map(|cell| cells.get(&cell)?.iter().copied().find(fits)).min();
         let plane = same.unwrap_or_else(|| {
             let (normal, id) = (triangle.normal, planes.len() as u32);
             planes.push(Plane { normal, offset_m: dot(normal, triangle.corner) });
-            by_normal.entry(key(normal)).or_default().push(id);
-            by_normal.entry(key(scale(normal, -1.0))).or_default().push(id);
+            for facing in [normal, scale(normal, -1.0)] {
+                cells.entry(key(facing, triangle.corner, 0.0)).or_default().push(id);
+            }
             id
         });
         triangles[i].plane = plane;

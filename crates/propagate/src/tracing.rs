@@ -2,14 +2,14 @@
 
 use crate::TracerConfig;
 use crate::event_mixture::{EventMixture, EventProbabilities};
-use crate::mesh_scene::MeshScene;
-use crate::patches::{Patch, Patches};
+use crate::patches::Patch;
+use crate::prepared_scene::PreparedScene;
 use crate::random::{direction, generator};
 use crate::techniques::{Use, Ways};
 use crate::vector::{Vec3, dot, norm, scale, sub};
 use crate::walk::{Sphere, before_hit, next_hit, reflected, visible};
 use rand::Rng;
-use sabine_acoustics::{Contribution, NamedMaterial, PathSet, Reflection};
+use sabine_acoustics::{Contribution, PathSet, Reflection};
 use std::f64::consts::PI;
 
 /// The ends of the paths.
@@ -17,24 +17,16 @@ const SOURCE: usize = 0;
 const RECEIVER: usize = 1;
 /// Pairs of rays that may meet each other, at most: so many are kept in memory by each thread.
 const MOST_PAIRS: usize = 256;
-/// Side of the patches on which rays meet, as a share of the radius of the sphere: about as blurred.
-const PATCH_SIDE: f64 = 0.7;
 
 /// What all rays of one trace share.
 pub(crate) struct Tracing<'a> {
-    pub mesh: &'a MeshScene,
-    pub probabilities: EventProbabilities,
+    pub scene: &'a PreparedScene,
     pub max_length_m: f64,
     ends: [Sphere; 2],
-    patches: Patches,
-    surface_m2: f64,
-    /// Share of the reflections that scatter, over the surfaces and bands.
-    mean_scattering: f64,
     /// Rays from each end; where only the source sends any, all of them.
     pairs: usize,
     /// Parts into which they are split, all of the same size: so many for each batch, with so many rays for each class.
     parts: usize,
-    materials: usize,
     config: &'a TracerConfig,
 }
 
@@ -100,37 +92,24 @@ impl Walk {
 
 impl<'a> Tracing<'a> {
     pub fn new(
-        mesh: &'a MeshScene,
-        materials: &[NamedMaterial],
+        scene: &'a PreparedScene,
         config: &'a TracerConfig,
         ends_m: [Vec3; 2],
-        clearances_m: [f64; 2],
         max_length_m: f64,
     ) -> Self {
-        let probabilities = EventProbabilities::new(materials.iter().map(|m| &m.material));
-        let (mut surface_m2, mut scattering_m2) = (0.0, 0.0);
-        for surface in &mesh.surfaces.triangles {
-            surface_m2 += surface.area_m2;
-            scattering_m2 += surface.area_m2 * probabilities.mean_scattering(surface.material);
-        }
         let sphere = |end: usize| Sphere {
             centre: ends_m[end],
-            radius_m: config.receiver_radius_m.min(clearances_m[end]),
+            radius_m: config.receiver_radius_m.min(scene.mesh.nearest(ends_m[end]).1),
         };
         let pairs = if config.bidirectional { config.rays.div_ceil(2) } else { config.rays };
         let batches = usize::from(PathSet::BATCHES);
         let parts = batches * pairs.div_ceil(batches * MOST_PAIRS);
         Self {
-            mesh,
+            scene,
             max_length_m,
             ends: [sphere(SOURCE), sphere(RECEIVER)],
-            patches: Patches::new(&mesh.surfaces, PATCH_SIDE * config.receiver_radius_m),
-            surface_m2,
-            mean_scattering: scattering_m2 / surface_m2,
-            pairs: parts * pairs.div_ceil(parts).next_multiple_of(probabilities.classes()),
+            pairs: parts * pairs.div_ceil(parts).next_multiple_of(scene.probabilities.classes()),
             parts,
-            probabilities,
-            materials: materials.len(),
             config,
         }
     }
@@ -151,14 +130,14 @@ impl<'a> Tracing<'a> {
 
     /// Traces the rays of one part; returns their number as well.
     pub fn part(&self, part: usize) -> (PathSet, u64) {
-        let mut paths = PathSet::new(self.materials, self.max_length_m);
+        let mut paths = PathSet::new(self.scene.materials, self.max_length_m);
         let pairs = self.pairs / self.parts;
         let batch = (part % usize::from(PathSet::BATCHES)) as u8;
         let mut walks: [Vec<Walk>; 2] = [Vec::new(), Vec::new()];
         for pair in part * pairs..(part + 1) * pairs {
             let mut random = generator(self.config.seed, 2 * pair as u64);
             // Both rays of a pair draw for the same class, and all classes get their turns within a part.
-            let hero = pair % self.probabilities.classes();
+            let hero = pair % self.scene.probabilities.classes();
             walks[SOURCE].push(self.walk(SOURCE, hero, batch, &mut random, &mut paths));
             if self.config.bidirectional {
                 let mut random = generator(self.config.seed, 2 * pair as u64 + 1);
@@ -183,18 +162,19 @@ impl<'a> Tracing<'a> {
             return Use { lines: 0.0, meetings: 0.0 };
         }
         let splits = reflections.saturating_sub(1) as f64;
-        let lines = (1.0 / (splits * self.mean_scattering)).min(1.0);
+        let lines = (1.0 / (splits * self.scene.mean_scattering)).min(1.0);
         Use { lines, meetings: self.rivals() * self.meeting_share(reflections) }
     }
 
     /// Rays from one end that a ray from the other end may meet: those of its part that draw for the same class.
     fn rivals(&self) -> f64 {
-        (self.pairs / self.parts) as f64 / self.probabilities.classes() as f64
+        (self.pairs / self.parts) as f64 / self.scene.probabilities.classes() as f64
     }
 
     /// Share of the meetings that are used.
     pub fn meeting_share(&self, reflections: usize) -> f64 {
-        let expected = reflections as f64 * self.rivals() * self.patches.full_m2() / self.surface_m2;
+        let expected =
+            reflections as f64 * self.rivals() * self.scene.patches.full_m2() / self.scene.surface_m2;
         (1.0 / expected).min(1.0)
     }
 
@@ -210,14 +190,14 @@ impl<'a> Tracing<'a> {
         let log_volume = there.volume_m3().ln();
         let mut heading = direction(random);
         let mut walk = Walk { heading, arrivals: Vec::new(), hero, chains: vec![PathSet::DIRECT] };
-        let mut mixture = EventMixture::new(self.probabilities.classes());
+        let mut mixture = EventMixture::new(self.scene.probabilities.classes());
         let mut ways = Ways::new(here.radius_m);
         let (mut origin, mut travelled_m) = (here.centre, 0.0);
         let mut ever_scattered = false;
         // Since the last scattering, or the beginning: how far, from which cosine, and whether over a mirror.
         let (mut stretch_m, mut cosine_out, mut mirrored) = (0.0, 1.0, false);
         loop {
-            let hit = next_hit(self.mesh, origin, &mut heading, random);
+            let hit = next_hit(&self.scene.mesh, origin, &mut heading, random);
             let leg_m = hit.map_or(f64::INFINITY, |h| h.distance);
             let depth = walk.arrivals.len();
             // Specular paths that image sources have found, and those that a line has found, are not counted again.
@@ -241,9 +221,9 @@ impl<'a> Tracing<'a> {
                 return walk;
             }
             stretch_m += hit.distance;
-            let surface = &self.mesh.surfaces.triangles[hit.triangle as usize];
+            let surface = &self.scene.mesh.surfaces.triangles[hit.triangle as usize];
             let material = surface.material;
-            let scattered = random.random::<f64>() < self.probabilities.scattering(material, hero);
+            let scattered = random.random::<f64>() < self.scene.probabilities.scattering(material, hero);
             let reflection = if scattered { Reflection::Scattered } else { Reflection::Specular };
             let normal = surface.normal_against(heading);
             let point = before_hit(origin, heading, hit.distance);
@@ -256,9 +236,9 @@ impl<'a> Tracing<'a> {
                     ways_here.first_stretch(stretch_m, cosine_in);
                 }
             }
-            let plane = &self.mesh.surfaces.planes[surface.plane as usize];
-            let patch = self.patches.at(surface.plane, plane, point, heading);
-            let area_m2 = scattered.then(|| self.patches.area_m2(patch));
+            let plane = &self.scene.mesh.surfaces.planes[surface.plane as usize];
+            let patch = self.scene.patches.at(surface.plane, plane, point, heading);
+            let area_m2 = scattered.then(|| self.scene.patches.area_m2(patch));
             let depth = depth + 1;
             walk.arrivals.push(Arrival {
                 depth,
@@ -271,7 +251,7 @@ impl<'a> Tracing<'a> {
                 patch,
                 area_m2,
             });
-            mixture.apply(&self.probabilities, material, scattered);
+            mixture.apply(&self.scene.probabilities, material, scattered);
             origin = point;
             heading = reflected(surface, heading, reflection, random);
             mirrored = !scattered;
@@ -284,7 +264,8 @@ impl<'a> Tracing<'a> {
             let distance_m = norm(line);
             let cosine = dot(line, normal) / distance_m;
             let length_m = travelled_m + distance_m;
-            if cosine > 0.0 && length_m <= self.max_length_m && visible(self.mesh, point, there.centre) {
+            if cosine > 0.0 && length_m <= self.max_length_m && visible(&self.scene.mesh, point, there.centre)
+            {
                 let share = match self.config.bidirectional {
                     true => ways.share_of_line(distance_m, cosine, self.usage(depth)),
                     false => 1.0,

@@ -141,7 +141,7 @@ fn a_screen_blocks_the_direct_sound_and_nothing_else() {
 #[test]
 fn the_report_lists_what_is_odd() {
     let closed = MeshReport::inspect(&box_with(&[], &[]), HERE).unwrap();
-    assert!(closed.is_closed() && closed.escape_rate == 0.0 && closed.planes == 6);
+    assert!(closed.is_closed() && closed.escaped_rays == 0 && closed.planes == 6);
     assert!((closed.volume_m3 - 72.0).abs() < 1e-9);
     assert!(closed.warnings().is_empty());
     // A flap at a wall's seam: an edge with three triangles and two open ones. A needle. A wall triangle twice.
@@ -150,11 +150,152 @@ fn the_report_lists_what_is_odd() {
     let needle = [a, b, [0.0, 0.0, 1.0]];
     let twice = [[0.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 4.0, 3.0]];
     let odd = MeshReport::inspect(&box_with(&[flap, needle, twice], &[]), [3.0, 1.0, 1.5]).unwrap();
-    assert_eq!(odd.crowded_edges_m, vec![[a, b]]);
-    assert_eq!(odd.open_edges_m.len(), 4); // two of the flap, two of the needle
+    assert_eq!(odd.crowded_edges.iter().map(|e| e.ends_m).collect::<Vec<_>>(), vec![[a, b]]);
+    assert_eq!(odd.open_edges.len(), 2); // of the flap
     assert_eq!(odd.degenerate_triangles, vec![13]);
     assert_eq!(odd.duplicate_triangles, vec![14]);
     assert_eq!(odd.warnings().len(), 4);
+}
+
+/// A wall of two triangles beside a wall of four, a table without underside on the floor, a cupboard with its own back wall.
+#[test]
+fn edges_that_touch_other_faces_are_no_leaks() {
+    let [x, y, z] = SIZE_M;
+    // The wall at x = 0, cut at half its width: its neighbours have one edge where it has two.
+    let cut = |a: f64, b: f64| {
+        [[[0.0, a, 0.0], [0.0, b, 0.0], [0.0, b, z]], [[0.0, a, 0.0], [0.0, b, z], [0.0, a, z]]]
+    };
+    let split = box_with(&[cut(0.0, 0.5 * y), cut(0.5 * y, y)].concat(), &[0, 1]);
+    let report = MeshReport::inspect(&split, HERE).unwrap();
+    assert!(report.is_closed() && report.escaped_rays == 0);
+    // Above and below: one long edge, two short ones each.
+    assert_eq!(report.resting_edges.len(), 6);
+    assert!((report.resting_edges[0].length_m() - y).abs() < 1e-12);
+    assert!((report.resting_edges[2].length_m() - 0.5 * y).abs() < 1e-12);
+    assert!(report.warnings().is_empty());
+
+    let table = body([2.0, 1.0, 0.0], [3.0, 2.0, 0.8]);
+    let open_below: Vec<_> = table.iter().filter(|t| t.iter().any(|p| p[2] > 0.0)).copied().collect();
+    assert_eq!(open_below.len(), 10);
+    let report = MeshReport::inspect(&box_with(&open_below, &[]), HERE).unwrap();
+    assert!(report.is_closed() && report.resting_edges.len() == 4, "{report}");
+
+    let cupboard = body([x - 0.5, 1.0, 0.0], [x, 2.0, 2.0]);
+    let report = MeshReport::inspect(&box_with(&cupboard, &[]), HERE).unwrap();
+    assert!(report.is_closed() && report.resting_edges.is_empty(), "{report}");
+
+    // Raised by a hand's breadth, the same table has a rim.
+    let raised: Vec<_> = open_below.iter().map(|t| t.map(|[x, y, z]| [x, y, z + 0.1])).collect();
+    let report = MeshReport::inspect(&box_with(&raised, &[]), HERE).unwrap();
+    assert_eq!((report.open_edges.len(), report.resting_edges.len()), (4, 0), "{report}");
+    assert!(!report.is_closed() && report.check().is_ok());
+}
+
+#[test]
+fn a_report_reads_well() {
+    let hole = MeshReport::inspect(&box_with(&[], &[10]), HERE).unwrap();
+    let text = hole.to_string();
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines[0], "11 triangles in 6 planes around 60.0 m3.");
+    assert!(lines[1].starts_with("Leaks: ") && lines[1].ends_with(" %)."), "{text}");
+    assert_eq!(
+        lines[2],
+        "Edges of one triangle, closed by nothing: the rim of a hole or of a free screen: 3, 17.21 m in all."
+    );
+    assert_eq!(
+        lines[3],
+        "  the longest: 7.211 m from (0.000, 0.000, 3.000) to (6.000, 4.000, 3.000), ceiling"
+    );
+    assert_eq!(lines.len(), 6);
+    let error = hole.check().unwrap_err().to_string();
+    assert!(
+        error.contains("through 3 open edges (the longest from [0.0, 0.0, 3.0] to [6.0, 4.0, 3.0] m)"),
+        "{error}"
+    );
+}
+
+/// A body whose underside lies on the floor: rays downwards cross both at once, and the count is undecided.
+#[test]
+fn points_in_a_flat_body_on_the_floor_are_named() {
+    // Its faces look into it, and then, as those of the room do, at the air.
+    let inward = body([4.0, 2.0, 0.0], [5.5, 3.5, 0.1]);
+    let outward = inward.iter().map(|&[a, b, c]| [a, c, b]).collect();
+    for faces in [inward, outward] {
+        let mesh = MeshScene::new(&box_with(&faces, &[])).unwrap();
+        let within = [4.7, 2.7, 0.05];
+        for (from, to) in [(HERE, within), (within, HERE)] {
+            let refused = check_placement(&mesh, &source(from), &receiver(to));
+            assert!(matches!(refused, Err(sabine_propagate::Error::InsideBody { .. })), "{refused:?}");
+        }
+        let above = check_placement(&mesh, &source(HERE), &receiver([4.7, 2.7, 0.15])).unwrap();
+        assert!((above - 0.05).abs() < 1e-9);
+    }
+}
+
+/// A cabin with walls of its own is a room, but not the one where the source is.
+#[test]
+fn a_receiver_in_a_sealed_cabin_hears_nothing() {
+    let (outer, inner) = (body([3.5, 1.5, 0.2], [5.8, 3.8, 2.8]), body([3.6, 1.6, 0.3], [5.7, 3.7, 2.7]));
+    let cabin = box_with(&[outer, inner].concat(), &[]);
+    assert!(matches!(
+        refusal(&cabin, HERE, THERE),
+        sabine_propagate::Error::NoPath { max_length_m, .. } if max_length_m > 1.0
+    ));
+    // Both in the cabin hear each other.
+    let paths = quick(false).trace(&cabin, &source([4.0, 2.0, 1.0]), &receiver(THERE), &Air::default(), &());
+    assert!(!paths.unwrap().is_empty());
+}
+
+#[test]
+fn places_that_are_no_numbers_are_refused() {
+    let scene = box_with(&[], &[]);
+    let mesh = MeshScene::new(&scene).unwrap();
+    for wild in [f64::NAN, f64::INFINITY, -1e300] {
+        let mut nowhere = receiver(THERE);
+        nowhere.position_m[1] = wild;
+        assert!(check_placement(&mesh, &source(HERE), &nowhere).is_err(), "{wild}");
+    }
+}
+
+/// A heap of bodies, 12 triangles each, turned about the vertical.
+fn heap(bodies: usize) -> Scene {
+    let wall = uniform_box(SIZE_M, OctaveBands::T60, 0.1, 0.1);
+    let (mut vertices, mut triangles) = (wall.vertices().to_vec(), wall.triangles().to_vec());
+    let n = (bodies as f64).cbrt().ceil() as usize;
+    let cell = SIZE_M.map(|side| side / n as f64);
+    for k in 0..bodies {
+        let place = [k % n, k / n % n, k / n / n];
+        let (sin, cos) = (0.7 * k as f64).sin_cos();
+        let base = vertices.len() as u32;
+        let half = 0.2 * cell[2] * (1.0 + 0.3 * (k as f64).sin());
+        vertices.extend((0..8u32).map(|corner| {
+            let [u, v, w] = [0, 1, 2].map(|axis| if corner >> axis & 1 == 0 { -half } else { half });
+            let turned = [u * cos - v * sin, u * sin + v * cos, w];
+            std::array::from_fn(|axis| (place[axis] as f64 + 0.5) * cell[axis] + turned[axis])
+        }));
+        let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        triangles.extend(faces.iter().flat_map(|&[a, b, c, d]| {
+            [[a, b, c], [a, c, d]].map(|t| Triangle { vertices: t.map(|i| base + i), material: 4 })
+        }));
+    }
+    Scene::new(vertices, triangles, wall.materials().to_vec()).unwrap()
+}
+
+/// It takes seconds, not minutes: nothing in it grows with the square of the number of triangles.
+#[test]
+fn a_million_triangles_are_repaired_inspected_and_traced() {
+    let scene = heap(83_334);
+    assert!(scene.triangles().len() > 1_000_000);
+    let (same, repaired) = scene.welded(Scene::WELD_TOLERANCE_M).unwrap();
+    assert!(repaired.is_unchanged() && same == scene);
+    // Along an edge of the floor the view is free.
+    let (from, to) = ([0.002, 0.002, 0.002], [5.998, 0.002, 0.002]);
+    let config = TracerConfig { rays: 100, duration_s: 0.05, image_order: 1, ..Default::default() };
+    let tracer = PathTracer::new(config).unwrap();
+    let paths = tracer.trace(&scene, &source(from), &receiver(to), &Air::default(), &()).unwrap();
+    assert!(paths.is_exact(0) && (f64::from(paths.lengths_m()[0]) - 5.996).abs() < 1e-5);
+    let report = MeshReport::inspect(&scene, from).unwrap();
+    assert!(report.is_closed() && report.escaped_rays == 0, "{report}");
 }
 
 #[test]

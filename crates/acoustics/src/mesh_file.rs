@@ -1,0 +1,246 @@
+//! Triangles and names of materials from a mesh file.
+
+#[cfg(feature = "gltf")]
+mod gltf;
+mod obj;
+mod polygon;
+
+use crate::{Error, Material, NamedMaterial, Scene, Triangle};
+use polygon::triangulate;
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+
+/// The triangles of a file and the names of their materials, before anything is known about these materials.
+///
+/// | file | read | names |
+/// |---|---|---|
+/// | `.obj` | vertices, polygons (concave ones too) | `usemtl NAME`; no `.mtl` is needed or read |
+/// | `.gltf`, `.glb` (feature `gltf`) | triangle lists, strips and fans of the default scene, nodes applied | of the material; `material_3` where the fourth has none |
+///
+/// Coordinates are metres, right-handed, z up; glTF is y up by definition and is turned: its (x, y, z) becomes (x, -z, y).
+/// Faces that name no material get [`Mesh::DEFAULT_MATERIAL`]. Materials of one name are one material; they stand in the
+/// order in which the faces first use them. Textures, normals, colours, cameras, skins and animations are not looked at.
+///
+/// ```
+/// use sabine_acoustics::{Material, Mesh, OctaveBands};
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("tent.obj");
+/// std::fs::write(&path, "v 0 0 0\nv 4 0 0\nv 0 4 0\nv 0 0 4\nusemtl ground\nf 1 2 3\nusemtl cloth\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
+/// let mesh = Mesh::read(&path)?;
+/// assert_eq!(mesh.material_names(), ["ground", "cloth"]);
+/// let cloth = Material::uniform(OctaveBands::SIMULATION, 0.2, 0.3)?;
+/// let ground = Material::uniform(OctaveBands::SIMULATION, 0.1, 0.5)?;
+/// let scene = mesh.into_scene(&[("cloth".into(), cloth), ("ground".into(), ground)].into())?;
+/// assert!((scene.volume_m3() - 32.0 / 3.0).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mesh {
+    path: PathBuf,
+    vertices_m: Vec<[f64; 3]>,
+    triangles: Vec<Triangle>,
+    material_names: Vec<String>,
+    faces_without_area: usize,
+    faces_without_material: usize,
+}
+
+impl Mesh {
+    /// The material of faces that name none: those before the first `usemtl`, and glTF primitives without material.
+    pub const DEFAULT_MATERIAL: &str = "default";
+
+    /// Reads a file; its ending (`.obj`, `.gltf`, `.glb`) says what it is.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::UnknownMeshFormat`] for other endings and, without the feature `gltf`, [`Error::GltfFeature`];
+    /// [`Error::InFile`] naming the line or the element, with the cause
+    /// [`Error::ObjSyntax`], [`Error::OutOfRange`], [`Error::Length`], [`Error::CrossedPolygon`], [`Error::Index`],
+    /// [`Error::MeshTooLarge`], [`Error::BeyondBuffer`], [`Error::BufferUri`], [`Error::UnsupportedMesh`] or
+    /// [`Error::NodeTwice`]; [`Error::MeshFormat`] for what is no glTF.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
+        let path = path.as_ref();
+        let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+        let mut draft = MeshDraft::new(path);
+        match ending.to_str() {
+            Some("obj") => {
+                let bytes = read_bytes(path, u64::MAX)?;
+                // Names may be in any old encoding; numbers and keywords are ASCII.
+                obj::parse_obj(path, &String::from_utf8_lossy(&bytes), &mut draft)?;
+            }
+            #[cfg(feature = "gltf")]
+            Some("gltf" | "glb") => gltf::parse_gltf(path, &read_bytes(path, u64::MAX)?, &mut draft)?,
+            #[cfg(not(feature = "gltf"))]
+            Some("gltf" | "glb") => return Err(Error::GltfFeature { path: path.to_owned() }),
+            _ => return Err(Error::UnknownMeshFormat { path: path.to_owned() }),
+        }
+        Ok(draft.mesh)
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Vertices in metres, z up, those of the file in its order.
+    pub fn vertices_m(&self) -> &[[f64; 3]] {
+        &self.vertices_m
+    }
+
+    /// Triangles; their materials are indices into [`Mesh::material_names`].
+    pub fn triangles(&self) -> &[Triangle] {
+        &self.triangles
+    }
+
+    /// Names of the materials that faces use, in the order of first use.
+    pub fn material_names(&self) -> &[String] {
+        &self.material_names
+    }
+
+    /// Faces that are lines or points: left out, since nothing can be reflected by them.
+    pub fn faces_without_area(&self) -> usize {
+        self.faces_without_area
+    }
+
+    /// Faces that name no material and have [`Mesh::DEFAULT_MATERIAL`] for that reason.
+    pub fn faces_without_material(&self) -> usize {
+        self.faces_without_material
+    }
+
+    /// Gives each material what it does to sound.
+    ///
+    /// # Errors
+    /// [`Error::MaterialWithoutTable`] or [`Error::FacesWithoutMaterial`] for a material of the mesh that is not in the
+    /// list; [`Error::InFile`] with the cause [`Error::TableWithoutMaterial`] for one in the list that no face has; else
+    /// as [`Scene::new`], naming the file.
+    pub fn into_scene(self, materials: &BTreeMap<String, Material>) -> Result<Scene, Error> {
+        if let Some(name) = materials.keys().find(|name| !self.material_names.contains(name)) {
+            let error = Error::TableWithoutMaterial { mesh: self.path.clone() };
+            return Err(error.in_file(&self.path, format!("material `{name}`")));
+        }
+        let named = |name: &String| match materials.get(name) {
+            Some(material) => Ok(NamedMaterial { name: name.clone(), material: material.clone() }),
+            None if name == Self::DEFAULT_MATERIAL && self.faces_without_material > 0 => {
+                Err(Error::FacesWithoutMaterial {
+                    faces: self.faces_without_material,
+                    mesh: self.path.clone(),
+                })
+            }
+            None => Err(Error::MaterialWithoutTable { material: name.clone(), mesh: self.path.clone() }),
+        };
+        let materials = self.material_names.iter().map(named).collect::<Result<_, _>>()?;
+        Scene::new(self.vertices_m, self.triangles, materials)
+            .map_err(|error| error.in_file(&self.path, "mesh"))
+    }
+}
+
+/// Reads at most so many bytes of a regular file: a pipe or a device might never end.
+fn read_bytes(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
+    use std::io::{Error as IoError, ErrorKind, Read};
+    let read = || {
+        let file = std::fs::File::open(path)?;
+        let metadata = file.metadata()?;
+        if !metadata.is_file() {
+            return Err(IoError::new(ErrorKind::InvalidInput, "not a regular file"));
+        }
+        let mut bytes = Vec::with_capacity(metadata.len().min(most) as usize);
+        file.take(most).read_to_end(&mut bytes)?;
+        Ok(bytes)
+    };
+    read().map_err(|source| Error::Io { path: path.to_owned(), source })
+}
+
+/// A mesh that is being read.
+struct MeshDraft {
+    mesh: Mesh,
+    /// Index of each material that is in use.
+    materials: HashMap<String, u32>,
+    /// Corners of the face at hand.
+    points: Vec<[f64; 3]>,
+}
+
+impl MeshDraft {
+    fn new(path: &Path) -> Self {
+        let mesh = Mesh {
+            path: path.to_owned(),
+            vertices_m: Vec::new(),
+            triangles: Vec::new(),
+            material_names: Vec::new(),
+            faces_without_area: 0,
+            faces_without_material: 0,
+        };
+        Self { mesh, materials: HashMap::new(), points: Vec::new() }
+    }
+
+    /// Adds a polygon; its corners must be indices of vertices.
+    fn face(&mut self, name: Option<&str>, corners: &[u32]) -> Result<(), Error> {
+        let vertices = &self.mesh.vertices_m;
+        self.points.clear();
+        self.points.extend(corners.iter().map(|&i| vertices[i as usize]));
+        let triangles = triangulate(&self.points)?;
+        if triangles.is_empty() {
+            self.mesh.faces_without_area += 1;
+            return Ok(());
+        }
+        self.mesh.faces_without_material += usize::from(name.is_none());
+        let name = name.unwrap_or(Mesh::DEFAULT_MATERIAL);
+        let material = match self.materials.get(name) {
+            Some(&known) => known,
+            None => {
+                let new = self.mesh.material_names.len() as u32;
+                self.materials.insert(name.to_owned(), new);
+                self.mesh.material_names.push(name.to_owned());
+                new
+            }
+        };
+        let indexed = |t: [usize; 3]| Triangle { vertices: t.map(|i| corners[i]), material };
+        self.mesh.triangles.extend(triangles.into_iter().map(indexed));
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::OctaveBands;
+
+    /// A square without name beside one of glass.
+    fn squares() -> Mesh {
+        let mut draft = MeshDraft::new(Path::new("two.obj"));
+        draft.mesh.vertices_m = vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        draft.face(None, &[0, 1, 2, 3]).unwrap();
+        draft.face(Some("glass"), &[3, 2, 1, 0]).unwrap();
+        draft.face(Some("paint"), &[0, 1, 0]).unwrap(); // no area: its material is in no use
+        draft.mesh
+    }
+
+    #[test]
+    fn materials_and_names_must_match() {
+        let scene = |names: &[&str]| {
+            let material = Material::uniform(OctaveBands::T60, 0.1, 0.1).unwrap();
+            squares().into_scene(&names.iter().map(|&name| (name.to_owned(), material.clone())).collect())
+        };
+        let whole = scene(&["glass", "default"]).unwrap();
+        assert_eq!(
+            whole.materials().iter().map(|m| m.name.as_str()).collect::<Vec<_>>(),
+            ["default", "glass"]
+        );
+        assert_eq!((whole.triangles().len(), squares().faces_without_area()), (4, 1));
+        assert!(matches!(scene(&["glass"]), Err(Error::FacesWithoutMaterial { faces: 1, .. })));
+        assert!(
+            matches!(scene(&["default"]), Err(Error::MaterialWithoutTable { material, .. }) if material == "glass")
+        );
+        let message = scene(&["default", "glass", "paint"]).unwrap_err().to_string();
+        assert!(message.starts_with("two.obj: material `paint`: no face"), "{message}");
+    }
+
+    #[test]
+    fn only_known_endings_are_read() {
+        assert!(matches!(Mesh::read("room.step"), Err(Error::UnknownMeshFormat { .. })));
+        assert!(matches!(Mesh::read("/nowhere/room.OBJ"), Err(Error::Io { .. })));
+        let binary = Mesh::read("/nowhere/room.glb");
+        if cfg!(feature = "gltf") {
+            assert!(matches!(binary, Err(Error::Io { .. })));
+        } else {
+            assert!(matches!(binary, Err(Error::GltfFeature { .. })));
+        }
+    }
+}

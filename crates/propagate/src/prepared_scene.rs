@@ -1,0 +1,62 @@
+//! A scene made ready for many traces.
+
+use crate::edge_diffraction::DiffractingEdges;
+use crate::event_mixture::EventProbabilities;
+use crate::mesh_scene::MeshScene;
+use crate::patches::Patches;
+use crate::{Error, MeshReport};
+use sabine_acoustics::Scene;
+use std::fmt;
+
+/// What a tracer needs to know of a scene, whatever the places of source and receiver: made once by
+/// [`PathTracer::prepare`](crate::PathTracer::prepare), used by
+/// [`PathTracer::trace_prepared`](crate::PathTracer::trace_prepared) as often as wanted.
+pub struct PreparedScene {
+    pub(crate) mesh: MeshScene,
+    pub(crate) patches: Patches,
+    pub(crate) probabilities: EventProbabilities,
+    pub(crate) edges: Option<DiffractingEdges>,
+    pub(crate) materials: usize,
+    pub(crate) surface_m2: f64,
+    /// Share of the reflections that scatter, over the surfaces and bands.
+    pub(crate) mean_scattering: f64,
+}
+
+impl PreparedScene {
+    pub(crate) fn new(scene: &Scene, patch_side_m: f64, diffraction: bool) -> Result<Self, Error> {
+        let mesh = MeshScene::new(scene)?;
+        let probabilities = EventProbabilities::new(scene.materials().iter().map(|m| &m.material));
+        let (mut surface_m2, mut scattering_m2) = (0.0, 0.0);
+        for surface in &mesh.surfaces.triangles {
+            surface_m2 += surface.area_m2;
+            scattering_m2 += surface.area_m2 * probabilities.mean_scattering(surface.material);
+        }
+        Ok(Self {
+            patches: Patches::new(&mesh.surfaces, patch_side_m),
+            edges: diffraction.then(|| DiffractingEdges::find(scene, &mesh)),
+            probabilities,
+            materials: scene.materials().len(),
+            surface_m2,
+            mean_scattering: scattering_m2 / surface_m2,
+            mesh,
+        })
+    }
+
+    /// Looks for holes through which sound from this point escapes. `scene` must be the one that was prepared.
+    ///
+    /// # Errors
+    /// [`Error::Leaking`] if more than one ray in a thousand escapes.
+    pub fn check_leaks(&self, scene: &Scene, source_m: [f64; 3]) -> Result<(), Error> {
+        // The edges are looked at only to tell where the holes are.
+        if MeshReport::holds(&self.mesh, source_m) {
+            return Ok(());
+        }
+        MeshReport::new(scene, &self.mesh, source_m)?.check()
+    }
+}
+
+impl fmt::Debug for PreparedScene {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("PreparedScene").field("surface_m2", &self.surface_m2).finish_non_exhaustive()
+    }
+}
