@@ -22,7 +22,8 @@ use sabine_acoustics::{Conditions, Orientation, PathSet};
 ///     departure: [0.0, -1.0, 0.0], arrival: [0.0, 1.0, 0.0], batch: None,
 /// });
 /// let wall = [Material::uniform(OctaveBands::new(62.5, 125.0)?, 0.1, 0.1)?];
-/// let conditions = Conditions::new(&wall, &Air::default());
+/// let air = Air::default();
+/// let conditions = Conditions::new(&wall, &air);
 /// let renderer = AmbisonicRenderer::new(1, RenderConfig::default())?;
 /// // The listener looks along +y, towards the sound: W and X alone hear it.
 /// let facing = Orientation::towards([0.0, 1.0, 0.0])?;

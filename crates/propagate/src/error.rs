@@ -104,6 +104,23 @@ pub enum Error {
         /// The sample rate in Hz.
         sample_rate_hz: u32,
     },
+    /// A room response and head responses of different sample rates.
+    #[error("the room response is sampled at {response_hz} Hz, the head responses at {head_hz} Hz")]
+    SampleRates {
+        /// Sample rate of the room response in Hz.
+        response_hz: u32,
+        /// Sample rate of the head responses in Hz.
+        head_hz: u32,
+    },
+    /// A SOFA file that cannot be read.
+    #[cfg(feature = "sofa")]
+    #[error("{}: {source}", path.display())]
+    Sofa {
+        /// The file.
+        path: std::path::PathBuf,
+        /// The reader's cause.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
     /// A value of the vocabulary was refused, or the observer asked to stop.
     #[error(transparent)]
     Acoustics(#[from] sabine_acoustics::Error),

@@ -86,12 +86,31 @@ fn candidates(
 }
 
 /// A specular path that was checked leg by leg.
-struct ExactPath {
+pub(crate) struct ExactPath {
     image: Vec3,
     materials: Vec<u32>,
-    length_m: f64,
+    pub length_m: f64,
     departure: Vec3,
-    arrival: Vec3,
+    pub arrival: Vec3,
+}
+
+impl ExactPath {
+    /// Adds the path to a set.
+    pub fn push_to(&self, paths: &mut PathSet) {
+        let chain = self
+            .materials
+            .iter()
+            .fold(PathSet::DIRECT, |chain, &material| paths.reflect(chain, material, Reflection::Specular));
+        paths.push(Contribution {
+            length_m: self.length_m,
+            log_weight: -2.0 * self.length_m.ln(),
+            chain,
+            tail: PathSet::DIRECT,
+            departure: self.departure,
+            arrival: self.arrival,
+            batch: None,
+        });
+    }
 }
 
 fn mirrored(point: Vec3, plane: &Plane) -> Vec3 {
@@ -100,7 +119,12 @@ fn mirrored(point: Vec3, plane: &Plane) -> Vec3 {
 
 /// Unfolds one sequence of planes: the path from receiver back to source must meet exactly these planes, in this order,
 /// within the mesh, and nothing else.
-fn validated(scene: &MeshScene, source: Vec3, receiver: Vec3, sequence: &[u32]) -> Option<ExactPath> {
+pub(crate) fn validated(
+    scene: &MeshScene,
+    source: Vec3,
+    receiver: Vec3,
+    sequence: &[u32],
+) -> Option<ExactPath> {
     let planes = &scene.surfaces.planes;
     let mut images = Vec::with_capacity(sequence.len() + 1);
     images.push(source);
@@ -190,18 +214,6 @@ pub(crate) fn add_exact_paths(
             continue;
         }
         kept.push((path.length_m, path.image));
-        let chain = path
-            .materials
-            .iter()
-            .fold(PathSet::DIRECT, |chain, &material| paths.reflect(chain, material, Reflection::Specular));
-        paths.push(Contribution {
-            length_m: path.length_m,
-            log_weight: -2.0 * path.length_m.ln(),
-            chain,
-            tail: PathSet::DIRECT,
-            departure: path.departure,
-            arrival: path.arrival,
-            batch: None,
-        });
+        path.push_to(paths);
     }
 }

@@ -2,15 +2,14 @@
 //!
 //! Where it sits: [`PathTracer`] turns a [`Scene`](sabine_acoustics::Scene), a source and a receiver into a
 //! [`PathSet`](sabine_acoustics::PathSet), in which absorption, air and speed of sound are still free. `sabine-optimize`
-//! fits materials to such paths; [`PressureRenderer`] turns them into a pressure response to convolve sound with. Plain
-//! arrays go in and out.
-//!
-//! Directivity of source and receiver enters with the [`Conditions`](sabine_acoustics::Conditions) under which paths are
-//! weighed or rendered; [`AmbisonicRenderer`] keeps directions, [`MovingTracer`] follows whoever moves.
+//! fits materials to such paths; [`PressureRenderer`] turns them into a pressure response to convolve sound with,
+//! [`AmbisonicRenderer`] into one with directions, and [`HeadResponses`] that into what two ears hear. [`MovingTracer`] follows
+//! whoever moves. Directivity of source and receiver enters with the [`Conditions`](sabine_acoustics::Conditions) under which
+//! paths are weighed or rendered. Plain arrays go in and out.
 //!
 //! What it does **not** do: no diffraction but, if asked for, over a single edge into its shadow ([`DiffractingEdges`]), no
 //! room modes (below about 2000 sqrt(T60 / V) Hz a room is a wave field, not rays: Schroeder 1962), no transmission through
-//! walls, no phase at reflections, and no reading of files.
+//! walls, no phase at reflections or of directivities, no Doppler shift within a response, and no reading of meshes.
 //!
 //! # Example
 //!
@@ -58,6 +57,10 @@
 //! | rays from both ends against rays from one | equal in the mean, half the variance, also through a doorway | `tests/agreement.rs` |
 //! | octaves of different scattering in one trace | equal in the mean to a trace for each | `tests/agreement.rs` |
 //! | T20, T30 measured on the rendered response | 3 % of the paths' own, 125 Hz to 4 kHz | `tests/rendering.rs` |
+//! | reverberation of a directional source | 1 / directivity factor, within three standard errors | `tests/directivity.rs` |
+//! | ambisonics: an exact path | its spherical harmonics in all channels | `tests/ambisonics.rs` |
+//! | ambisonics: a diffuse field | SN3D energies, 1 / (2l + 1), within 1 % in each channel; T30 of W as in mono | `tests/ambisonics.rs` |
+//! | a listener who walks | direct sound exact; reverberation within four standard errors of a long trace | `tests/moving.rs` |
 //! | same seed, other number of threads | the same paths and samples, bit for bit | `tests/agreement.rs` |
 //! | diffraction by one edge, 63 Hz to 8 kHz | 0.05 dB from Macdonald's half plane, 0.02 dB from the uniform theory at a right angle | `tests/diffraction.rs` |
 //! | edges and corners | no ray lost | `walk.rs` |
@@ -66,13 +69,17 @@
 //! as much space, and so do the patches of wall (0.35 m) on which rays from both ends meet; that concerns paths of several
 //! reflections only, some of them mirror-like.
 //!
+//! # Features
+//!
+//! `sofa`: [`HeadResponses`] are read from AES69 (SOFA) files, by the crate `sofar` (pure Rust).
+//!
 //! # References
 //!
 //! Krokstad, Strom and Sorsdal 1968 (ray tracing of rooms); Allen and Berkley 1979, Borish 1984 (image sources);
 //! Vorlaender 2008, Auralization (scattering, spherical receivers); Veach 1997 (connections, balance heuristic); Cao et al. 2016
 //! (bidirectional tracing of sound); Georgiev et al. 2012, ACM Transactions on Graphics 31(6) (connections and meetings united);
-//! Wilkie et al. 2014 (hero sampling); Svensson, Fred and Vanderkooy 1999 (edge diffraction); Savioja and Svensson 2015,
-//! JASA 138(2) (overview of geometric room acoustics).
+//! Wilkie et al. 2014 (hero sampling); Nachbar et al. 2011 (AmbiX); Svensson, Fred and Vanderkooy 1999 (edge diffraction);
+//! Savioja and Svensson 2015, JASA 138(2) (overview of geometric room acoustics).
 
 mod ambisonic_renderer;
 mod ambisonic_response;
@@ -80,11 +87,13 @@ mod band_masks;
 mod box_tree;
 mod brute_force_scene;
 mod direction_cells;
+mod early_memory;
 mod edge_diffraction;
 mod edge_wedges;
 mod energy_envelope;
 mod error;
 mod event_mixture;
+mod head_responses;
 mod hierarchy;
 mod hierarchy_builder;
 mod image_sources;
@@ -102,6 +111,8 @@ mod pulse;
 mod random;
 mod reference_tracer;
 mod rendering;
+#[cfg(feature = "sofa")]
+mod sofa_file;
 mod spectrum;
 mod spherical_harmonics;
 mod surfaces;
@@ -117,6 +128,7 @@ pub use ambisonic_response::AmbisonicResponse;
 pub use brute_force_scene::BruteForceScene;
 pub use edge_diffraction::DiffractingEdges;
 pub use error::Error;
+pub use head_responses::HeadResponses;
 pub use mesh_edges::MeshEdge;
 pub use mesh_report::MeshReport;
 pub use mesh_scene::MeshScene;

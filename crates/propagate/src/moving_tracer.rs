@@ -1,5 +1,6 @@
 //! Paths between a source and a listener that move.
 
+use crate::early_memory::EarlyMemory;
 use crate::error::check_range;
 use crate::vector::{norm, sub};
 use crate::{Error, PathTracer, PreparedScene, TracerConfig};
@@ -32,7 +33,7 @@ impl Default for MovingConfig {
 pub struct Frame {
     /// All paths of the moment, to be re-weighted and rendered as any others.
     pub paths: PathSet,
-    /// Rays traced for this frame.
+    /// Rays asked for in this frame ([`TracerConfig::rays`]).
     pub rays: usize,
     /// Rays of this and older frames as they count: as many equally weighted ones would have the same variance.
     pub effective_rays: f64,
@@ -41,10 +42,13 @@ pub struct Frame {
 /// Follows a moving source and a moving listener with few rays for each frame.
 ///
 /// Exact paths (the direct sound, image sources) are found anew in every frame, with the delays and directions of the
-/// moment. Sampled paths are averaged over the last frames, each traced with its own seed: a frame counts by
-/// exp(-moved / `memory_m`), `moved` being how far source and listener have gone since. Whoever stands still gathers up to
-/// `most_frames` frames; for one who walks at 1.4 m/s the default memory is a time constant of 0.36 s, and at ten frames a second seven
-/// of them count. Older paths are shifted to the new places to first order
+/// moment. In a room of so many planes that rays have to find the image sources, what older frames found is validated
+/// again, so that early reflections do not flicker.
+///
+/// Sampled paths are averaged over the last frames, each traced with its own seed: a frame counts by
+/// exp(-moved / `memory_m`), `moved` being how far source and listener have gone since. Whoever stands still gathers
+/// `most_frames` frames. For one who walks at 1.4 m/s the default memory is a time constant of 0.36 s; at ten frames a second
+/// the average is worth seven frames. Older paths are shifted to the new places to first order
 /// ([`PathSet::append_displaced`]), so that their delays neither jump nor precede the direct sound.
 ///
 /// The result depends on the seed and on the sequence of places, not on the time that passes or on the number of threads.
@@ -68,8 +72,11 @@ pub struct Frame {
 pub struct MovingTracer {
     scene: Scene,
     prepared: Arc<PreparedScene>,
+    /// Whether the room has been looked over for holes.
+    closed: bool,
     air: Air,
     config: MovingConfig,
+    early: EarlyMemory,
     /// The newest first.
     past: VecDeque<Past>,
     count: u64,
@@ -94,7 +101,8 @@ impl MovingTracer {
         let prepared = Arc::new(PathTracer::new(config.tracer.clone())?.prepare(&scene)?);
         check_range("memory_m", config.memory_m, 1e-3, 1e3, "between 1 mm and 1 km")?;
         check_range("most_frames", config.most_frames as f64, 1.0, 1e3, "between 1 and 1000")?;
-        Ok(Self { scene, prepared, air, config, past: VecDeque::new(), count: 0 })
+        let early = EarlyMemory::default();
+        Ok(Self { scene, prepared, closed: false, air, config, early, past: VecDeque::new(), count: 0 })
     }
 
     /// The settings.
@@ -105,6 +113,7 @@ impl MovingTracer {
     /// Forgets all frames: after a leap, or when the room has changed.
     pub fn clear(&mut self) {
         self.past.clear();
+        self.early.clear();
     }
 
     /// Traces the frame of these places.
@@ -129,11 +138,13 @@ impl MovingTracer {
         let seed = self.config.tracer.seed.wrapping_add(self.count);
         self.count += 1;
         let tracer = PathTracer::new(TracerConfig { seed, ..self.config.tracer.clone() })?;
-        if self.count == 1 && !self.config.tracer.allow_leaks {
+        if !self.closed && !self.config.tracer.allow_leaks {
             self.prepared.check_leaks(&self.scene, source.position_m)?;
+            self.closed = true;
         }
-        let paths = tracer.trace_prepared(&self.prepared, source, receiver, &self.air, observer)?;
+        let mut paths = tracer.trace_prepared(&self.prepared, source, receiver, &self.air, observer)?;
         let (source_m, receiver_m) = (source.position_m, receiver.position_m);
+        self.early.complete(&mut paths, &self.prepared.mesh, [source_m, receiver_m]);
         if let Some(last) = self.past.front() {
             let moved_m = norm(sub(source_m, last.source_m)) + norm(sub(receiver_m, last.receiver_m));
             self.past.iter_mut().for_each(|past| past.moved_m += moved_m);

@@ -218,13 +218,17 @@ impl<'a> Rendering<'a> {
                 // Stationary noise of the band, shaped afterwards: filtering what is shaped would ring before its time.
                 let share = |hz| self.masks.share(band, hz, Transition::Steep);
                 let carrier = self.spectrum.filtered(&carriers[cell], share);
-                let first_sample = self.earliest.ceil() as usize;
-                for i in first_sample..self.samples {
-                    let energy = envelope.at(i as f64 * per_sample) * per_sample;
-                    let shaped = energy.sqrt() * carrier[i];
-                    for (channel, gain) in noise.channels.iter_mut().zip(gains) {
-                        channel[i] += (gain * shaped) as f32;
-                    }
+                // Nothing before the first arrival.
+                let first_sample = (self.earliest.ceil() as usize).min(self.samples);
+                let shaped: Vec<f32> = (first_sample..self.samples)
+                    .map(|i| {
+                        let energy = envelope.at(i as f64 * per_sample) * per_sample;
+                        (energy.sqrt() * carrier[i]) as f32
+                    })
+                    .collect();
+                for (channel, gain) in noise.channels.iter_mut().zip(gains) {
+                    let gain = gain as f32;
+                    channel[first_sample..].iter_mut().zip(&shaped).for_each(|(sum, s)| *sum += gain * s);
                 }
             }
             noise
