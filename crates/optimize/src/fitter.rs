@@ -40,6 +40,11 @@ impl MaterialFitter {
         Ok(Self { config })
     }
 
+    /// The settings.
+    pub fn config(&self) -> &FitConfig {
+        &self.config
+    }
+
     /// Fits to one reverberation time for each band, in seconds, the mean over the given source-receiver pairs.
     ///
     /// `materials` give the bands and the scattering, `priors` what is expected of their absorption (and the start of the
@@ -59,7 +64,23 @@ impl MaterialFitter {
         target_t60_s: &PerBand<Estimate>,
         observer: &dyn Observer,
     ) -> Result<MaterialFit, Error> {
-        check_paths(paths, materials)?;
+        let traces: Vec<Trace<'_>> =
+            paths.iter().enumerate().map(|(pair, paths)| Trace { pair, paths, share: 1.0 }).collect();
+        self.fit_traces(&traces, materials, priors, air, target_t60_s, observer)
+    }
+
+    /// The same for pairs that were traced more than once: their energies add up.
+    pub(crate) fn fit_traces(
+        &self,
+        traces: &[Trace<'_>],
+        materials: &[Material],
+        priors: &[AbsorptionPrior],
+        air: &Air,
+        target_t60_s: &PerBand<Estimate>,
+        observer: &dyn Observer,
+    ) -> Result<MaterialFit, Error> {
+        let paths: Vec<&PathSet> = traces.iter().map(|t| t.paths).collect();
+        check_paths(&paths, materials)?;
         self.check_priors(materials, priors)?;
         check_targets(target_t60_s)?;
         let octaves = materials[0].bands();
@@ -81,20 +102,21 @@ impl MaterialFitter {
         let bands = (0..octaves.len())
             .into_par_iter()
             .map(|b| {
-                let pairs = histories
+                let weighted = histories
                     .iter()
-                    .zip(paths)
-                    .map(|(history, paths)| {
-                        Ok((history, history.weights(paths, materials, exponents.values()[b], b)?))
+                    .zip(traces)
+                    .map(|(history, trace)| {
+                        let exponent = exponents.values()[b];
+                        Ok((history, history.weights(trace.paths, materials, exponent, b, trace.share)?))
                     })
                     .collect::<Result<Vec<_>, Error>>()?;
                 let line = match self.config.objective {
                     SlopeObjective::DecayCurve => None,
-                    SlopeObjective::Paper => Some(SinglePathSlope::through_mean(&pairs)),
-                    SlopeObjective::Li2018 => Some(SinglePathSlope::through_first(&pairs)),
+                    SlopeObjective::Paper => Some(SinglePathSlope::through_mean(&weighted)),
+                    SlopeObjective::Li2018 => Some(SinglePathSlope::through_first(&weighted)),
                 };
                 Ok(Band {
-                    curve: DecaySlope::new(pairs, self.config.range_db),
+                    curve: DecaySlope::new(by_pair(traces, weighted), self.config.range_db),
                     line,
                     target_s: targets.values()[b].value,
                     mean: priors.iter().map(|p| p.mean.values()[b]).collect(),
@@ -241,6 +263,25 @@ impl MaterialFitter {
         }
         Ok(())
     }
+}
+
+/// One trace of a source-receiver pair.
+#[derive(Clone, Copy)]
+pub(crate) struct Trace<'p> {
+    pub pair: usize,
+    pub paths: &'p PathSet,
+    /// What its energies count: the shares of the traces of a pair sum to 1.
+    pub share: f64,
+}
+
+/// Collects what belongs to the same pair.
+pub(crate) fn by_pair<T>(traces: &[Trace<'_>], of_trace: Vec<T>) -> Vec<Vec<T>> {
+    let pairs = traces.iter().map(|t| t.pair + 1).max().unwrap_or(0);
+    let mut grouped: Vec<Vec<T>> = (0..pairs).map(|_| Vec::new()).collect();
+    for (trace, value) in traces.iter().zip(of_trace) {
+        grouped[trace.pair].push(value);
+    }
+    grouped
 }
 
 fn check_targets(target_t60_s: &PerBand<Estimate>) -> Result<(), Error> {

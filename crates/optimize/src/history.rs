@@ -76,13 +76,14 @@ impl History {
         self.order.len()
     }
 
-    /// Energy of each path in one band if no surface absorbed: distance, scattering and air alone.
+    /// Energy of each path in one band if no surface absorbed, distance, scattering and air alone, times `share`.
     pub fn weights(
         &self,
         paths: &PathSet,
         materials: &[Material],
         air_exponent_per_m: f64,
         band: usize,
+        share: f64,
     ) -> Result<Vec<f32>, Error> {
         let rigid: Vec<Material> = materials
             .iter()
@@ -90,10 +91,11 @@ impl History {
             .collect::<Result<_, _>>()?;
         let scattering = paths.log_reflectance(&rigid, band)?;
         let exponent = air_exponent_per_m as f32;
+        let log_share = share.ln() as f32;
         let weight = |&i: &u32| {
             let i = i as usize;
             let surfaces = scattering[paths.chains()[i] as usize] + scattering[paths.tails()[i] as usize];
-            (paths.log_weights()[i] + surfaces - exponent * paths.lengths_m()[i]).exp()
+            (log_share + paths.log_weights()[i] + surfaces - exponent * paths.lengths_m()[i]).exp()
         };
         Ok(self.order.iter().map(weight).collect())
     }
@@ -193,8 +195,8 @@ impl History {
 }
 
 impl History {
-    /// Monte-Carlo variance of a linear functional of the bins' energies, from the scatter between batches of rays.
-    pub fn variance(&self, weights: &[f32], absorption: &[f64], functional: &[f64]) -> f64 {
+    /// What each batch of rays contributes to a linear functional of the bins' energies.
+    pub fn batch_sums(&self, weights: &[f32], absorption: &[f64], functional: &[f64]) -> Vec<f64> {
         let (powers, stride) = self.powers(absorption);
         let batches = usize::from(PathSet::BATCHES);
         // The last place is for exact paths, which do not scatter.
@@ -204,9 +206,20 @@ impl History {
                 parts[usize::from(batch)] += factor * e;
             }
         }
-        let parts = &parts[..batches];
-        let mean = parts.iter().sum::<f64>() / batches as f64;
-        let scatter: f64 = parts.iter().map(|p| (p - mean) * (p - mean)).sum();
-        scatter * batches as f64 / (batches as f64 - 1.0)
+        parts.truncate(batches);
+        parts
     }
+
+    /// Monte-Carlo variance of a linear functional of the bins' energies, from the scatter between batches of rays.
+    pub fn variance(&self, weights: &[f32], absorption: &[f64], functional: &[f64]) -> f64 {
+        variance_of_sum(&self.batch_sums(weights, absorption, functional))
+    }
+}
+
+/// Variance of the sum of independent parts, from their scatter.
+pub(crate) fn variance_of_sum(parts: &[f64]) -> f64 {
+    let n = parts.len() as f64;
+    let mean = parts.iter().sum::<f64>() / n;
+    let scatter: f64 = parts.iter().map(|p| (p - mean) * (p - mean)).sum();
+    scatter * n / (n - 1.0)
 }

@@ -97,6 +97,8 @@ mod fitter;
 mod group;
 mod history;
 mod objective;
+mod prediction;
+mod retrace;
 mod single_paths;
 mod uncertainty;
 mod variables;
@@ -109,4 +111,6 @@ pub use fit::{
 };
 pub use fitter::MaterialFitter;
 pub use objective::SlopeEvaluation;
+pub use prediction::{PredictedChange, RoomPrediction};
+pub use retrace::{NotVerified, Retrace, RetraceConfig, RetracedFit};
 pub use variables::{ForArgmin, Logit, RegularisedSlope};
