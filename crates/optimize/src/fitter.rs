@@ -19,7 +19,7 @@ const STAGE: &str = "fit materials";
 /// Relative Monte-Carlo error of T60 that is worth a warning.
 const FEW_PATHS: f64 = 0.03;
 /// Deviation from a prior that is worth a warning, in standard deviations.
-const FAR_FROM_PRIOR: f64 = 3.0;
+pub(crate) const FAR_FROM_PRIOR: f64 = 3.0;
 
 /// Fits materials so that the simulated decay of every band has the slope -60/T60.
 ///
@@ -166,7 +166,7 @@ impl MaterialFitter {
             let here = b % together;
             let found = &solution.bands[here];
             let values = &found.absorption;
-            let bounded = AtBound::find(band, values, band_hz, self.config.bounds);
+            let bounded = AtBound::find(&band.standard_deviation, values, band_hz, self.config.bounds);
             let reading = found.t60_s.clone();
             if let Some(reason) = self.unreachable(band, found, limits_s.values()[b]) {
                 fit.unreachable.push(Unreachable { band_hz, reason });
@@ -191,7 +191,7 @@ impl MaterialFitter {
             if traced_s < advised_s {
                 fit.warnings.push(Warning::ShortPaths { band_hz, traced_s, advised_s });
             }
-            spread.name_open(here, band, band_hz, &hits, &bounded, &mut fit.not_determined);
+            spread.name_open(here, &band.standard_deviation, band_hz, &hits, &bounded, &mut fit.not_determined);
             fit.at_bounds.extend(bounded);
             predicted.push(reading);
         }
@@ -235,7 +235,7 @@ impl MaterialFitter {
         })
     }
 
-    fn check_priors(&self, materials: &[Material], priors: &[AbsorptionPrior]) -> Result<(), Error> {
+    pub(crate) fn check_priors(&self, materials: &[Material], priors: &[AbsorptionPrior]) -> Result<(), Error> {
         if priors.len() != materials.len() {
             return Err(Error::Count { what: "priors", expected: materials.len(), found: priors.len() });
         }
@@ -303,8 +303,8 @@ pub(crate) fn at_bound(absorption: f64, bound: f64) -> bool {
 }
 
 impl AtBound {
-    fn find(band: &Band<'_>, absorption: &[f64], band_hz: f64, bounds: (f64, f64)) -> Vec<Self> {
-        let free = absorption.iter().enumerate().filter(|&(k, _)| band.standard_deviation[k] > 0.0);
+    pub(crate) fn find(standard_deviation: &[f64], absorption: &[f64], band_hz: f64, bounds: (f64, f64)) -> Vec<Self> {
+        let free = absorption.iter().enumerate().filter(|&(k, _)| standard_deviation[k] > 0.0);
         free.flat_map(|(material, &a)| {
             [(bounds.0, false), (bounds.1, true)]
                 .into_iter()

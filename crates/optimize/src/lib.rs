@@ -96,9 +96,14 @@ mod fit;
 mod fitter;
 mod group;
 mod history;
+mod measured_decay;
+mod misfit;
 mod objective;
 mod prediction;
+mod response_band;
+mod responses;
 mod retrace;
+mod scale;
 mod single_paths;
 mod uncertainty;
 mod variables;
@@ -110,7 +115,10 @@ pub use fit::{
     AtBound, MaterialFit, Undetermined, UndeterminedKind, Unreachable, UnreachableReason, Warning,
 };
 pub use fitter::MaterialFitter;
+pub use measured_decay::MeasuredDecay;
+pub use misfit::DecayMisfit;
 pub use objective::SlopeEvaluation;
 pub use prediction::{PredictedChange, RoomPrediction};
+pub use responses::{MeasuredPair, ResponseFit};
 pub use retrace::{NotVerified, Retrace, RetraceConfig, RetracedFit};
 pub use variables::{ForArgmin, Logit, RegularisedSlope};
