@@ -180,7 +180,7 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
     out.write("report.html", page.html().as_bytes())?;
     out.finish()?;
     if let Some(path) = &arguments.json {
-        sabine::acoustics::write_atomically(path, json.as_bytes())?;
+        sabine::acoustics::write_atomically(path, |file| std::io::Write::write_all(file, json.as_bytes()))?;
     }
     summary.print(&outcome, &arguments.out);
     Ok(())
