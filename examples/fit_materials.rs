@@ -36,7 +36,7 @@ struct Arguments {
     #[arg(long, value_name = "DIR")]
     room: Option<PathBuf>,
     /// Reverberation times at 125 Hz to 8 kHz, in seconds
-    #[arg(long, value_delimiter = ',', num_args = 7, value_name = "S", conflicts_with = "responses")]
+    #[arg(long, value_delimiter = ',', value_name = "S,...", conflicts_with = "responses")]
     t60: Option<Vec<f64>>,
     /// Fit to the room's measured responses (the default without --t60)
     #[arg(long)]
@@ -173,7 +173,11 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
     for (b, curves) in outcome.curves.iter().enumerate() {
         let chart = decay_chart(curves);
         out.write(&format!("decay_{:.0}_hz.svg", OCTAVES.nominal_hz(b)), chart.plain_svg()?.as_bytes())?;
-        page.markup(&format!("<figure>{}<figcaption>{} Hz</figcaption></figure>", chart.svg()?, OCTAVES.nominal_hz(b)));
+        page.markup(&format!(
+            "<figure>{}<figcaption>{} Hz</figcaption></figure>",
+            chart.svg()?,
+            OCTAVES.nominal_hz(b)
+        ));
     }
     page.markup("</div>").heading("Absorption");
     page.table(&summary.table());
@@ -299,11 +303,12 @@ impl<'a> Room<'a> {
 
     fn fit_responses(&self, bar: &Bar) -> Result<Outcome, AnyError> {
         let entries = self.file.responses();
-        let places: Vec<(&Source, &Receiver)> =
-            entries.iter().map(|e| (&self.file.sources()[e.source], &self.file.receivers()[e.receiver])).collect();
-        let unknown = |id: &&String| {
-            !places.iter().any(|(s, r)| **id == r.id || **id == format!("{}/{}", s.id, r.id))
-        };
+        let places: Vec<(&Source, &Receiver)> = entries
+            .iter()
+            .map(|e| (&self.file.sources()[e.source], &self.file.receivers()[e.receiver]))
+            .collect();
+        let unknown =
+            |id: &&String| !places.iter().any(|(s, r)| **id == r.id || **id == format!("{}/{}", s.id, r.id));
         if let Some(id) = self.arguments.hold_out.iter().find(unknown) {
             return Err(format!("--hold-out {id}: the room has no response of this receiver").into());
         }
@@ -314,7 +319,8 @@ impl<'a> Room<'a> {
         let measured = (0..entries.len())
             .map(|i| Ok(MeasuredDecay::new(&self.file.load_response(i)?, OCTAVES)?))
             .collect::<Result<Vec<_>, AnyError>>()?;
-        let t30 = |m: &MeasuredDecay| m.t30_s().values().iter().flatten().map(|t| t.value).fold(0.0, f64::max);
+        let t30 =
+            |m: &MeasuredDecay| m.t30_s().values().iter().flatten().map(|t| t.value).fold(0.0, f64::max);
         let longest_s = measured.iter().map(t30).fold(0.0, f64::max);
         let duration_s = (DURATION_FACTOR * longest_s).clamp(DURATION_S.0, DURATION_S.1);
         let seed = self.arguments.seed;
@@ -345,7 +351,8 @@ impl<'a> Room<'a> {
         let (mut compared, mut curves) = (Vec::new(), Vec::new());
         for (i, (measured, paths)) in measured.iter().zip(&other).enumerate() {
             let pair = MeasuredPair { measured, paths };
-            let misfit = |materials: &[Material]| DecayMisfit::new(pair, measurement.time_zero, materials, &self.air);
+            let misfit =
+                |materials: &[Material]| DecayMisfit::new(pair, measurement.time_zero, materials, &self.air);
             let (before, after) = (misfit(&self.materials)?, misfit(&done.fit.materials)?);
             if curves.is_empty() && (held_out[i] || !held_out.contains(&true)) {
                 curves = (0..OCTAVES.len()).map(|b| response_curves(&before, &after, b)).collect();
@@ -363,7 +370,9 @@ impl<'a> Room<'a> {
             });
         }
         let mut warnings: Vec<String> = done.fit.warnings.iter().map(ToString::to_string).collect();
-        warnings.extend(done.left_out.iter().map(|(i, hz, why)| format!("response {i} at {hz} Hz is left out: {why}")));
+        warnings.extend(
+            done.left_out.iter().map(|(i, hz, why)| format!("response {i} at {hz} Hz is left out: {why}")),
+        );
         let mean = |of: &dyn Fn(&Compared) -> &Vec<Option<f64>>| -> Vec<Option<f64>> {
             let used = || compared.iter().filter(|c| !c.held_out);
             (0..OCTAVES.len()).map(|b| mean_of(used().filter_map(|c| of(c)[b]))).collect()
@@ -440,7 +449,9 @@ fn decay_chart(curves: &[(&'static str, Look, Vec<(f64, f64)>)]) -> Chart {
         y_label: "level, dB".to_owned(),
         x: Scale::Linear(0.0, longest_s),
         y: Some((-65.0, 0.0)),
-        series: series.map(|((name, look, points), colour)| Series::new(*name, *look, colour, points.clone())).collect(),
+        series: series
+            .map(|((name, look, points), colour)| Series::new(*name, *look, colour, points.clone()))
+            .collect(),
         small: true,
     }
 }

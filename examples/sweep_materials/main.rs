@@ -155,7 +155,8 @@ struct Traced<'a> {
 impl Traced<'_> {
     fn read(&self, paths: &PathSet, materials: &[Material]) -> Result<PerBand<Reading>, AcousticsError> {
         let failed = |e: sabine::propagate::Error| AcousticsError::implementation("rendering", e);
-        let config = RenderConfig { sample_rate_hz: 32_000, seed: self.noise_seed, ..RenderConfig::default() };
+        let config =
+            RenderConfig { sample_rate_hz: 32_000, seed: self.noise_seed, ..RenderConfig::default() };
         let renderer = PressureRenderer::new(config).map_err(failed)?;
         let response = renderer.render(paths, materials, &self.air).map_err(failed)?;
         Ok(RoomParameters::measure(&response, OctaveBands::T60)?.t30_s)
@@ -203,8 +204,15 @@ fn fit_room(
     let fitter = |objective| MaterialFitter::new(FitConfig { objective, ..FitConfig::default() });
 
     let config = RetraceConfig { seed: 1, t60_error: arguments.t60_error, ..RetraceConfig::default() };
-    let edc = fitter(SlopeObjective::DecayCurve)?
-        .fit_t60_retracing(&traced, &materials, &priors, &air, &targets, &config, &())?;
+    let edc = fitter(SlopeObjective::DecayCurve)?.fit_t60_retracing(
+        &traced,
+        &materials,
+        &priors,
+        &air,
+        &targets,
+        &config,
+        &(),
+    )?;
     // Rays and noise that nothing was chosen by.
     let total: usize = edc.fitted_paths.iter().map(|(_, sets)| sets[0].len()).sum();
     let effort = edc.independent_paths[0].len() as f64 / edc.fitted_paths[0].1[0].len() as f64;

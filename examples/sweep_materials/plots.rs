@@ -81,8 +81,7 @@ fn targets(points: &[Point]) -> Vec<f64> {
 pub fn reached(points: &[Point]) -> Result<String, AnyError> {
     let targets = targets(points);
     let longest = targets.last().copied().unwrap_or(1.0);
-    let mut series =
-        vec![Series::new("wanted", Look::Dashed, 3, vec![(0.0, 0.0), (longest, longest)])];
+    let mut series = vec![Series::new("wanted", Look::Dashed, 3, vec![(0.0, 0.0), (longest, longest)])];
     for (colour, (method, name)) in METHODS.into_iter().enumerate().filter(|(i, _)| *i != 1) {
         let of = |target: f64| {
             let mine = points.iter().filter(|p| p.method == method && p.target_s == target && p.reachable);

@@ -191,7 +191,14 @@ impl MaterialFitter {
             if traced_s < advised_s {
                 fit.warnings.push(Warning::ShortPaths { band_hz, traced_s, advised_s });
             }
-            spread.name_open(here, &band.standard_deviation, band_hz, &hits, &bounded, &mut fit.not_determined);
+            spread.name_open(
+                here,
+                &band.standard_deviation,
+                band_hz,
+                &hits,
+                &bounded,
+                &mut fit.not_determined,
+            );
             fit.at_bounds.extend(bounded);
             predicted.push(reading);
         }
@@ -235,7 +242,11 @@ impl MaterialFitter {
         })
     }
 
-    pub(crate) fn check_priors(&self, materials: &[Material], priors: &[AbsorptionPrior]) -> Result<(), Error> {
+    pub(crate) fn check_priors(
+        &self,
+        materials: &[Material],
+        priors: &[AbsorptionPrior],
+    ) -> Result<(), Error> {
         if priors.len() != materials.len() {
             return Err(Error::Count { what: "priors", expected: materials.len(), found: priors.len() });
         }
@@ -303,7 +314,12 @@ pub(crate) fn at_bound(absorption: f64, bound: f64) -> bool {
 }
 
 impl AtBound {
-    pub(crate) fn find(standard_deviation: &[f64], absorption: &[f64], band_hz: f64, bounds: (f64, f64)) -> Vec<Self> {
+    pub(crate) fn find(
+        standard_deviation: &[f64],
+        absorption: &[f64],
+        band_hz: f64,
+        bounds: (f64, f64),
+    ) -> Vec<Self> {
         let free = absorption.iter().enumerate().filter(|&(k, _)| standard_deviation[k] > 0.0);
         free.flat_map(|(material, &a)| {
             [(bounds.0, false), (bounds.1, true)]

@@ -1,7 +1,9 @@
 //! How the energy of a measured response decays, in every band, as far as the noise lets one see.
 
 use crate::Error;
-use sabine_acoustics::{DecayFit, FilterBank, ImpulseResponse, NoReading, OctaveBands, PerBand, Reading, RoomParameters};
+use sabine_acoustics::{
+    DecayFit, FilterBank, ImpulseResponse, NoReading, OctaveBands, PerBand, Reading, RoomParameters,
+};
 
 /// What follows the onset by less than this is direct sound, which the source's directivity changes, not decay; in seconds.
 const DIRECT_S: f64 = 0.005;

@@ -90,10 +90,9 @@ impl SlopeEvaluation {
             })
             .collect::<Result<Vec<_>, Error>>()?;
         let model: Box<dyn SlopeModel> = match config.objective {
-            SlopeObjective::DecayCurve => Box::new(DecaySlope::new(
-                pairs.into_iter().map(|pair| vec![pair]).collect(),
-                config.range_db,
-            )),
+            SlopeObjective::DecayCurve => {
+                Box::new(DecaySlope::new(pairs.into_iter().map(|pair| vec![pair]).collect(), config.range_db))
+            }
             SlopeObjective::Paper => Box::new(SinglePathSlope::through_mean(&pairs)),
             SlopeObjective::Li2018 => Box::new(SinglePathSlope::through_first(&pairs)),
         };

@@ -1,12 +1,12 @@
 //! What a receiver hears with given materials, read from the paths.
 
+use crate::Error;
 use crate::decay::{DB_PER_NEPER, slope_with_sensitivity};
 use crate::decay_slope::Traces;
 use crate::expansion::Bins;
 use crate::fitter::Trace;
 use crate::history::{History, variance_of_sum};
 use crate::objective::check_paths;
-use crate::Error;
 use rayon::prelude::*;
 use sabine_acoustics::{Air, EnergyDecayCurve, Estimate, Material, NoReading, PathSet, PerBand, Reading};
 
@@ -68,7 +68,8 @@ impl PredictedChange {
             let bins = Bins::of(&vec![(&history, weights.clone())], &absorption);
             Ok(functionals(&bins, direct_s).map(|reading| Linear {
                 value: reading.as_ref().map(|(value, _)| *value).map_err(NoReading::clone),
-                parts: reading.map_or_else(|_| Vec::new(), |(_, by)| history.batch_sums(&weights, &absorption, &by)),
+                parts: reading
+                    .map_or_else(|_| Vec::new(), |(_, by)| history.batch_sums(&weights, &absorption, &by)),
             }))
         };
         let all = (0..bands.len())

@@ -215,7 +215,13 @@ impl<'b> BandFit<'b> {
 
     /// The result with its uncertainty: cov = C (1 + F + M) C in standard deviations of the prior, with C the inverse of prior plus
     /// data information, F what the measurement's chance and M what that of the rays adds. Materials at a bound or held do not follow.
-    pub fn solved(&self, absorption: &[f64], dispersion: f64, config: &FitConfig, iterations: usize) -> Solved {
+    pub fn solved(
+        &self,
+        absorption: &[f64],
+        dispersion: f64,
+        config: &FitConfig,
+        iterations: usize,
+    ) -> Solved {
         let n = absorption.len();
         let sd = &self.band.standard_deviation;
         let fixed = |k: usize| {
@@ -329,7 +335,15 @@ impl<'f, 'b> Likelihood<'f, 'b> {
         let at = |b: usize, k: usize| free.iter().position(|&f| f == (b, k));
         let pairs = free.iter().enumerate();
         let neighbours = pairs.filter_map(|(low, &(b, k))| at(b + 1, k).map(|high| (low, high))).collect();
-        Self { fits, dispersion, bounds: config.bounds, smoothness: config.smoothness, free, scales, neighbours }
+        Self {
+            fits,
+            dispersion,
+            bounds: config.bounds,
+            smoothness: config.smoothness,
+            free,
+            scales,
+            neighbours,
+        }
     }
 
     pub fn variables(&self, absorption: &[Vec<f64>]) -> Vec<f64> {

@@ -127,8 +127,7 @@ impl MaterialFitter {
         };
         for (b, (band, solved)) in bands.iter().zip(&solved).enumerate() {
             let band_hz = octaves.nominal_hz(b);
-            let bounded =
-                AtBound::find(&band.standard_deviation, &solved.absorption, band_hz, config.bounds);
+            let bounded = AtBound::find(&band.standard_deviation, &solved.absorption, band_hz, config.bounds);
             solved.spread.name_open(
                 0,
                 &band.standard_deviation,
@@ -163,7 +162,11 @@ impl MaterialFitter {
 }
 
 /// Seconds from the first sample of each response to the emission.
-pub(crate) fn latencies_s(pairs: &[MeasuredPair<'_>], histories: &[History], time_zero: TimeZero) -> Vec<f64> {
+pub(crate) fn latencies_s(
+    pairs: &[MeasuredPair<'_>],
+    histories: &[History],
+    time_zero: TimeZero,
+) -> Vec<f64> {
     let shortest_s = |h: &History| h.times_s.iter().fold(f64::INFINITY, |first, t| first.min(*t));
     let own: Vec<f64> =
         pairs.iter().zip(histories).map(|(p, h)| p.measured.onset_s() - shortest_s(h)).collect();

@@ -4,9 +4,7 @@ use crate::fitter::Trace;
 use crate::objective::check_paths;
 use crate::prediction::t60_of_traces;
 use crate::{AbsorptionPrior, Error, MaterialFit, MaterialFitter};
-use sabine_acoustics::{
-    Air, Estimate, Material, Observer, OctaveBands, PathSet, PerBand, Reading, report,
-};
+use sabine_acoustics::{Air, Estimate, Material, Observer, OctaveBands, PathSet, PerBand, Reading, report};
 use std::time::Instant;
 
 /// What traces a room again, with other random numbers and as many rays as are asked for.
@@ -196,9 +194,8 @@ impl MaterialFitter {
         loop {
             rounds += 1;
             report(observer, STAGE, rounds as u64 - 1, config.max_rounds as u64)?;
-            let fit = clock.fitting(|| {
-                self.fit_traces(&pool.shares(), materials, priors, air, &aim, observer)
-            })?;
+            let fit =
+                clock.fitting(|| self.fit_traces(&pool.shares(), materials, priors, air, &aim, observer))?;
             let last = rounds == config.max_rounds;
             let wanted = fit.effort_for(config.t60_error, pool.effort()).min(largest_effort);
             if wanted > WORTHWHILE * pool.effort() && !last {
@@ -214,7 +211,8 @@ impl MaterialFitter {
             let verified = self.t60_of(&independent, &fit.materials, air)?;
             let read = clock.tracing(|| room.read_t60_s(&independent, &fit.materials))?;
             let verdicts = verdicts(&fit, &aim, &target, &verified, read.as_ref());
-            let settled = verdicts.iter().flatten().all(|v| !v.contradicted && (v.correction - 1.0).abs() < OFF);
+            let settled =
+                verdicts.iter().flatten().all(|v| !v.contradicted && (v.correction - 1.0).abs() < OFF);
             if last || settled {
                 report(observer, STAGE, config.max_rounds as u64, config.max_rounds as u64)?;
                 let read_t60_s = read.unwrap_or_else(|| verified.clone());
@@ -249,7 +247,12 @@ impl MaterialFitter {
         }
     }
 
-    fn t60_of(&self, paths: &[PathSet], materials: &[Material], air: &Air) -> Result<PerBand<Reading>, Error> {
+    fn t60_of(
+        &self,
+        paths: &[PathSet],
+        materials: &[Material],
+        air: &Air,
+    ) -> Result<PerBand<Reading>, Error> {
         check_paths(&paths.iter().collect::<Vec<_>>(), materials)?;
         let traces: Vec<Trace<'_>> =
             paths.iter().enumerate().map(|(pair, paths)| Trace { pair, paths, share: 1.0 }).collect();
@@ -265,10 +268,11 @@ impl MaterialFit {
 
     /// Effort with which every reachable T60 has a standard error, if `effort` gave what it has.
     fn effort_for(&self, t60_error: f64, effort: f64) -> f64 {
-        let needed = self.predicted_t60_s.iter().filter(|(hz, _)| self.is_reachable(*hz)).map(|(_, reading)| {
-            let relative = reading.as_ref().map_or(0.0, |t| t.standard_error / t.value);
-            effort * (relative / t60_error).powi(2)
-        });
+        let needed =
+            self.predicted_t60_s.iter().filter(|(hz, _)| self.is_reachable(*hz)).map(|(_, reading)| {
+                let relative = reading.as_ref().map_or(0.0, |t| t.standard_error / t.value);
+                effort * (relative / t60_error).powi(2)
+            });
         needed.fold(1.0, f64::max)
     }
 }
@@ -317,7 +321,8 @@ fn verdicts(
     read: Option<&PerBand<Reading>>,
 ) -> Vec<Option<Verdict>> {
     let verdict = |(b, (band_hz, verified)): (usize, (f64, &Reading))| {
-        let predicted = fit.predicted_t60_s.values()[b].as_ref().ok().filter(|_| fit.is_reachable(band_hz))?;
+        let predicted =
+            fit.predicted_t60_s.values()[b].as_ref().ok().filter(|_| fit.is_reachable(band_hz))?;
         let verified = verified.as_ref().ok()?;
         let error = predicted.standard_error.hypot(verified.standard_error);
         let off = (verified.value - predicted.value).abs();
