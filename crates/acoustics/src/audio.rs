@@ -97,9 +97,24 @@ pub fn write_wav(
     sample_rate_hz: u32,
     format: SampleFormat,
 ) -> Result<(), Error> {
+    write_wav_channels(path, &[samples], sample_rate_hz, format)
+}
+
+/// Writes a WAV file of several channels of equal length (2 for ears, 16 for third-order ambisonics), whole or not at all
+/// ([`write_atomically`]).
+///
+/// # Errors
+/// As [`write_wav`]; also [`Error::InFile`] with the cause [`Error::OutOfRange`] for no channel or more than 64, or
+/// [`Error::Length`] for channels of unequal length.
+pub fn write_wav_channels(
+    path: impl AsRef<Path>,
+    channels: &[&[f32]],
+    sample_rate_hz: u32,
+    format: SampleFormat,
+) -> Result<(), Error> {
     let path = path.as_ref();
-    check_writable(samples, sample_rate_hz, format).map_err(|error| error.in_file(path, "samples"))?;
-    write_atomically(path, |file| encode(file, samples, sample_rate_hz, format))
+    check_writable(channels, sample_rate_hz, format).map_err(|error| error.in_file(path, "samples"))?;
+    write_atomically(path, |file| encode(file, channels, sample_rate_hz, format))
 }
 
 /// The bytes of a mono WAV file, for whoever does not want a file of its own.
@@ -107,17 +122,29 @@ pub fn write_wav(
 /// # Errors
 /// [`Error::OutOfRange`] for a sample beyond full scale in an integer format.
 pub fn encode_wav(signal: &Signal, format: SampleFormat) -> Result<Vec<u8>, Error> {
-    check_writable(signal.samples(), signal.sample_rate_hz(), format)?;
+    encode_wav_channels(&[signal.samples()], signal.sample_rate_hz(), format)
+}
+
+/// The bytes of a WAV file of several channels.
+///
+/// # Errors
+/// As [`write_wav_channels`], without a file to name.
+pub fn encode_wav_channels(
+    channels: &[&[f32]],
+    sample_rate_hz: u32,
+    format: SampleFormat,
+) -> Result<Vec<u8>, Error> {
+    check_writable(channels, sample_rate_hz, format)?;
     let mut bytes = std::io::Cursor::new(Vec::new());
-    encode(&mut bytes, signal.samples(), signal.sample_rate_hz(), format)
+    encode(&mut bytes, channels, sample_rate_hz, format)
         .map_err(|source| Error::implementation("WAV encoder", source))?;
     Ok(bytes.into_inner())
 }
 
 fn encode(
     file: impl std::io::Write + std::io::Seek,
-    samples: &[f32],
-    sample_rate_hz: u32,
+    channels: &[&[f32]],
+    sample_rate: u32,
     format: SampleFormat,
 ) -> std::io::Result<()> {
     let (bits_per_sample, sample_format) = match format {
@@ -125,32 +152,41 @@ fn encode(
         SampleFormat::Int24 => (24, hound::SampleFormat::Int),
         SampleFormat::Float32 => (32, hound::SampleFormat::Float),
     };
-    let spec = hound::WavSpec { channels: 1, sample_rate: sample_rate_hz, bits_per_sample, sample_format };
+    let spec =
+        hound::WavSpec { channels: channels.len() as u16, sample_rate, bits_per_sample, sample_format };
     let mut writer = hound::WavWriter::new(file, spec).map_err(into_io)?;
+    let mut interleaved =
+        (0..channels[0].len()).flat_map(|frame| channels.iter().map(move |samples| samples[frame]));
     match sample_format {
-        hound::SampleFormat::Float => samples.iter().try_for_each(|&s| writer.write_sample(s)),
+        hound::SampleFormat::Float => interleaved.try_for_each(|s| writer.write_sample(s)),
         hound::SampleFormat::Int => {
             let full = f32::from(bits_per_sample - 1).exp2();
             // A sample of exactly 1 has no code of its own: the largest one is a part in 2^15 below it.
             let code = |s: f32| (s * full).round().min(full - 1.0) as i32;
-            samples.iter().try_for_each(|&s| writer.write_sample(code(s)))
+            interleaved.try_for_each(|s| writer.write_sample(code(s)))
         }
     }
     .map_err(into_io)?;
     writer.finalize().map_err(into_io)
 }
 
-fn check_writable(samples: &[f32], sample_rate_hz: u32, format: SampleFormat) -> Result<(), Error> {
-    crate::signal::check_samples("signal", samples, sample_rate_hz)?;
-    // The RIFF header counts bytes in 32 bits.
-    check_range("number of samples", samples.len() as f64, 1.0, 1e9, "at most 1e9 in a WAV file")?;
-    if format != SampleFormat::Float32
-        && let Some(&beyond) = samples.iter().find(|s| s.abs() > 1.0)
-    {
-        let range = "between -1 and 1 in an integer format";
-        return Err(Error::OutOfRange { field: "sample", value: f64::from(beyond), range });
+fn check_writable(channels: &[&[f32]], sample_rate_hz: u32, format: SampleFormat) -> Result<(), Error> {
+    check_range("number of channels", channels.len() as f64, 1.0, 64.0, "between 1 and 64")?;
+    for samples in channels {
+        crate::signal::check_samples("signal", samples, sample_rate_hz)?;
+        if samples.len() != channels[0].len() {
+            return Err(Error::Length { expected: channels[0].len(), found: samples.len() });
+        }
+        if format != SampleFormat::Float32
+            && let Some(&beyond) = samples.iter().find(|s| s.abs() > 1.0)
+        {
+            let range = "between -1 and 1 in an integer format";
+            return Err(Error::OutOfRange { field: "sample", value: f64::from(beyond), range });
+        }
     }
-    Ok(())
+    // The RIFF header counts bytes in 32 bits.
+    let count = channels.len() * channels[0].len();
+    check_range("number of samples", count as f64, 1.0, 1e9, "at most 1e9 in a WAV file")
 }
 
 fn open(path: &Path) -> Result<BufReader<File>, Error> {

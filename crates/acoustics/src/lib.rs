@@ -45,7 +45,10 @@
 //! - Theory, kept apart from measurement: [`DiffuseRoom`] (Sabine, Eyring, Millington, Fitzroy, Arau-Puchades, critical
 //!   distance, mean free path), [`schroeder_frequency_hz`], [`Air`] (ISO 9613-1).
 //! - Rooms: [`Scene`], [`Material`], [`material_library`], [`MeasuredRoom`], [`Source`], [`Receiver`].
-//! - Between tracing and everything after it: [`PathSet`], [`EnergyResponse`] (energy, **not** to be convolved).
+//! - Between tracing and everything after it: [`PathSet`], [`Conditions`] (what may change without tracing again: materials,
+//!   air, [`Directivity`] and [`Orientation`] of source and receiver), [`EnergyResponse`] (energy, **not** to be convolved),
+//!   [`PathParameters`] with Monte-Carlo standard errors.
+//! - Between tracing and everything after it: [`PathSet`], [`EnergyResponse`] (energy, **not** to be convolved), [`EdgeDiffraction`].
 //! - Seams: [`FeatureExtractor`], [`RoomEstimator`], [`Augment`], [`RayScene`], [`Propagator`], [`Objective`].
 //!
 //! # Does not
@@ -90,7 +93,11 @@ mod audio;
 mod audio_symphonia;
 mod band_energy;
 mod bands;
+mod conditions;
 mod decay_fit;
+mod directivity;
+mod directivity_table;
+mod edge_diffraction;
 mod energy;
 mod equalisation;
 mod error;
@@ -100,7 +107,9 @@ mod material;
 mod material_library;
 mod measured_room;
 mod onset;
+mod orientation;
 mod parameters;
+mod path_parameters;
 mod paths;
 mod progress;
 mod resample;
@@ -114,9 +123,15 @@ mod traits;
 
 pub use air::Air;
 pub use atomic_file::write_atomically;
-pub use audio::{AudioInfo, Channel, SampleFormat, encode_wav, probe_wav, read_audio, write_wav};
+pub use audio::{
+    AudioInfo, Channel, SampleFormat, encode_wav, encode_wav_channels, probe_wav, read_audio, write_wav,
+    write_wav_channels,
+};
 pub use bands::{OctaveBands, PerBand};
+pub use conditions::Conditions;
 pub use decay_fit::{DecayFit, Slope};
+pub use directivity::Directivity;
+pub use edge_diffraction::{EdgeDiffraction, EdgePoint};
 pub use energy::{EnergyDecayCurve, EnergyResponse};
 pub use equalisation::equalisation;
 pub use error::Error;
@@ -128,7 +143,9 @@ pub use measured_room::{
     Levels, MaterialPrior, MeasuredRoom, Measurement, NewResponse, NewRoom, ResponseEntry, TimeZero,
 };
 pub use onset::Onset;
+pub use orientation::Orientation;
 pub use parameters::{BandParameters, RoomParameters};
+pub use path_parameters::PathParameters;
 pub use paths::{Contribution, PathSet, Reflection};
 pub use progress::{Observer, report};
 pub use resample::{resample, resample_response};

@@ -1,6 +1,8 @@
 //! Traced paths: the seam between a tracer and everything after it.
 
-use crate::{Air, EnergyResponse, Error, Material, OctaveBands};
+use crate::{
+    Air, Conditions, Directivity, EdgeDiffraction, EnergyResponse, Error, Material, OctaveBands, Orientation,
+};
 
 /// What a surface did to a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +68,8 @@ pub struct PathSet {
     departures: Vec<u32>,
     arrivals: Vec<u32>,
     batches: Vec<u8>,
+    /// Ways around edges, by contribution, rising.
+    diffractions: Vec<(usize, EdgeDiffraction)>,
 }
 
 /// Batch of contributions that are exact.
@@ -97,6 +101,7 @@ impl PathSet {
             departures: Vec::new(),
             arrivals: Vec::new(),
             batches: Vec::new(),
+            diffractions: Vec::new(),
         }
     }
 
@@ -130,12 +135,31 @@ impl PathSet {
         self.batches.push(contribution.batch.unwrap_or(EXACT));
     }
 
+    /// Adds a path that bends around an edge: its energy in each band is that of the contribution times
+    /// [`EdgeDiffraction::octave_energy_gain`]. The contribution is exact, without reflections, as long as the way around the
+    /// edge, and of the weight of an undisturbed path of that length. Directions are as in [`Contribution`].
+    pub fn push_diffracted(&mut self, departure: [f64; 3], arrival: [f64; 3], diffraction: EdgeDiffraction) {
+        let length_m = diffraction.length_m();
+        self.diffractions.push((self.len(), diffraction));
+        self.push(Contribution {
+            length_m,
+            log_weight: -2.0 * length_m.ln(),
+            chain: Self::DIRECT,
+            tail: Self::DIRECT,
+            departure,
+            arrival,
+            batch: None,
+        });
+    }
+
     /// Appends the paths of another set between the same surfaces; weights stay as they are.
     ///
     /// # Panics
     /// If the sets have different numbers of materials.
     pub fn append(&mut self, other: &PathSet) {
         assert_eq!(self.materials, other.materials, "paths of different scenes");
+        let before = self.len();
+        self.diffractions.extend(other.diffractions.iter().map(|(i, d)| (before + i, d.clone())));
         let offset = self.parents.len() as u32 - 1;
         let shifted = |chain: u32| if chain == Self::DIRECT { chain } else { chain + offset };
         self.parents.extend(other.parents[1..].iter().map(|&p| shifted(p)));
@@ -147,6 +171,96 @@ impl PathSet {
         self.departures.extend_from_slice(&other.departures);
         self.arrivals.extend_from_slice(&other.arrivals);
         self.batches.extend_from_slice(&other.batches);
+    }
+
+    /// Appends the sampled paths of another set between the same surfaces as they would be had the source and the receiver moved
+    /// by these displacements (m): to first order, a path grows by what its ends move against the directions in which it
+    /// leaves and comes. None gets shorter than `least_length_m`, the distance of the new places. Each brings `share` of
+    /// its energy; exact paths stay behind, for they can be found anew.
+    ///
+    /// # Panics
+    /// If the sets have different numbers of materials.
+    pub fn append_displaced(
+        &mut self,
+        other: &PathSet,
+        [source_m, receiver_m]: [[f64; 3]; 2],
+        least_length_m: f64,
+        share: f64,
+    ) {
+        let mut sampled = other.clone();
+        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        for i in 0..sampled.len() {
+            let shorter_m = dot(source_m, other.departure(i)) + dot(receiver_m, other.arrival(i));
+            let length_m = f64::from(sampled.lengths_m[i]) - shorter_m;
+            sampled.lengths_m[i] = length_m.max(least_length_m) as f32;
+            sampled.log_weights[i] += share.ln() as f32;
+        }
+        sampled.retain(|batch| batch != EXACT);
+        self.append(&sampled);
+    }
+
+    /// Appends the exact paths of another set between the same surfaces.
+    ///
+    /// # Panics
+    /// If the sets have different numbers of materials.
+    pub fn append_exact(&mut self, other: &PathSet) {
+        let mut exact = other.clone();
+        exact.retain(|batch| batch == EXACT);
+        self.append(&exact);
+    }
+
+    /// Keeps the contributions of some batches, and the chains that they need.
+    fn retain(&mut self, keep: impl Fn(u8) -> bool) {
+        fn of<T>(column: &mut Vec<T>, kept: &[bool]) {
+            let mut marks = kept.iter();
+            column.retain(|_| marks.next() == Some(&true));
+        }
+        let kept: Vec<bool> = self.batches.iter().map(|&batch| keep(batch)).collect();
+        of(&mut self.lengths_m, &kept);
+        of(&mut self.log_weights, &kept);
+        of(&mut self.chains, &kept);
+        of(&mut self.tails, &kept);
+        of(&mut self.departures, &kept);
+        of(&mut self.arrivals, &kept);
+        of(&mut self.batches, &kept);
+        let mut place = 0;
+        let places: Vec<usize> =
+            kept.iter().map(|&kept| std::mem::replace(&mut place, place + usize::from(kept))).collect();
+        self.diffractions.retain_mut(|(contribution, _)| {
+            let stays = kept[*contribution];
+            *contribution = places[*contribution];
+            stays
+        });
+        self.prune_chains();
+    }
+
+    /// Drops the chains that no contribution passes through.
+    fn prune_chains(&mut self) {
+        let mut needed = vec![false; self.parents.len()];
+        needed[Self::DIRECT as usize] = true;
+        for &chain in self.chains.iter().chain(&self.tails) {
+            needed[chain as usize] = true;
+        }
+        for chain in (1..needed.len()).rev() {
+            if needed[chain] {
+                needed[self.parents[chain] as usize] = true;
+            }
+        }
+        let mut renamed = vec![Self::DIRECT; needed.len()];
+        let mut count = 0;
+        for chain in 0..needed.len() {
+            if needed[chain] {
+                renamed[chain] = count as u32;
+                self.parents[count] = renamed[self.parents[chain] as usize];
+                self.events[count] = self.events[chain];
+                count += 1;
+            }
+        }
+        self.parents.truncate(count);
+        self.events.truncate(count);
+        for chain in self.chains.iter_mut().chain(&mut self.tails) {
+            *chain = renamed[*chain as usize];
+        }
     }
 
     /// Number of contributions.
@@ -208,6 +322,16 @@ impl PathSet {
         Some((self.parents[chain as usize], u32::from(event >> 1), reflection))
     }
 
+    /// Whether a contribution met no surface and no edge.
+    ///
+    /// # Panics
+    /// If there is no such contribution.
+    pub fn is_direct(&self, contribution: usize) -> bool {
+        let met_nothing =
+            self.chains[contribution] == Self::DIRECT && self.tails[contribution] == Self::DIRECT;
+        met_nothing && self.diffractions.binary_search_by_key(&contribution, |(i, _)| *i).is_err()
+    }
+
     /// Whether a contribution was found exactly and renders as a coherent reflection.
     ///
     /// # Panics
@@ -238,6 +362,12 @@ impl PathSet {
     /// If there is no such contribution.
     pub fn arrival(&self, contribution: usize) -> [f64; 3] {
         unpack_direction(self.arrivals[contribution])
+    }
+
+    /// Contributions that bend around an edge, each with its diffraction, by rising index. Neither
+    /// [`PathSet::log_weights`] nor [`PathSet::log_reflectance`] contains their gain; [`PathSet::energies`] does.
+    pub fn diffractions(&self) -> &[(usize, EdgeDiffraction)] {
+        &self.diffractions
     }
 
     /// How often each chain hit each material: `counts[chain * materials + material]`.
@@ -278,14 +408,25 @@ impl PathSet {
         Ok(log_gain)
     }
 
-    /// Energy of each contribution in each band of the materials, `[band][contribution]`.
+    /// Energy of each contribution in each band of the materials, `[band][contribution]`, between an omnidirectional source and
+    /// an omnidirectional receiver.
     ///
     /// # Errors
     /// As [`PathSet::log_reflectance`].
     pub fn energies(&self, materials: &[Material], air: &Air) -> Result<Vec<Vec<f32>>, Error> {
+        self.energies_under(&Conditions::new(materials, air))
+    }
+
+    /// Energy of each contribution in each band of the materials, `[band][contribution]`.
+    ///
+    /// # Errors
+    /// As [`PathSet::log_reflectance`]; [`Error::BandMismatch`] for a directivity on other bands than the materials.
+    pub fn energies_under(&self, conditions: &Conditions) -> Result<Vec<Vec<f32>>, Error> {
+        let Conditions { materials, air, .. } = *conditions;
         let bands = self.check_materials(materials)?;
+        conditions.check_bands(bands)?;
         let exponents = air.energy_exponent_per_m(bands);
-        (0..bands.len())
+        let mut energies = (0..bands.len())
             .map(|band| {
                 let log_gain = self.log_reflectance(materials, band)?;
                 let exponent = exponents.values()[band] as f32;
@@ -296,10 +437,27 @@ impl PathSet {
                 let columns = self.lengths_m.iter().zip(&self.log_weights).zip(&self.chains).zip(&self.tails);
                 Ok(columns.map(energy).collect())
             })
-            .collect()
+            .collect::<Result<Vec<Vec<f32>>, Error>>()?;
+        for (ends, directed) in [(&self.departures, conditions.source), (&self.arrivals, conditions.receiver)]
+        {
+            if let Some((directivity, orientation)) = directed {
+                weigh_directions(&mut energies, ends, directivity, &orientation);
+            }
+        }
+        self.weigh_diffractions(&mut energies, bands, conditions.air.speed_of_sound_m_s());
+        Ok(energies)
     }
 
-    /// Energy in time bins, with Monte-Carlo standard errors from the scatter between batches of rays.
+    fn weigh_diffractions(&self, energies: &mut [Vec<f32>], bands: OctaveBands, speed_m_s: f64) {
+        for (contribution, diffraction) in &self.diffractions {
+            for (band, column) in energies.iter_mut().enumerate() {
+                column[*contribution] *= diffraction.octave_energy_gain(bands, band, speed_m_s) as f32;
+            }
+        }
+    }
+
+    /// Energy in time bins between an omnidirectional source and an omnidirectional receiver, with Monte-Carlo standard
+    /// errors from the scatter between batches of rays.
     ///
     /// # Errors
     /// As [`PathSet::log_reflectance`]; [`Error::OutOfRange`] for a bin width that is not positive.
@@ -309,14 +467,26 @@ impl PathSet {
         air: &Air,
         bin_s: f64,
     ) -> Result<EnergyResponse, Error> {
-        let bands = self.check_materials(materials)?;
+        self.energy_response_under(&Conditions::new(materials, air), bin_s)
+    }
+
+    /// Energy in time bins, with Monte-Carlo standard errors from the scatter between batches of rays.
+    ///
+    /// # Errors
+    /// As [`PathSet::energies_under`]; [`Error::OutOfRange`] for a bin width that is not positive.
+    pub fn energy_response_under(
+        &self,
+        conditions: &Conditions,
+        bin_s: f64,
+    ) -> Result<EnergyResponse, Error> {
+        let bands = self.check_materials(conditions.materials)?;
         crate::error::check_range("bin width (s)", bin_s, 1e-6, 10.0, "between 1 us and 10 s")?;
-        let speed = air.speed_of_sound_m_s();
+        let speed = conditions.air.speed_of_sound_m_s();
         let bins = (self.max_length_m / speed / bin_s).ceil() as usize;
         let batches = usize::from(Self::BATCHES);
         let mut energy = Vec::with_capacity(bins * bands.len());
         let mut standard_error = Vec::with_capacity(bins * bands.len());
-        for column in self.energies(materials, air)? {
+        for column in self.energies_under(conditions)? {
             let mut exact = vec![0.0f64; bins];
             let mut sampled = vec![0.0f64; bins * batches];
             for (i, &e) in column.iter().enumerate() {
@@ -349,6 +519,21 @@ impl PathSet {
         match materials.iter().find(|m| m.bands() != bands) {
             Some(other) => Err(Error::BandMismatch { left: bands, right: other.bands() }),
             None => Ok(bands),
+        }
+    }
+}
+
+/// Multiplies energies by the gains of a directivity in packed directions.
+fn weigh_directions(
+    energies: &mut [Vec<f32>],
+    directions: &[u32],
+    directivity: &Directivity,
+    orientation: &Orientation,
+) {
+    for (i, &packed) in directions.iter().enumerate() {
+        let place = directivity.place(orientation.to_local(unpack_direction(packed)));
+        for (band, column) in energies.iter_mut().enumerate() {
+            column[i] *= directivity.gain_at(place, band) as f32;
         }
     }
 }
@@ -459,6 +644,23 @@ mod tests {
         let counts = left.hit_counts();
         let of = |i: usize| &counts[left.chains()[i] as usize * 2..][..2];
         assert_eq!((of(0), of(1), of(2)), (&[1, 0][..], &[0, 2][..], &[0, 0][..]));
+    }
+
+    #[test]
+    fn displaced_paths_change_their_length_and_share() {
+        let mut frame = PathSet::new(1, 100.0);
+        let early = frame.reflect(PathSet::DIRECT, 0, Reflection::Specular);
+        let hit = frame.reflect(PathSet::DIRECT, 0, Reflection::Scattered);
+        frame.push(path(10.0, 0.0, early, None));
+        frame.push(path(20.0, 0.0, hit, Some(3)));
+        frame.push(path(4.0, 0.0, hit, Some(4)));
+        let mut now = PathSet::new(1, 100.0);
+        // All paths leave and come from above: the source rises by 1 m towards them, the receiver sinks by 0.25 m.
+        now.append_displaced(&frame, [[0.0, 0.0, 1.0], [0.3, 0.0, -0.25]], 3.5, 0.5);
+        assert_eq!((now.len(), now.batch(0), now.chains()[1]), (2, Some(3), 1));
+        assert_eq!(now.last_reflection(1), frame.last_reflection(hit));
+        assert!((now.lengths_m()[0] - 19.25).abs() < 1e-5 && now.lengths_m()[1] == 3.5);
+        assert!((now.log_weights()[0] - 0.5f32.ln()).abs() < 1e-6);
     }
 
     #[test]

@@ -141,7 +141,7 @@ impl MeshReport {
 }
 
 /// For each vertex the first one at the same place.
-fn weld(vertices: &[Vec3]) -> Vec<usize> {
+pub(crate) fn weld(vertices: &[Vec3]) -> Vec<usize> {
     let mut first_in: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
     let mut welded = Vec::with_capacity(vertices.len());
     for (i, &vertex) in vertices.iter().enumerate() {

@@ -1,41 +1,38 @@
 //! The path tracer.
 
 use crate::error::check_range;
-use crate::event_mixture::{EventMixture, EventProbabilities};
 use crate::image_sources::add_exact_paths;
 use crate::mesh_scene::MeshScene;
 use crate::placement::check_placement;
-use crate::random::{direction, generator};
-use crate::vector::{Vec3, dot, norm, scale, sub};
-use crate::walk::{ReceiverSphere, before_hit, next_hit, reflected, visible};
+use crate::tracing::Tracing;
 use crate::{Error, MeshReport};
-use rand::Rng;
 use rayon::prelude::*;
-use sabine_acoustics::{
-    Air, Contribution, Observer, PathSet, Propagator, Receiver, Reflection, Scene, Source, report,
-};
-use std::f64::consts::PI;
+use sabine_acoustics::{Air, Observer, PathSet, Propagator, Receiver, Scene, Source, report};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Rays that one task traces: fixed, so that the result does not depend on the number of threads.
-const CHUNK: usize = 256;
-/// Chunks between which their paths are gathered.
-const CHUNKS_AT_ONCE: usize = 64;
+/// Parts of the rays between which their paths are gathered.
+const PARTS_AT_ONCE: usize = 64;
 
 /// Settings of [`PathTracer`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct TracerConfig {
-    /// Number of rays, 1 to 100 million. The standard error falls with its square root.
+    /// Number of rays, 1 to 100 million, rounded up to as many for each batch ([`PathSet::BATCHES`]) and each set of scattering
+    /// coefficients. The standard error falls with its square root.
     pub rays: usize,
+    /// Half of the rays start at the receiver, and the halves are joined. Else all start at the source.
+    pub bidirectional: bool,
     /// Paths are followed for so long after emission, 1 ms to 60 s.
     pub duration_s: f64,
     /// Same seed, same paths, on any number of threads.
     pub seed: u64,
     /// Specular paths of up to so many reflections (0 to 10) are found exactly, by image sources.
     pub image_order: usize,
-    /// Radius of the sphere that counts rays whose last reflection is specular and beyond [`TracerConfig::image_order`],
+    /// Radius of the spheres about both ends that count rays whose last reflection is specular and beyond
+    /// [`TracerConfig::image_order`],
     /// 1 cm to 10 m; it shrinks to the distance of the nearest surface.
     pub receiver_radius_m: f64,
+    /// Adds the ways around one edge where the direct line is blocked, so that a screen casts a shadow and not a black hole.
+    pub diffraction: bool,
     /// Trace a mesh through whose holes more than one ray in a thousand escapes: what escapes is lost, as through an open
     /// window.
     pub allow_leaks: bool,
@@ -45,10 +42,12 @@ impl Default for TracerConfig {
     fn default() -> Self {
         Self {
             rays: 20_000,
+            bidirectional: true,
             duration_s: 1.5,
             seed: 0,
             image_order: 3,
             receiver_radius_m: 0.5,
+            diffraction: false,
             allow_leaks: false,
         }
     }
@@ -63,22 +62,26 @@ impl TracerConfig {
     }
 }
 
-/// Finds paths by rays from the source, each kind of path by the estimator that suits it and by no other:
+/// Finds paths by rays from the source and from the receiver (bidirectional path tracing: Veach 1997, chapter 10; for sound
+/// Cao et al. 2016, ACM Transactions on Graphics 35(6)). Each path counts once, whichever way it is found:
 ///
 /// | path | found by |
 /// |---|---|
 /// | direct | exactly |
 /// | specular reflections only, up to `image_order` | image sources: exactly |
-/// | specular reflections only, more than that | rays through a sphere about the receiver |
-/// | last reflection scattered | a connection from the scattering point to the receiver |
-/// | scattered earlier, last reflection specular | rays through the sphere |
+/// | specular reflections only, more than that | rays from either end through a sphere about the other |
+/// | with scattering | all that apply of: a line from the last scattering to the other end; a line between a ray from the source and one from the receiver; two such rays that meet on a patch of wall; where the last reflection is specular, the other end's sphere |
 ///
-/// At each surface a ray is reflected specularly **or** by Lambert's law, at random with the scattering coefficient. A ray
-/// draws for one octave; the balance heuristic makes its paths serve all octaves without bias. Rays end by length, never
-/// by energy, so that the paths hold for any absorption.
+/// The ways that apply to one path share it by the balance heuristic. At each surface a ray is reflected specularly **or**
+/// by Lambert's law, at random with the scattering coefficient. A ray draws for one set of scattering coefficients; the
+/// balance heuristic makes its paths serve all octaves without bias. Rays end by length, never by energy, so that the paths
+/// hold for any absorption.
 ///
-/// Long specular chains through facets that neither rays nor the exhaustive search (up to 20,000 sequences of planes)
-/// find are missing from the image sources; each carries less than about 1 / `rays` of the source's energy.
+/// With [`TracerConfig::bidirectional`] off, all rays start at the source and neither join nor meet.
+///
+/// Spheres and meetings blur: arrivals by the sphere's radius, or the patch's width, over the speed of sound. Long specular
+/// chains through facets that neither rays nor the exhaustive search (up to 20,000 sequences of planes) find are missing from
+/// the image sources; each carries less than about 1 / `rays` of the source's energy.
 #[derive(Clone, Debug)]
 pub struct PathTracer {
     config: TracerConfig,
@@ -108,7 +111,8 @@ impl PathTracer {
         observer: &dyn Observer,
     ) -> Result<PathSet, Error> {
         let mesh = MeshScene::new(scene)?;
-        let clearance_m = check_placement(&mesh, source, receiver)?;
+        let receiver_clearance_m = check_placement(&mesh, source, receiver)?;
+        let clearances_m = [mesh.nearest(source.position_m).1, receiver_clearance_m];
         let leaks = MeshReport::new(scene, &mesh, source.position_m)?;
         if !self.config.allow_leaks {
             leaks.check()?;
@@ -119,32 +123,23 @@ impl PathTracer {
         let (order, rays, seed) = (self.config.image_order, self.config.rays, self.config.seed);
         report(observer, "image sources", 0, 1)?;
         add_exact_paths(&mut paths, &mesh, from, to, order, rays.min(1 << 17), seed);
-        let tracing = Tracing {
-            mesh: &mesh,
-            probabilities: EventProbabilities::new(scene.materials().iter().map(|m| &m.material)),
-            sphere: ReceiverSphere { centre: to, radius_m: self.config.receiver_radius_m.min(clearance_m) },
-            source: from,
-            materials: scene.materials().len(),
-            max_length_m,
-            config: &self.config,
-        };
-        let total = rays as u64;
+        let tracing =
+            Tracing::new(&mesh, scene.materials(), &self.config, [from, to], clearances_m, max_length_m);
+        let total = tracing.rays() as u64;
         let done = AtomicU64::new(0);
         report(observer, "tracing", 0, total)?;
-        let chunks = rays.div_ceil(CHUNK);
-        for group in (0..chunks).step_by(CHUNKS_AT_ONCE) {
-            let parts: Vec<PathSet> = (group..chunks.min(group + CHUNKS_AT_ONCE))
+        let parts = tracing.parts();
+        for group in (0..parts).step_by(PARTS_AT_ONCE) {
+            let traced: Vec<PathSet> = (group..parts.min(group + PARTS_AT_ONCE))
                 .into_par_iter()
-                .map(|chunk| {
-                    let range = chunk * CHUNK..rays.min((chunk + 1) * CHUNK);
-                    let count = range.len() as u64;
-                    let part = tracing.chunk(range);
-                    let behind = done.fetch_add(count, Ordering::Relaxed) + count;
+                .map(|part| {
+                    let (traced, rays) = tracing.part(part);
+                    let behind = done.fetch_add(rays, Ordering::Relaxed) + rays;
                     report(observer, "tracing", behind, total)?;
-                    Ok(part)
+                    Ok(traced)
                 })
                 .collect::<Result<_, Error>>()?;
-            for part in parts {
+            for part in traced {
                 if paths.chain_count() + part.chain_count() > u32::MAX as usize {
                     return Err(Error::TooManyReflections { limit: u32::MAX as usize });
                 }
@@ -169,119 +164,5 @@ impl Propagator for PathTracer {
         observer: &dyn Observer,
     ) -> Result<PathSet, sabine_acoustics::Error> {
         Ok(self.run(scene, source, receiver, air, observer)?)
-    }
-}
-
-/// What all rays of one trace share.
-struct Tracing<'a> {
-    mesh: &'a MeshScene,
-    probabilities: EventProbabilities,
-    sphere: ReceiverSphere,
-    source: Vec3,
-    materials: usize,
-    max_length_m: f64,
-    config: &'a TracerConfig,
-}
-
-/// The reflections of one ray; they enter the path set when a contribution needs them.
-struct ChainOfRay {
-    events: Vec<(u32, Reflection)>,
-    stored: usize,
-    last: u32,
-}
-
-impl ChainOfRay {
-    fn store(&mut self, paths: &mut PathSet) -> u32 {
-        for &(material, reflection) in &self.events[self.stored..] {
-            self.last = paths.reflect(self.last, material, reflection);
-        }
-        self.stored = self.events.len();
-        self.last
-    }
-}
-
-impl Tracing<'_> {
-    fn chunk(&self, rays: std::ops::Range<usize>) -> PathSet {
-        let mut paths = PathSet::new(self.materials, self.max_length_m);
-        let mut chain = ChainOfRay { events: Vec::new(), stored: 0, last: PathSet::DIRECT };
-        for ray in rays {
-            chain.events.clear();
-            (chain.stored, chain.last) = (0, PathSet::DIRECT);
-            self.ray(ray, &mut chain, &mut paths);
-        }
-        paths
-    }
-
-    fn ray(&self, ray: usize, chain: &mut ChainOfRay, paths: &mut PathSet) {
-        let mut random = generator(self.config.seed, ray as u64);
-        let batch = Some((ray % usize::from(PathSet::BATCHES)) as u8);
-        let bands = self.probabilities.bands();
-        let hero = random.random_range(0..bands);
-        let mut mixture = EventMixture::new(bands);
-        // Each ray carries an equal share of the source's power, 4 pi in units in which the direct sound is 1 / d2.
-        let log_share = (4.0 * PI / self.config.rays as f64).ln();
-        let log_volume = self.sphere.volume_m3().ln();
-        let receiver = self.sphere.centre;
-        let mut heading = direction(&mut random);
-        let departure = heading;
-        let mut origin = self.source;
-        let mut travelled_m = 0.0;
-        let (mut ever_scattered, mut just_scattered) = (false, false);
-        loop {
-            let hit = next_hit(self.mesh, origin, &mut heading, &mut random);
-            let leg_m = hit.map_or(f64::INFINITY, |h| h.distance);
-            // Paths that image sources have found, and those that a connection has found, are not counted again.
-            let counts = !just_scattered && (ever_scattered || chain.events.len() > self.config.image_order);
-            if counts
-                && !chain.events.is_empty()
-                && let Some((middle_m, chord_m)) = self.sphere.chord(origin, heading, leg_m)
-                && travelled_m + middle_m <= self.max_length_m
-            {
-                let stored = chain.store(paths);
-                paths.push(Contribution {
-                    length_m: travelled_m + middle_m,
-                    log_weight: log_share + chord_m.ln() - log_volume - mixture.log_density(),
-                    chain: stored,
-                    tail: PathSet::DIRECT,
-                    departure,
-                    arrival: scale(heading, -1.0),
-                    batch,
-                });
-            }
-            let Some(hit) = hit else { return };
-            travelled_m += hit.distance;
-            if travelled_m >= self.max_length_m {
-                return;
-            }
-            let surface = &self.mesh.surfaces.triangles[hit.triangle as usize];
-            let scattering = self.probabilities.scattering(surface.material, hero);
-            just_scattered = random.random::<f64>() < scattering;
-            ever_scattered |= just_scattered;
-            let reflection = if just_scattered { Reflection::Scattered } else { Reflection::Specular };
-            mixture.apply(&self.probabilities, surface.material, just_scattered);
-            chain.events.push((surface.material, reflection));
-            origin = before_hit(origin, heading, hit.distance);
-            if just_scattered {
-                let line = sub(receiver, origin);
-                let distance_m = norm(line);
-                let cosine = dot(line, surface.normal_against(heading)) / distance_m;
-                let length_m = travelled_m + distance_m;
-                if cosine > 0.0 && length_m <= self.max_length_m && visible(self.mesh, origin, receiver) {
-                    // Lambert: cos / pi of the power per steradian, thinned by the square of the distance.
-                    let log_spread = (cosine / (PI * distance_m * distance_m)).ln();
-                    let stored = chain.store(paths);
-                    paths.push(Contribution {
-                        length_m,
-                        log_weight: log_share + log_spread - mixture.log_density(),
-                        chain: stored,
-                        tail: PathSet::DIRECT,
-                        departure,
-                        arrival: scale(line, -1.0 / distance_m),
-                        batch,
-                    });
-                }
-            }
-            heading = reflected(surface, heading, reflection, &mut random);
-        }
     }
 }

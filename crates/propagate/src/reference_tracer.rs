@@ -5,7 +5,7 @@ use crate::mesh_scene::MeshScene;
 use crate::placement::check_placement;
 use crate::random::{direction, generator};
 use crate::vector::{norm, scale, sub};
-use crate::walk::{ReceiverSphere, before_hit, next_hit, reflected, visible};
+use crate::walk::{Sphere, before_hit, next_hit, reflected, visible};
 use crate::{Error, TracerConfig};
 use rand::Rng;
 use sabine_acoustics::{
@@ -47,10 +47,8 @@ impl Propagator for ReferenceTracer {
         let room = BruteForceScene::new(scene)?;
         let max_length_m = self.config.duration_s * air.speed_of_sound_m_s();
         let mut paths = PathSet::new(scene.materials().len(), max_length_m);
-        let sphere = ReceiverSphere {
-            centre: receiver.position_m,
-            radius_m: self.config.receiver_radius_m.min(clearance_m),
-        };
+        let sphere =
+            Sphere { centre: receiver.position_m, radius_m: self.config.receiver_radius_m.min(clearance_m) };
         let mean_scattering: Vec<f64> = scene
             .materials()
             .iter()

@@ -65,15 +65,15 @@ pub(crate) fn visible(scene: &impl RayScene, from: Vec3, to: Vec3) -> bool {
     scene.closest_hit(from, direction, distance - STEP_BACK_M).is_none()
 }
 
-/// A sphere about the receiver that counts the rays passing through: the mean energy density inside is the sum of energy
-/// times chord over volume.
+/// A sphere about one end of the paths that counts the rays from the other end: the mean energy density inside is the sum of
+/// energy times chord over volume.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ReceiverSphere {
+pub(crate) struct Sphere {
     pub centre: Vec3,
     pub radius_m: f64,
 }
 
-impl ReceiverSphere {
+impl Sphere {
     /// Distance along the ray to the middle of its chord, and the length of the chord, if the sphere lies on the leg.
     /// The legs of rays begin and end on surfaces, and no surface cuts the sphere.
     pub fn chord(&self, origin: Vec3, direction: Vec3, leg_m: f64) -> Option<(f64, f64)> {

@@ -121,13 +121,13 @@ fn a_screen_blocks_the_direct_sound_and_nothing_else() {
     let trace = |scene: &Scene| {
         quick(false).trace(scene, &source(HERE), &receiver(THERE), &Air::default(), &()).unwrap()
     };
-    let is_direct = |paths: &PathSet| (0..paths.len()).any(|i| paths.chains()[i] == PathSet::DIRECT);
+    let is_direct = |paths: &PathSet| (0..paths.len()).any(|i| paths.is_direct(i));
     let (open, screened) = (trace(&open), trace(&screened));
     assert!(is_direct(&open));
     assert!(!is_direct(&screened));
     assert!((0..screened.len()).any(|i| screened.is_exact(i)));
     // The direct sound, exactly.
-    let direct = (0..open.len()).find(|&i| open.chains()[i] == PathSet::DIRECT).unwrap();
+    let direct = (0..open.len()).find(|&i| open.is_direct(i)).unwrap();
     let distance_m = 20f64.sqrt();
     assert!((f64::from(open.lengths_m()[direct]) - distance_m).abs() < 1e-6);
     assert!((f64::from(open.log_weights()[direct]) + 2.0 * distance_m.ln()).abs() < 1e-6);

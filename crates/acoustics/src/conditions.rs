@@ -1,0 +1,56 @@
+//! What may change without tracing again.
+
+use crate::{Air, Directivity, Error, Material, OctaveBands, Orientation};
+
+/// All that paths leave open: surfaces, air, and how source and receiver are turned and what they favour.
+///
+/// ```
+/// use sabine_acoustics::{Air, Conditions, Directivity, Material, OctaveBands, Orientation};
+/// let walls = [Material::uniform(OctaveBands::T60, 0.1, 0.2)?];
+/// let (air, voice) = (Air::default(), Directivity::first_order(Directivity::SUBCARDIOID)?);
+/// let facing = Orientation::towards([0.0, 1.0, 0.0])?;
+/// let conditions = Conditions::new(&walls, &air).with_source(&voice, facing);
+/// assert!(conditions.receiver.is_none()); // hears all directions alike
+/// # Ok::<(), sabine_acoustics::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct Conditions<'a> {
+    /// A material for each that the paths know, in the same order.
+    pub materials: &'a [Material],
+    /// The air: attenuation and speed of sound.
+    pub air: &'a Air,
+    /// How the source radiates and where it faces; `None` is omnidirectional.
+    pub source: Option<(&'a Directivity, Orientation)>,
+    /// How the receiver hears and where it faces; `None` is omnidirectional.
+    pub receiver: Option<(&'a Directivity, Orientation)>,
+}
+
+impl<'a> Conditions<'a> {
+    /// Omnidirectional source and receiver between these surfaces.
+    pub fn new(materials: &'a [Material], air: &'a Air) -> Self {
+        Self { materials, air, source: None, receiver: None }
+    }
+
+    /// The same with a directional source. Energies are then relative to the direct sound on its axis at 1 m.
+    #[must_use]
+    pub fn with_source(self, directivity: &'a Directivity, orientation: Orientation) -> Self {
+        Self { source: Some((directivity, orientation)), ..self }
+    }
+
+    /// The same with a directional receiver, of gain 1 on its axis.
+    #[must_use]
+    pub fn with_receiver(self, directivity: &'a Directivity, orientation: Orientation) -> Self {
+        Self { receiver: Some((directivity, orientation)), ..self }
+    }
+
+    /// That directivities, if they have bands, have those of the materials.
+    pub(crate) fn check_bands(&self, bands: OctaveBands) -> Result<(), Error> {
+        for (directivity, _) in [self.source, self.receiver].into_iter().flatten() {
+            if let Some(own) = directivity.bands().filter(|&own| own != bands) {
+                return Err(Error::BandMismatch { left: bands, right: own });
+            }
+        }
+        Ok(())
+    }
+}
