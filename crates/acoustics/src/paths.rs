@@ -224,8 +224,14 @@ impl PathSet {
         of(&mut self.arrivals, &kept);
         of(&mut self.batches, &kept);
         let mut place = 0;
-        let places: Vec<usize> =
-            kept.iter().map(|&kept| std::mem::replace(&mut place, place + usize::from(kept))).collect();
+        let places: Vec<usize> = kept
+            .iter()
+            .map(|&kept| {
+                let at = place;
+                place += usize::from(kept);
+                at
+            })
+            .collect();
         self.diffractions.retain_mut(|(contribution, _)| {
             let stays = kept[*contribution];
             *contribution = places[*contribution];
