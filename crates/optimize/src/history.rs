@@ -21,6 +21,7 @@ pub(crate) struct History {
     pub batches: Vec<u8>,
     /// Where in the path set each path stands.
     order: Vec<u32>,
+    speed_m_s: f64,
 }
 
 impl History {
@@ -65,6 +66,7 @@ impl History {
             starts,
             counts,
             order,
+            speed_m_s,
         }
     }
 
@@ -97,7 +99,14 @@ impl History {
             let surfaces = scattering[paths.chains()[i] as usize] + scattering[paths.tails()[i] as usize];
             (log_share + paths.log_weights()[i] + surfaces - exponent * paths.lengths_m()[i]).exp()
         };
-        Ok(self.order.iter().map(weight).collect())
+        let mut weights: Vec<f32> = self.order.iter().map(weight).collect();
+        // Few, if any: the ways around edges.
+        for (contribution, diffraction) in paths.diffractions() {
+            let gain = diffraction.octave_energy_gain(materials[0].bands(), band, self.speed_m_s) as f32;
+            let places = self.order.iter().zip(&mut weights).filter(|(i, _)| **i as usize == *contribution);
+            places.for_each(|(_, w)| *w *= gain);
+        }
+        Ok(weights)
     }
 
     /// Energy of each bin at an absorption of each material, and, where `moments` is not empty, the sum over paths of energy
