@@ -223,14 +223,9 @@ impl PathSet {
         of(&mut self.departures, &kept);
         of(&mut self.arrivals, &kept);
         of(&mut self.batches, &kept);
-        let mut place = 0;
         let places: Vec<usize> = kept
             .iter()
-            .map(|&kept| {
-                let at = place;
-                place += usize::from(kept);
-                at
-            })
+            .scan(0, |next, &kept| Some(std::mem::replace(next, *next + usize::from(kept))))
             .collect();
         self.diffractions.retain_mut(|(contribution, _)| {
             let stays = kept[*contribution];

@@ -26,13 +26,12 @@ impl BruteForceScene {
 impl RayScene for BruteForceScene {
     fn closest_hit(&self, origin: [f64; 3], direction: [f64; 3], max_distance: f64) -> Option<RayHit> {
         let mut nearest: Option<RayHit> = None;
-        for (i, surface) in self.surfaces.triangles.iter().enumerate() {
-            let limit = nearest.map_or(max_distance, |hit| hit.distance);
-            match surface.intersect(origin, direction) {
-                Some(distance) if distance <= limit => {
-                    nearest = Some(RayHit { distance, triangle: i as u32 });
-                }
-                _ => {}
+        for (surface, triangle) in self.surfaces.triangles.iter().zip(0..) {
+            if let Some(distance) = surface.intersect(origin, direction)
+                && distance <= max_distance
+                && nearest.is_none_or(|hit| distance < hit.distance)
+            {
+                nearest = Some(RayHit { distance, triangle });
             }
         }
         nearest

@@ -2,8 +2,8 @@
 //!
 //! Where it sits: [`PathTracer`] turns a [`Scene`](sabine_acoustics::Scene), a source and a receiver into a
 //! [`PathSet`](sabine_acoustics::PathSet), in which absorption, air and speed of sound are still free. `sabine-optimize`
-//! fits materials to such paths; [`PressureRenderer`] turns them into a pressure response to convolve sound with. parry
-//! stays inside this crate: plain arrays go in and out.
+//! fits materials to such paths; [`PressureRenderer`] turns them into a pressure response to convolve sound with. Plain
+//! arrays go in and out.
 //!
 //! What it does **not** do: no diffraction but over a single edge into its shadow ([`DiffractingEdges`]), no room modes
 //! (below about 2000 sqrt(T60 / V) Hz a room is a wave field, not rays: Schroeder 1962), no transmission through walls, no
@@ -82,6 +82,8 @@ mod edge_wedges;
 mod energy_envelope;
 mod error;
 mod event_mixture;
+mod hierarchy;
+mod hierarchy_builder;
 mod image_sources;
 mod joining;
 mod mesh_report;
@@ -100,8 +102,10 @@ mod spherical_harmonics;
 mod surfaces;
 mod techniques;
 mod tracing;
+mod triangle_pack;
 mod vector;
 mod walk;
+mod wide_node;
 
 pub use ambisonic_renderer::AmbisonicRenderer;
 pub use ambisonic_response::AmbisonicResponse;

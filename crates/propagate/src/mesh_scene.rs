@@ -1,18 +1,18 @@
 //! A triangle mesh behind a bounding volume hierarchy.
 
 use crate::Error;
-use crate::surfaces::{Surface, Surfaces, distance_to};
-use crate::vector::{Vec3, norm, sub};
-use parry3d::bounding_volume::Aabb;
-use parry3d::math::Vector;
-use parry3d::partitioning::{Bvh, BvhBuildStrategy};
-use parry3d::query::Ray;
+use crate::hierarchy::Hierarchy;
+use crate::surfaces::{Surfaces, distance_to};
+use crate::vector::{Vec3, along, norm, sub};
+use crate::wide_node::LocalRay;
 use sabine_acoustics::{RayHit, RayScene, Scene};
+use std::ops::ControlFlow;
 
-/// The mesh of a [`Scene`], ready for rays: parry's bounding volume hierarchy chooses the candidates in single precision,
-/// this crate's own test decides in double precision.
+/// The mesh of a [`Scene`], ready for rays: a bounding volume hierarchy chooses the candidates in single precision, a test
+/// in double precision decides.
 ///
-/// Neighbouring triangles overlap by 1e-8 of their sides, so that no ray slips through an edge by rounding.
+/// It answers as [`BruteForceScene`](crate::BruteForceScene) does, to the bit. Neighbouring triangles overlap by 1e-8 of
+/// their sides, so that no ray slips through an edge by rounding.
 ///
 /// ```
 /// use sabine_acoustics::{Material, OctaveBands, RayScene, Scene};
@@ -27,10 +27,10 @@ use sabine_acoustics::{RayHit, RayScene, Scene};
 /// ```
 pub struct MeshScene {
     pub(crate) surfaces: Surfaces,
-    hierarchy: Bvh,
-    /// Triangle of each leaf: degenerate triangles have none.
-    leaves: Vec<u32>,
-    /// Subtracted before rounding to single precision, so that a room far from the origin loses nothing.
+    hierarchy: Hierarchy,
+    /// Triangles without area: nothing hits them, but a point can be near them.
+    degenerate: Vec<u32>,
+    /// Origin of coordinates in the hierarchy: a room far from the scene's origin loses nothing in single precision.
     centre_m: Vec3,
 }
 
@@ -41,53 +41,125 @@ impl MeshScene {
     /// [`Error::NoSurface`] if all triangles have zero area.
     pub fn new(scene: &Scene) -> Result<Self, Error> {
         let surfaces = Surfaces::new(scene)?;
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for corner in surfaces.triangles.iter().flat_map(Surface::corners) {
-            for axis in 0..3 {
-                low[axis] = low[axis].min(corner[axis]);
-                high[axis] = high[axis].max(corner[axis]);
-            }
-        }
-        let centre_m: Vec3 = std::array::from_fn(|i| 0.5 * (low[i] + high[i]));
-        // More than what the single-precision box test can be wrong by.
-        let margin = 1e-5 * norm(sub(high, low));
-        let leaves: Vec<u32> = (0..surfaces.triangles.len() as u32)
-            .filter(|&i| !surfaces.triangles[i as usize].is_degenerate())
-            .collect();
-        let boxes: Vec<Aabb> = leaves
-            .iter()
-            .map(|&i| {
-                let corners = surfaces.triangles[i as usize].corners();
-                let bound = |axis: usize, pick: fn(f64, f64) -> f64| {
-                    corners.iter().map(|c| c[axis] - centre_m[axis]).reduce(pick).unwrap_or(0.0)
-                };
-                let least: Vec3 = std::array::from_fn(|axis| bound(axis, f64::min) - margin);
-                let most: Vec3 = std::array::from_fn(|axis| bound(axis, f64::max) + margin);
-                Aabb::new(single(least), single(most))
+        let (degenerate, solid): (Vec<u32>, Vec<u32>) = (0..surfaces.triangles.len() as u32)
+            .partition(|&i| surfaces.triangles[i as usize].is_degenerate());
+        let centre_m = surfaces.centre_m;
+        let triangles: Vec<(u32, [Vec3; 3])> = solid
+            .into_iter()
+            .map(|i| {
+                let surface = &surfaces.triangles[i as usize];
+                (i, [sub(surface.corner, centre_m), surface.edge1, surface.edge2])
             })
             .collect();
-        let hierarchy = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
-        Ok(Self { surfaces, hierarchy, leaves, centre_m })
+        let hierarchy = Hierarchy::new(&triangles, surfaces.size_m);
+        Ok(Self { surfaces, hierarchy, degenerate, centre_m })
     }
 
     /// The triangle nearest to a point, and its distance in metres.
     pub(crate) fn nearest(&self, point: Vec3) -> (usize, f64) {
-        let distances = self.surfaces.triangles.iter().map(|s| distance_to(s, point)).enumerate();
-        distances.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::INFINITY))
+        let distance = |i: u32| distance_to(&self.surfaces.triangles[i as usize], point);
+        let flat = self.degenerate.iter().map(|&i| (i, distance(i)));
+        let flat = flat.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((u32::MAX, f64::INFINITY));
+        let (triangle, distance_m) =
+            self.hierarchy.nearest(single(sub(point, self.centre_m)), flat, distance);
+        (triangle as usize, distance_m)
+    }
+
+    /// The ray as the hierarchy sees it, and the distance along it at which that one begins: an origin far outside is
+    /// moved up to the mesh, so that single precision suffices.
+    #[inline]
+    fn local(&self, origin: Vec3, direction: Vec3) -> (LocalRay, f64) {
+        let from_centre = sub(origin, self.centre_m);
+        let away = norm(from_centre);
+        let size_m = self.surfaces.size_m;
+        let skipped = if away > 2.0 * size_m { away - size_m } else { 0.0 };
+        (LocalRay::new(single(along(from_centre, direction, skipped)), single(direction)), skipped)
+    }
+
+    /// Calls `test` with the candidates up to `max_distance`, and goes on up to the distance that it returns.
+    #[inline]
+    fn candidates(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        max_distance: f64,
+        mut test: impl FnMut(u32) -> ControlFlow<(), f64>,
+    ) {
+        let (ray, skipped) = self.local(origin, direction);
+        // No surface is further from the start of the local ray than three sizes of the mesh.
+        let furthest = 4.0 * self.surfaces.size_m;
+        let limit = |distance: f64| (distance - skipped).min(furthest) as f32;
+        self.hierarchy.visit(&ray, limit(max_distance), |i| test(i).map_continue(limit));
     }
 }
 
 impl RayScene for MeshScene {
     fn closest_hit(&self, origin: Vec3, direction: Vec3, max_distance: f64) -> Option<RayHit> {
-        let ray = Ray::new(single(sub(origin, self.centre_m)), single(direction));
-        let surface = |leaf: u32| &self.surfaces.triangles[self.leaves[leaf as usize] as usize];
-        let test = |leaf: u32, _| surface(leaf).intersect(origin, direction).map(|t| t as f32);
-        let (leaf, _) = self.hierarchy.cast_ray(&ray, max_distance as f32, test)?;
-        let distance = surface(leaf).intersect(origin, direction).filter(|&t| t <= max_distance)?;
-        Some(RayHit { distance, triangle: self.leaves[leaf as usize] })
+        let mut nearest: Option<RayHit> = None;
+        let mut limit = max_distance;
+        self.candidates(origin, direction, max_distance, |triangle| {
+            if let Some(distance) = self.surfaces.triangles[triangle as usize].intersect(origin, direction)
+                && distance <= limit
+                && nearest.is_none_or(|hit| distance < hit.distance || triangle < hit.triangle)
+            {
+                nearest = Some(RayHit { distance, triangle });
+                limit = distance;
+            }
+            ControlFlow::Continue(limit)
+        });
+        nearest
+    }
+
+    fn any_hit(&self, origin: Vec3, direction: Vec3, max_distance: f64) -> bool {
+        let mut hit = false;
+        self.candidates(origin, direction, max_distance, |triangle| {
+            let surface = &self.surfaces.triangles[triangle as usize];
+            hit = surface.intersect(origin, direction).is_some_and(|distance| distance <= max_distance);
+            if hit { ControlFlow::Break(()) } else { ControlFlow::Continue(max_distance) }
+        });
+        hit
     }
 }
 
-fn single(v: Vec3) -> Vector {
-    Vector::new(v[0] as f32, v[1] as f32, v[2] as f32)
+fn single(v: Vec3) -> [f32; 3] {
+    v.map(|c| c as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{direction, generator};
+    use rand::Rng;
+    use sabine_acoustics::{Material, NamedMaterial, OctaveBands, Triangle};
+
+    #[test]
+    fn the_nearest_triangle_is_that_of_a_plain_search() {
+        let mut random = generator(11, 0);
+        let mut point =
+            |half: f64| crate::vector::scale(direction(&mut random), half * random.random::<f64>());
+        let mut vertices = Vec::new();
+        for i in 0..400 {
+            let at = point(5.0);
+            // Every tenth has no area.
+            let corners = if i % 10 == 0 {
+                [at; 3]
+            } else {
+                [at, along(at, point(1.0), 1.0), along(at, point(1.0), 1.0)]
+            };
+            vertices.extend(corners);
+        }
+        let triangles = (0..400).map(|i| Triangle { vertices: [3 * i, 3 * i + 1, 3 * i + 2], material: 0 });
+        let material = Material::uniform(OctaveBands::T60, 0.1, 0.1).unwrap();
+        let materials = vec![NamedMaterial { name: "any".into(), material }];
+        let mesh = MeshScene::new(&Scene::new(vertices, triangles.collect(), materials).unwrap()).unwrap();
+        let mut flat = 0;
+        for _ in 0..2_000 {
+            let from = point(10.0);
+            let all = mesh.surfaces.triangles.iter().map(|s| distance_to(s, from)).enumerate();
+            let expected = all.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+            assert_eq!(mesh.nearest(from), expected);
+            flat += usize::from(expected.0 % 10 == 0);
+        }
+        assert!(flat > 20, "{flat}");
+    }
 }

@@ -9,13 +9,18 @@ use std::collections::HashMap;
 const LEAST_AREA_M2: f64 = 1e-12;
 /// Overlap of neighbouring triangles, as a share of their sides: closes the gap that rounding opens along shared edges.
 const OVERLAP: f64 = 1e-8;
+/// The two ways to compute where a ray meets a triangle, along the ray and across the triangle, agree to this share of the
+/// size of the scene. They always do, but for rays so nearly in the plane of a sliver that the distance is noise; a point
+/// far from its triangle would be found or not, depending on who looks for it.
+const AGREEMENT: f64 = 1e-6;
 /// Triangles within this distance of a common plane mirror as one (m) ...
 const COPLANAR_M: f64 = 1e-4;
 /// ... if their normals agree to this angle (rad).
 const COPLANAR_RAD: f64 = 2e-3;
 
-/// One triangle, two-sided.
+/// One triangle, two-sided: two cache lines, which is what a ray that meets it waits for.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub(crate) struct Surface {
     pub corner: Vec3,
     pub edge1: Vec3,
@@ -26,6 +31,8 @@ pub(crate) struct Surface {
     pub material: u32,
     /// Index of the plane that it shares with its coplanar neighbours.
     pub plane: u32,
+    /// [`AGREEMENT`] in metres.
+    pub agreement_m: f64,
 }
 
 impl Surface {
@@ -38,7 +45,7 @@ impl Surface {
         let p = cross(direction, self.edge2);
         let determinant = dot(self.edge1, p);
         // Twice the area times the cosine of incidence: rays in the plane miss.
-        if determinant.abs() <= 2e-12 * self.area_m2 {
+        if determinant.abs() <= 2e-12 * self.area_m2 || self.is_degenerate() {
             return None;
         }
         let inverse = 1.0 / determinant;
@@ -53,7 +60,11 @@ impl Surface {
             return None;
         }
         let distance = dot(self.edge2, q) * inverse;
-        (distance > 0.0).then_some(distance)
+        let agrees = |axis: usize| {
+            let apart = s[axis] + distance * direction[axis] - u * self.edge1[axis] - v * self.edge2[axis];
+            apart.abs() <= self.agreement_m
+        };
+        (distance > 0.0 && agrees(0) && agrees(1) && agrees(2)).then_some(distance)
     }
 
     pub fn corners(&self) -> [Vec3; 3] {
@@ -85,6 +96,10 @@ impl Plane {
 pub(crate) struct Surfaces {
     pub triangles: Vec<Surface>,
     pub planes: Vec<Plane>,
+    /// Middle of the box around all triangles that have an area.
+    pub centre_m: Vec3,
+    /// Diagonal of that box.
+    pub size_m: f64,
 }
 
 impl Surfaces {
@@ -98,14 +113,24 @@ impl Surfaces {
                 let area_m2 = 0.5 * length;
                 let normal = if area_m2 < LEAST_AREA_M2 { [0.0; 3] } else { scale(normal, 1.0 / length) };
                 let material = scene.triangles()[i].material;
-                Surface { corner: a, edge1, edge2, normal, area_m2, material, plane: 0 }
+                Surface { corner: a, edge1, edge2, normal, area_m2, material, plane: 0, agreement_m: 0.0 }
             })
             .collect();
         if triangles.iter().all(Surface::is_degenerate) {
             return Err(Error::NoSurface { triangles: triangles.len() });
         }
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for corner in triangles.iter().filter(|s| !s.is_degenerate()).flat_map(Surface::corners) {
+            low = std::array::from_fn(|axis| low[axis].min(corner[axis]));
+            high = std::array::from_fn(|axis| high[axis].max(corner[axis]));
+        }
+        let size_m = norm(sub(high, low));
+        for triangle in &mut triangles {
+            triangle.agreement_m = AGREEMENT * size_m;
+        }
         let planes = merge_coplanar(&mut triangles);
-        Ok(Self { triangles, planes })
+        let centre_m = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
+        Ok(Self { triangles, planes, centre_m, size_m })
     }
 }
 

@@ -1,0 +1,118 @@
+//! What `docs/validation/peers/propagate_peers.py` compares: one run on one thread, printed as JSON lines; the scenes and
+//! rays that another engine is to repeat are written to the folder given as the last argument.
+#![allow(clippy::unwrap_used, missing_docs)] // a panic is how a bench fails
+
+mod rooms;
+
+use parry3d::math::Vector;
+use parry3d::query::{Ray, RayCast};
+use parry3d::shape::TriMesh;
+use rooms::{finely_meshed, furnished, rays};
+use sabine_acoustics::*;
+use sabine_propagate::*;
+use std::hint::black_box;
+use std::path::Path;
+use std::time::Instant;
+
+/// Seconds that `work` takes: the median of five, after one to warm up.
+fn median_s<T>(mut work: impl FnMut() -> T) -> f64 {
+    let mut seconds: Vec<f64> = (0..6)
+        .map(|_| {
+            let start = Instant::now();
+            black_box(work());
+            start.elapsed().as_secs_f64()
+        })
+        .skip(1)
+        .collect();
+    seconds.sort_by(f64::total_cmp);
+    seconds[2]
+}
+
+fn write<const N: usize>(folder: &Path, name: &str, numbers: impl IntoIterator<Item = [u8; N]>) {
+    let bytes: Vec<u8> = numbers.into_iter().flatten().collect();
+    std::fs::write(folder.join(name), bytes).unwrap();
+}
+
+fn hits(folder: &Path) {
+    let rays = rays(262_144);
+    let single = |v: &[f64; 3]| Vector::new(v[0] as f32, v[1] as f32, v[2] as f32);
+    let rounded: Vec<Ray> = rays.iter().map(|(o, d)| Ray::new(single(o), single(d))).collect();
+    write(
+        folder,
+        "rays.f32",
+        rays.iter().flat_map(|(o, d)| o.iter().chain(d)).map(|&c| (c as f32).to_le_bytes()),
+    );
+    let scenes = [1, 29, 91].map(|cells| ("box", finely_meshed(cells, 0.1, 0.1)));
+    for (name, scene) in scenes.into_iter().chain([("furnished", furnished(0.1, 0.1))]) {
+        let triangles = scene.triangles().len();
+        let name = format!("{name}_{triangles}");
+        let vertices = scene.vertices().as_flattened().iter().map(|&c| (c as f32).to_le_bytes());
+        write(folder, &format!("{name}.vertices.f32"), vertices);
+        let indices = scene.triangles().iter().flat_map(|t| t.vertices).map(u32::to_le_bytes);
+        write(folder, &format!("{name}.triangles.u32"), indices);
+
+        let mesh = MeshScene::new(&scene).unwrap();
+        let ours = median_s(|| {
+            rays.iter()
+                .filter_map(|(o, d)| mesh.closest_hit(*o, *d, f64::INFINITY))
+                .map(|h| h.distance)
+                .sum::<f64>()
+        });
+        let sum: f64 = rays
+            .iter()
+            .filter_map(|(o, d)| mesh.closest_hit(*o, *d, f64::INFINITY))
+            .map(|h| h.distance)
+            .sum();
+        let vertices = scene.vertices().iter().map(single).collect();
+        let peer = TriMesh::new(vertices, scene.triangles().iter().map(|t| t.vertices).collect()).unwrap();
+        let theirs = median_s(|| {
+            let found =
+                rounded.iter().filter_map(|ray| peer.cast_local_ray_and_get_normal(ray, f32::MAX, false));
+            found.map(|hit| hit.time_of_impact).sum::<f32>()
+        });
+        let per_second = |seconds: f64| rays.len() as f64 / seconds;
+        println!(
+            "{{\"what\": \"hits\", \"scene\": \"{name}\", \"sabine\": {:.0}, \"parry3d\": {:.0}, \"mean_m\": {:.6}}}",
+            per_second(ours),
+            per_second(theirs),
+            sum / rays.len() as f64
+        );
+    }
+}
+
+fn paths() {
+    let (source, receiver) =
+        (Source::omni("S", [2.0, 3.0, 1.5]).unwrap(), Receiver::omni("R", [7.0, 4.0, 1.6]).unwrap());
+    let rays = 10_000;
+    for (cells, scattering) in [1, 29, 64].into_iter().flat_map(|cells| [(cells, 0.0), (cells, 0.3)]) {
+        let scene = finely_meshed(cells, 0.1, scattering);
+        // What a trace costs before its rays: the hierarchy, the report on the mesh, placement, image sources.
+        let few = PathTracer::new(TracerConfig { rays: 32, duration_s: 1.5, ..Default::default() }).unwrap();
+        let before_s =
+            median_s(|| few.trace(&scene, &source, &receiver, &Air::default(), &()).unwrap().len());
+        for threads in [1, 2] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let tracer =
+                PathTracer::new(TracerConfig { rays, duration_s: 1.5, ..Default::default() }).unwrap();
+            let trace = || tracer.trace(&scene, &source, &receiver, &Air::default(), &()).unwrap().len();
+            let seconds = pool.install(|| median_s(trace));
+            println!(
+                "{{\"what\": \"paths\", \"triangles\": {}, \"scattering\": {scattering}, \"threads\": {threads}, \
+                 \"before_s\": {before_s:.4}, \
+                 \"rays_per_s\": {:.0}, \"seconds\": {seconds:.4}}}",
+                scene.triangles().len(),
+                rays as f64 / seconds
+            );
+        }
+    }
+}
+
+fn main() {
+    let Some(folder) = std::env::args().skip(1).find(|argument| !argument.starts_with('-')) else {
+        eprintln!("pass a folder to write scenes and rays to");
+        return;
+    };
+    std::fs::create_dir_all(&folder).unwrap();
+    hits(Path::new(&folder));
+    paths();
+}

@@ -1,0 +1,48 @@
+//! New absorption for paths that are there already. `cargo bench -p sabine-propagate --bench reweighting`
+#![allow(clippy::unwrap_used, missing_docs)] // a panic is how a bench fails; criterion's macros write no docs
+
+mod rooms;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use rooms::finely_meshed;
+use sabine_acoustics::*;
+use sabine_propagate::*;
+
+/// Paths of the box until there are a million contributions, and what its walls are changed to.
+fn a_million() -> (PathSet, Vec<Material>) {
+    let scene = finely_meshed(1, 0.1, 0.3);
+    let (source, receiver) =
+        (Source::omni("S", [2.0, 3.0, 1.5]).unwrap(), Receiver::omni("R", [7.0, 4.0, 1.6]).unwrap());
+    let trace = |rays: usize| {
+        let config = TracerConfig { rays, duration_s: 1.5, ..Default::default() };
+        PathTracer::new(config).unwrap().trace(&scene, &source, &receiver, &Air::default(), &()).unwrap()
+    };
+    let per_ray = trace(1_000).len() as f64 / 1_000.0;
+    let paths = trace((1e6 / per_ray).round() as usize);
+    let softer = (0..6).map(|i| {
+        let absorption = 0.05 + 0.05 * f64::from(i);
+        Material::uniform(OctaveBands::SIMULATION, absorption, 0.2).unwrap()
+    });
+    (paths, softer.collect())
+}
+
+fn reweighting(criterion: &mut Criterion) {
+    let (paths, materials) = a_million();
+    println!("{} contributions, {} chains", paths.len(), paths.chain_count());
+    let air = Air::default();
+    let mut group = criterion.benchmark_group("reweight");
+    group.sample_size(20).throughput(Throughput::Elements(paths.len() as u64));
+    group.bench_function("reflectance of all chains, one band", |bencher| {
+        bencher.iter(|| paths.log_reflectance(&materials, 3).unwrap());
+    });
+    group.bench_function("energies, eight bands", |bencher| {
+        bencher.iter(|| paths.energies(&materials, &air).unwrap());
+    });
+    group.bench_function("energy response in 1 ms, eight bands", |bencher| {
+        bencher.iter(|| paths.energy_response(&materials, &air, 1e-3).unwrap());
+    });
+    group.finish();
+}
+
+criterion_group!(benches, reweighting);
+criterion_main!(benches);
