@@ -10,8 +10,8 @@ const DIRECT_S: f64 = 0.005;
 /// The filter rings for about this long, in units of one over the bandwidth: the decay starts so much later, and no time
 /// bin is narrower.
 const RINGING: f64 = 1.5;
-/// Most time bins.
-const BINS: f64 = 48.0;
+/// Width of a bin as a share of the time since the decay began: early reflections are told apart, the tail is summed.
+const GROWTH: f64 = 0.08;
 /// Fewest time bins that a decay is read from.
 const LEAST_BINS: usize = 6;
 /// Noise may not exceed this share of what a bin holds.
@@ -32,7 +32,7 @@ pub struct MeasuredDecay {
 pub(crate) struct BinnedDecay {
     /// Edges of the bins in seconds from the first sample, one more than bins.
     pub edges_s: Vec<f64>,
-    /// Energy of each bin less the noise.
+    /// Energy of each bin less the noise; a unit impulse has energy 1.
     pub energy: Vec<f64>,
     /// Shape of its Gamma distribution: (mean / standard deviation)2.
     pub shape: Vec<f64>,
@@ -49,11 +49,25 @@ impl MeasuredDecay {
         let parameters = RoomParameters::measure(response, bands)?;
         let onset_s = parameters.onset.clone().map_err(|source| Error::NoOnset { source })?.time_s;
         let rate = f64::from(response.sample_rate_hz());
-        let filtered = FilterBank::new(bands, response.sample_rate_hz())?.analyse(response.samples());
+        let bank = FilterBank::new(bands, response.sample_rate_hz())?;
+        let filtered = bank.analyse(response.samples());
+        // What the filters leave of a unit impulse, whose energy counts as one in every band.
+        let mut impulse = vec![0.0; response.sample_rate_hz() as usize];
+        let middle = impulse.len() / 2;
+        impulse[middle] = 1.0;
+        let units =
+            bank.analyse(&impulse).map(|x| x.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>());
         let of_band = |b: usize| {
             let fit = parameters.fits.values()[b].as_ref().map_err(NoReading::clone)?;
             let (lower_hz, upper_hz) = bands.edges_hz(b);
-            BinnedDecay::new(&filtered.values()[b], rate, onset_s, upper_hz - lower_hz, fit)
+            BinnedDecay::new(
+                &filtered.values()[b],
+                rate,
+                onset_s,
+                upper_hz - lower_hz,
+                units.values()[b],
+                fit,
+            )
         };
         let decays = (0..bands.len()).map(of_band).collect();
         Ok(Self { bands, onset_s, t30_s: parameters.t30_s, decays })
@@ -85,16 +99,18 @@ impl BinnedDecay {
         rate_hz: f64,
         onset_s: f64,
         bandwidth_hz: f64,
+        unit_energy: f64,
         fit: &DecayFit,
     ) -> Result<Self, NoReading> {
         let from_s = onset_s + DIRECT_S.max(RINGING / bandwidth_hz);
         let to_s = fit.knee_s().min(samples.len() as f64 / rate_hz);
-        let width_s = (RINGING / bandwidth_hz).max((to_s - from_s) / BINS);
-        let wanted = |i: usize| ((from_s + i as f64 * width_s) * rate_hz).round() as usize;
+        let narrowest_s = RINGING / bandwidth_hz;
         let mut decay = Self { edges_s: Vec::new(), energy: Vec::new(), shape: Vec::new(), tail: 0.0 };
-        let mut end = wanted(0);
-        for i in 0.. {
-            let (from, to) = (wanted(i), wanted(i + 1));
+        let mut end = (from_s * rate_hz).round() as usize;
+        loop {
+            let from = end;
+            let width_s = narrowest_s.max(GROWTH * (from as f64 / rate_hz - from_s));
+            let to = from + (width_s * rate_hz).ceil() as usize;
             if to > samples.len() || to as f64 > to_s * rate_hz {
                 break;
             }
@@ -105,13 +121,13 @@ impl BinnedDecay {
             }
             let signal = 1.0 - noise / gross;
             decay.edges_s.push(from as f64 / rate_hz);
-            decay.energy.push(gross - noise);
+            decay.energy.push((gross - noise) / unit_energy);
             // Two degrees of freedom for each independent value of the band, of which there are B dt.
             decay.shape.push(bandwidth_hz * (to - from) as f64 / rate_hz * signal * signal);
             end = to;
         }
         if decay.energy.len() < LEAST_BINS {
-            let (needed_s, available_s) = (LEAST_BINS as f64 * width_s, (to_s - from_s).max(0.0));
+            let (needed_s, available_s) = (LEAST_BINS as f64 * narrowest_s, (to_s - from_s).max(0.0));
             return Err(NoReading::TooShort { needed_s, available_s });
         }
         decay.edges_s.push(end as f64 / rate_hz);
@@ -120,7 +136,7 @@ impl BinnedDecay {
             let tau_s = slope.t60_s.value / 1e6f64.ln();
             slope.power * (-(end as f64 / rate_hz - fit.start_s()) / tau_s).exp() * tau_s * rate_hz
         };
-        decay.tail = fit.slopes().iter().map(after).sum();
+        decay.tail = fit.slopes().iter().map(after).sum::<f64>() / unit_energy;
         Ok(decay)
     }
 
