@@ -44,14 +44,15 @@ pub fn tables(points: &[Point]) -> String {
         for (what, read) in readings {
             let mine = || points.iter().filter(move |p| p.method == method);
             let (errors, unread) = sorted_errors(mine(), read);
+            let percent = |value: f64| if value.is_nan() { "-".to_owned() } else { format!("{value:.2}") };
             let _ = writeln!(
                 text,
-                "| {name} | {what} | {} | {} | {unread} | {:.2} | {:.2} | {:.1} |",
+                "| {name} | {what} | {} | {} | {unread} | {} | {} | {} |",
                 mine().count(),
                 mine().filter(|p| p.reachable).count(),
-                quantile(&errors, 0.5),
-                quantile(&errors, 0.95),
-                errors.last().copied().unwrap_or(f64::NAN),
+                percent(quantile(&errors, 0.5)),
+                percent(quantile(&errors, 0.95)),
+                percent(quantile(&errors, 1.0)),
             );
         }
     }
@@ -77,7 +78,7 @@ fn targets(points: &[Point]) -> Vec<f64> {
     targets
 }
 
-/// T30 read against T60 wanted, the median of all rooms and octaves with the middle 90 % about it.
+/// T30 read against T60 wanted, the median of all rooms and octaves.
 pub fn reached(points: &[Point]) -> Result<String, AnyError> {
     let targets = targets(points);
     let longest = targets.last().copied().unwrap_or(1.0);

@@ -1,12 +1,13 @@
-//! Synthetic truth: all image sources of a box as a pressure response (testkit), fitted on the paths of a ray tracer. Neither
-//! shares code with the other.
+//! Synthetic truth: the energy of all image sources of a box (testkit) with the statistics of a diffuse field, fitted on the
+//! paths of a ray tracer. Neither shares code with the other.
 
 // A test that cannot be set up should fail.
 #![allow(clippy::unwrap_used)]
 
+use rand::{Rng, SeedableRng};
 use sabine_acoustics::{
-    Air, Estimate, ImpulseResponse, Levels, Material, Measurement, NamedMaterial, OctaveBands, PathSet,
-    PerBand, Propagator, Receiver, Scene, Source, TimeZero, Triangle,
+    Air, EnergyResponse, Estimate, FilterBank, ImpulseResponse, Levels, Material, Measurement, NamedMaterial,
+    OctaveBands, PathSet, PerBand, Propagator, Receiver, Scene, Source, TimeZero, Triangle,
 };
 use sabine_optimize::{
     AbsorptionPrior, DecayMisfit, Error, FitConfig, MaterialFitter, MeasuredDecay, MeasuredPair, ResponseFit,
@@ -40,6 +41,22 @@ fn room(faces: [usize; 6], absorption: &[[f64; 2]]) -> Scene {
     Scene::new(shell.vertices().to_vec(), triangles, materials).unwrap()
 }
 
+/// Gaussian noise at 8 kHz whose energy follows an energy response in bins of 1 ms: what a diffuse field makes of it.
+fn noise_under(energy: &EnergyResponse, seed: u64) -> Vec<f32> {
+    let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
+    let mut normal = || {
+        let (u, v): (f64, f64) = (random.random(), random.random());
+        ((-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()) as f32
+    };
+    let white: Vec<f32> = (0..8 * energy.bins()).map(|_| normal()).collect();
+    let bands = FilterBank::new(octaves(), 8000).unwrap().split(&white);
+    let at = |i: usize| {
+        let shaped = |b: usize| bands.values()[b][i] * (energy.band(b)[i / 8] / 8.0).sqrt() as f32;
+        shaped(0) + shaped(1)
+    };
+    (0..white.len()).map(at).collect()
+}
+
 struct Measured {
     decay: MeasuredDecay,
     paths: PathSet,
@@ -62,9 +79,10 @@ fn measure(
     let (source, receiver) = (Source::omni("s", source).unwrap(), Receiver::omni("r", receiver).unwrap());
     let air = Air::default();
     let images = ShoeboxImages::new(DURATION_S).unwrap();
-    let response = images.impulse_response(truth, &source, &receiver, &air, 8000).unwrap();
+    let energy = images.energy_response(truth, &source, &receiver, Some(&air), 1e-3).unwrap();
+    let response = noise_under(&energy, seed);
     let mut samples = vec![0.0; delay];
-    samples.extend(response.samples().iter().map(|s| gain * s));
+    samples.extend(response.iter().map(|s| gain * s));
     let response = ImpulseResponse::new(samples, 8000).unwrap();
     let paths = tracer(8_000, seed).trace(truth, &source, &receiver, &air, &()).unwrap();
     Measured { decay: MeasuredDecay::new(&response, octaves()).unwrap(), paths }
@@ -181,7 +199,8 @@ fn gains_latencies_and_held_out_places() {
     for (gain, expected) in fit.gain_db.iter().zip(gains) {
         for found in gain.values() {
             let wanted = 20.0 * f64::from(expected).log10();
-            assert!((found.unwrap() - wanted).abs() < 1.5, "{found:?} dB for {wanted}");
+            // Floor and ceiling are hardly known here, and with them the level of the paths.
+            assert!((found.unwrap() - wanted).abs() < 3.0, "{found:?} dB for {wanted}");
         }
     }
     let pair = MeasuredPair { measured: &held_out.decay, paths: &held_out.paths };
