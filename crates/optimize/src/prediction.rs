@@ -76,7 +76,7 @@ impl PredictedChange {
             .into_par_iter()
             .map(|b| Ok((read(before, b)?, read(after, b)?)))
             .collect::<Result<Vec<_>, Error>>()?;
-        let collect = |of: &dyn Fn(&([Linear; 3], [Linear; 3]), usize) -> Reading| {
+        let collect = |of: &dyn Fn(&Both, usize) -> Reading| {
             let column = |i: usize| PerBand::from_fn(bands, |b| of(&all[b], i));
             RoomPrediction { t60_s: column(0), c50_db: column(1), d50: column(2) }
         };
@@ -90,6 +90,9 @@ impl PredictedChange {
 
 /// Width of the time bins, in seconds.
 const BIN_S: f64 = 1e-3;
+
+/// T60, C50 and D50 with the materials before and after.
+type Both = ([Linear; 3], [Linear; 3]);
 
 /// A number read from energies, and what each batch of rays adds to it to first order.
 struct Linear {
@@ -129,7 +132,7 @@ fn functionals(bins: &Bins, direct_s: f64) -> [Result<(f64, Vec<f64>), NoReading
     let late = total - early;
     let needed_s = direct_s + EARLY_S;
     let available_s = count as f64 * bins.bin_s;
-    let ratios = if !(total > 0.0) {
+    let ratios = if total.is_nan() || total <= 0.0 {
         Err(NoReading::NoOnset)
     } else if available_s <= needed_s {
         Err(NoReading::TooShort { needed_s, available_s })

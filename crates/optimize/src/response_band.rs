@@ -126,9 +126,9 @@ impl<'b> BandFit<'b> {
                 let last = ((window[1] / fine.bin_s).ceil().max(0.0) as usize).min(fine.energy.len());
                 let mut functional = vec![0.0; fine.energy.len()];
                 let (mut energy, mut hits) = (0.0, vec![0.0; materials]);
-                for i in first..last {
-                    functional[i] = share(i);
-                    let e = functional[i] * fine.energy[i];
+                for (i, part) in functional.iter_mut().enumerate().take(last).skip(first) {
+                    *part = share(i);
+                    let e = *part * fine.energy[i];
                     energy += e;
                     let row = &fine.hits[i * materials..(i + 1) * materials];
                     hits.iter_mut().zip(row).for_each(|(h, n)| *h += e * n);
