@@ -10,8 +10,8 @@ const DIRECT_S: f64 = 0.005;
 /// The filter rings for about this long, in units of one over the bandwidth: the decay starts so much later, and no time
 /// bin is narrower.
 const RINGING: f64 = 1.5;
-/// Width of a bin as a share of the time since the decay began: early reflections are told apart, the tail is summed.
-const GROWTH: f64 = 0.08;
+/// Most time bins.
+const BINS: f64 = 48.0;
 /// Fewest time bins that a decay is read from.
 const LEAST_BINS: usize = 6;
 /// Noise may not exceed this share of what a bin holds.
@@ -104,12 +104,11 @@ impl BinnedDecay {
     ) -> Result<Self, NoReading> {
         let from_s = onset_s + DIRECT_S.max(RINGING / bandwidth_hz);
         let to_s = fit.knee_s().min(samples.len() as f64 / rate_hz);
-        let narrowest_s = RINGING / bandwidth_hz;
+        let width_s = (RINGING / bandwidth_hz).max((to_s - from_s) / BINS);
         let mut decay = Self { edges_s: Vec::new(), energy: Vec::new(), shape: Vec::new(), tail: 0.0 };
         let mut end = (from_s * rate_hz).round() as usize;
         loop {
             let from = end;
-            let width_s = narrowest_s.max(GROWTH * (from as f64 / rate_hz - from_s));
             let to = from + (width_s * rate_hz).ceil() as usize;
             if to > samples.len() || to as f64 > to_s * rate_hz {
                 break;
@@ -127,7 +126,7 @@ impl BinnedDecay {
             end = to;
         }
         if decay.energy.len() < LEAST_BINS {
-            let (needed_s, available_s) = (LEAST_BINS as f64 * narrowest_s, (to_s - from_s).max(0.0));
+            let (needed_s, available_s) = (LEAST_BINS as f64 * width_s, (to_s - from_s).max(0.0));
             return Err(NoReading::TooShort { needed_s, available_s });
         }
         decay.edges_s.push(end as f64 / rate_hz);

@@ -11,7 +11,7 @@ use crate::response_band::{BandFit, Likelihood, ResponseBand, Solved};
 use crate::{AbsorptionPrior, Error, FitConfig, MaterialFit, MaterialFitter};
 use rayon::prelude::*;
 use sabine_acoustics::{
-    Air, Levels, Material, Measurement, NoReading, Objective, Observer, PathSet, PerBand, TimeZero, report,
+    Air, Levels, Material, Measurement, NoReading, Observer, PathSet, PerBand, TimeZero, report,
 };
 
 /// A measured response and the paths between its source and its receiver.
@@ -41,8 +41,8 @@ pub struct ResponseFit {
 /// Name of this work to an observer.
 const STAGE: &str = "fit to responses";
 /// Expansions of the paths before the fit takes what it has.
-const PASSES: usize = 24;
-/// Change of any variable (about a standard deviation of the prior each) below which it has settled.
+const PASSES: usize = 12;
+/// Change of any material, in standard deviations of its prior, below which it has settled.
 const SETTLED: f64 = 0.02;
 
 impl MaterialFitter {
@@ -184,38 +184,29 @@ pub(crate) fn latencies_s(
 
 /// Minimises the bands' cost, expanding the paths about the present materials until these settle.
 fn solve(bands: &[ResponseBand<'_>], config: &FitConfig) -> Result<Vec<Solved>, Error> {
-    let expand = |absorption: &[Vec<f64>]| -> Vec<BandFit<'_>> {
-        bands.par_iter().zip(absorption).map(|(band, a)| BandFit::about(band, a)).collect()
-    };
     let mut absorption: Vec<Vec<f64>> = bands.iter().map(|b| b.start(config.bounds)).collect();
     let mut dispersion = vec![1.0; bands.len()];
     let mut iterations = 0;
-    let mut reach = f64::INFINITY;
-    let mut fits = expand(&absorption);
-    for _ in 0..PASSES {
+    let mut fits = Vec::new();
+    for pass in 0..PASSES {
+        fits = bands.iter().zip(&absorption).map(|(band, a)| BandFit::about(band, a)).collect();
         let likelihood = Likelihood::new(&fits, &dispersion, config);
         let start = likelihood.variables(&absorption);
         let (lower, upper) = likelihood.bounds();
-        let lower: Vec<f64> = lower.iter().zip(&start).map(|(l, x)| l.max(x - reach)).collect();
-        let upper: Vec<f64> = upper.iter().zip(&start).map(|(u, x)| u.min(x + reach)).collect();
         let minimum = minimise(&likelihood, &start, &lower, &upper, config.max_iterations)?;
         iterations += minimum.iterations;
         let next = likelihood.absorption(&minimum.x);
-        let moved = minimum.x.iter().zip(&start).fold(0.0, |w: f64, (to, from)| w.max((to - from).abs()));
-        // An expansion is exact where it is made: what the step brought is known there, and a step that brought nothing is
-        // tried again, shorter.
-        let before = likelihood.value_and_gradient(&start, &mut vec![0.0; start.len()]);
-        let there = expand(&next);
-        let likelihood = Likelihood::new(&there, &dispersion, config);
-        let after = likelihood.value_and_gradient(&minimum.x, &mut vec![0.0; start.len()]);
-        if after > before && moved > SETTLED {
-            reach = 0.4 * moved;
-            continue;
+        let mut moved = 0.0f64;
+        for ((band, old), new) in bands.iter().zip(&mut absorption).zip(next) {
+            for (k, new) in new.into_iter().enumerate() {
+                if band.standard_deviation[k] > 0.0 {
+                    moved = moved.max((new - old[k]).abs() / band.standard_deviation[k]);
+                    old[k] = new;
+                }
+            }
         }
-        reach = 2.0 * moved.max(SETTLED);
-        (absorption, fits) = (next, there);
         dispersion = fits.iter().zip(&absorption).map(|(fit, a)| fit.dispersion(a)).collect();
-        if moved < SETTLED {
+        if moved < SETTLED && pass > 0 {
             break;
         }
     }
