@@ -7,33 +7,26 @@ use crate::objective::SlopeModel;
 use sabine_acoustics::{EnergyDecayCurve, Estimate, NoReading, Reading};
 use std::borrow::Borrow;
 
+/// The traces of one source-receiver pair, each a history and the weights of its paths in a band, the share of the trace in
+/// the whole included: their energies add up.
+pub(crate) type Traces<H> = Vec<(H, Vec<f32>)>;
+
 /// Slope of the decay curves of several source-receiver pairs: -60 over the mean of their reverberation times
 /// (ISO 3382-1, 8.1: arithmetic mean over positions).
 pub(crate) struct DecaySlope<H> {
-    pairs: Vec<(H, Vec<f32>)>,
+    pairs: Vec<Traces<H>>,
     range_db: (f64, f64),
 }
 
 impl<H: Borrow<History>> DecaySlope<H> {
-    /// Pairs of a history and the weights of its paths in this band.
-    pub fn new(pairs: Vec<(H, Vec<f32>)>, range_db: (f64, f64)) -> Self {
+    pub fn new(pairs: Vec<Traces<H>>, range_db: (f64, f64)) -> Self {
         Self { pairs, range_db }
     }
 
     /// The curves near an absorption: one pass over all paths.
     pub fn expand(&self, absorption: &[f64]) -> Expansion {
-        let expand = |(history, weights): &(H, Vec<f32>)| {
-            let history = history.borrow();
-            let mut energy = vec![0.0; history.bins()];
-            let mut hits = vec![0.0; history.bins() * history.materials];
-            history.accumulate(weights, absorption, &mut energy, &mut hits);
-            for (row, e) in hits.chunks_exact_mut(history.materials).zip(&energy).filter(|(_, e)| **e > 0.0) {
-                row.iter_mut().for_each(|h| *h /= e);
-            }
-            Bins { bin_s: history.bin_s, energy, hits }
-        };
         Expansion {
-            pairs: self.pairs.iter().map(expand).collect(),
+            pairs: self.pairs.iter().map(|traces| Bins::of(traces, absorption)).collect(),
             about: absorption.to_vec(),
             range_db: self.range_db,
         }
@@ -44,7 +37,7 @@ impl<H: Borrow<History>> DecaySlope<H> {
     pub fn reading(&self, expansion: &Expansion) -> Reading {
         let mut why = NoReading::NoOnset;
         let (mut t60_s, mut variance, mut count) = (0.0, 0.0, 0.0);
-        for ((history, weights), bins) in self.pairs.iter().zip(&expansion.pairs) {
+        for (traces, bins) in self.pairs.iter().zip(&expansion.pairs) {
             let sampled = EnergyDecayCurve::from_energy(&bins.energy, bins.bin_s)
                 .decay_time_s(self.range_db.0, self.range_db.1);
             if let Err(reason) = sampled {
@@ -57,8 +50,10 @@ impl<H: Borrow<History>> DecaySlope<H> {
             count += 1.0;
             t60_s += -60.0 / slope;
             let by_slope = 60.0 / (slope * slope);
-            let spread = history.borrow().variance(weights, &expansion.about, &sensitivity);
-            variance += by_slope * by_slope * spread;
+            let spread = |(history, weights): &(H, Vec<f32>)| {
+                history.borrow().variance(weights, &expansion.about, &sensitivity)
+            };
+            variance += by_slope * by_slope * traces.iter().map(spread).sum::<f64>();
         }
         if count == 0.0 {
             return Err(why);

@@ -98,6 +98,20 @@ pub enum Error {
         /// Duration traced, in seconds.
         traced_s: f64,
     },
+    /// A measured response in which no direct sound stands out.
+    #[error("the response has no direct sound: {source}")]
+    NoOnset {
+        /// Why.
+        source: sabine_acoustics::NoReading,
+    },
+    /// No response can be read in any band.
+    #[error("none of {responses} responses has a decay that can be read in any of {bands} bands")]
+    NoDecay {
+        /// Number of responses.
+        responses: usize,
+        /// Number of bands.
+        bands: usize,
+    },
     /// A vocabulary value was refused, or the observer stopped the fit.
     #[error(transparent)]
     Acoustics(#[from] sabine_acoustics::Error),

@@ -1,7 +1,10 @@
 //! A decay curve near given materials: one energy and one mean number of hits for each time bin, instead of all paths.
 
 use crate::decay::slope_with_sensitivity;
+use crate::decay_slope::Traces;
+use crate::history::History;
 use crate::objective::SlopeModel;
+use std::borrow::Borrow;
 
 /// Energies of the time bins about a point: E(a) = E0 product of ((1 - a)/(1 - a0))^h, h being the mean number of hits of the
 /// bin's paths weighted by their energy at a0. Value and gradient are exact at a0, and the error grows with the square of
@@ -20,6 +23,29 @@ pub(crate) struct Bins {
     pub energy: Vec<f64>,
     /// `hits[bin * materials + material]`.
     pub hits: Vec<f64>,
+}
+
+impl Bins {
+    /// Sums the paths of all traces of a pair.
+    pub fn of<H: Borrow<History>>(traces: &Traces<H>, absorption: &[f64]) -> Self {
+        // Traces of one pair are made to the same length; the shortest counts.
+        let bins = traces.iter().map(|(history, _)| history.borrow().bins()).min().unwrap_or(0);
+        let materials = absorption.len();
+        let mut sum = Self { bin_s: 1.0, energy: vec![0.0; bins], hits: vec![0.0; bins * materials] };
+        for (history, weights) in traces {
+            let history = history.borrow();
+            let mut energy = vec![0.0; history.bins()];
+            let mut hits = vec![0.0; history.bins() * materials];
+            history.accumulate(weights, absorption, &mut energy, &mut hits);
+            sum.bin_s = history.bin_s;
+            sum.energy.iter_mut().zip(energy).for_each(|(s, e)| *s += e);
+            sum.hits.iter_mut().zip(hits).for_each(|(s, h)| *s += h);
+        }
+        for (row, e) in sum.hits.chunks_exact_mut(materials).zip(&sum.energy).filter(|(_, e)| **e > 0.0) {
+            row.iter_mut().for_each(|h| *h /= e);
+        }
+        sum
+    }
 }
 
 impl Expansion {

@@ -19,7 +19,7 @@ const STAGE: &str = "fit materials";
 /// Relative Monte-Carlo error of T60 that is worth a warning.
 const FEW_PATHS: f64 = 0.03;
 /// Deviation from a prior that is worth a warning, in standard deviations.
-const FAR_FROM_PRIOR: f64 = 3.0;
+pub(crate) const FAR_FROM_PRIOR: f64 = 3.0;
 
 /// Fits materials so that the simulated decay of every band has the slope -60/T60.
 ///
@@ -38,6 +38,11 @@ impl MaterialFitter {
     pub fn new(config: FitConfig) -> Result<Self, Error> {
         config.check()?;
         Ok(Self { config })
+    }
+
+    /// The settings.
+    pub fn config(&self) -> &FitConfig {
+        &self.config
     }
 
     /// Fits to one reverberation time for each band, in seconds, the mean over the given source-receiver pairs.
@@ -59,7 +64,23 @@ impl MaterialFitter {
         target_t60_s: &PerBand<Estimate>,
         observer: &dyn Observer,
     ) -> Result<MaterialFit, Error> {
-        check_paths(paths, materials)?;
+        let traces: Vec<Trace<'_>> =
+            paths.iter().enumerate().map(|(pair, paths)| Trace { pair, paths, share: 1.0 }).collect();
+        self.fit_traces(&traces, materials, priors, air, target_t60_s, observer)
+    }
+
+    /// The same for pairs that were traced more than once: their energies add up.
+    pub(crate) fn fit_traces(
+        &self,
+        traces: &[Trace<'_>],
+        materials: &[Material],
+        priors: &[AbsorptionPrior],
+        air: &Air,
+        target_t60_s: &PerBand<Estimate>,
+        observer: &dyn Observer,
+    ) -> Result<MaterialFit, Error> {
+        let paths: Vec<&PathSet> = traces.iter().map(|t| t.paths).collect();
+        check_paths(&paths, materials)?;
         self.check_priors(materials, priors)?;
         check_targets(target_t60_s)?;
         let octaves = materials[0].bands();
@@ -81,20 +102,21 @@ impl MaterialFitter {
         let bands = (0..octaves.len())
             .into_par_iter()
             .map(|b| {
-                let pairs = histories
+                let weighted = histories
                     .iter()
-                    .zip(paths)
-                    .map(|(history, paths)| {
-                        Ok((history, history.weights(paths, materials, exponents.values()[b], b)?))
+                    .zip(traces)
+                    .map(|(history, trace)| {
+                        let exponent = exponents.values()[b];
+                        Ok((history, history.weights(trace.paths, materials, exponent, b, trace.share)?))
                     })
                     .collect::<Result<Vec<_>, Error>>()?;
                 let line = match self.config.objective {
                     SlopeObjective::DecayCurve => None,
-                    SlopeObjective::Paper => Some(SinglePathSlope::through_mean(&pairs)),
-                    SlopeObjective::Li2018 => Some(SinglePathSlope::through_first(&pairs)),
+                    SlopeObjective::Paper => Some(SinglePathSlope::through_mean(&weighted)),
+                    SlopeObjective::Li2018 => Some(SinglePathSlope::through_first(&weighted)),
                 };
                 Ok(Band {
-                    curve: DecaySlope::new(pairs, self.config.range_db),
+                    curve: DecaySlope::new(by_pair(traces, weighted), self.config.range_db),
                     line,
                     target_s: targets.values()[b].value,
                     mean: priors.iter().map(|p| p.mean.values()[b]).collect(),
@@ -144,7 +166,7 @@ impl MaterialFitter {
             let here = b % together;
             let found = &solution.bands[here];
             let values = &found.absorption;
-            let bounded = AtBound::find(band, values, band_hz, self.config.bounds);
+            let bounded = AtBound::find(&band.standard_deviation, values, band_hz, self.config.bounds);
             let reading = found.t60_s.clone();
             if let Some(reason) = self.unreachable(band, found, limits_s.values()[b]) {
                 fit.unreachable.push(Unreachable { band_hz, reason });
@@ -169,7 +191,14 @@ impl MaterialFitter {
             if traced_s < advised_s {
                 fit.warnings.push(Warning::ShortPaths { band_hz, traced_s, advised_s });
             }
-            spread.name_open(here, band, band_hz, &hits, &bounded, &mut fit.not_determined);
+            spread.name_open(
+                here,
+                &band.standard_deviation,
+                band_hz,
+                &hits,
+                &bounded,
+                &mut fit.not_determined,
+            );
             fit.at_bounds.extend(bounded);
             predicted.push(reading);
         }
@@ -213,7 +242,11 @@ impl MaterialFitter {
         })
     }
 
-    fn check_priors(&self, materials: &[Material], priors: &[AbsorptionPrior]) -> Result<(), Error> {
+    pub(crate) fn check_priors(
+        &self,
+        materials: &[Material],
+        priors: &[AbsorptionPrior],
+    ) -> Result<(), Error> {
         if priors.len() != materials.len() {
             return Err(Error::Count { what: "priors", expected: materials.len(), found: priors.len() });
         }
@@ -243,6 +276,25 @@ impl MaterialFitter {
     }
 }
 
+/// One trace of a source-receiver pair.
+#[derive(Clone, Copy)]
+pub(crate) struct Trace<'p> {
+    pub pair: usize,
+    pub paths: &'p PathSet,
+    /// What its energies count: the shares of the traces of a pair sum to 1.
+    pub share: f64,
+}
+
+/// Collects what belongs to the same pair.
+pub(crate) fn by_pair<T>(traces: &[Trace<'_>], of_trace: Vec<T>) -> Vec<Vec<T>> {
+    let pairs = traces.iter().map(|t| t.pair + 1).max().unwrap_or(0);
+    let mut grouped: Vec<Vec<T>> = (0..pairs).map(|_| Vec::new()).collect();
+    for (trace, value) in traces.iter().zip(of_trace) {
+        grouped[trace.pair].push(value);
+    }
+    grouped
+}
+
 fn check_targets(target_t60_s: &PerBand<Estimate>) -> Result<(), Error> {
     let (low_s, high_s) = TARGET_RANGE_S;
     for (band_hz, target) in target_t60_s.iter() {
@@ -262,8 +314,13 @@ pub(crate) fn at_bound(absorption: f64, bound: f64) -> bool {
 }
 
 impl AtBound {
-    fn find(band: &Band<'_>, absorption: &[f64], band_hz: f64, bounds: (f64, f64)) -> Vec<Self> {
-        let free = absorption.iter().enumerate().filter(|&(k, _)| band.standard_deviation[k] > 0.0);
+    pub(crate) fn find(
+        standard_deviation: &[f64],
+        absorption: &[f64],
+        band_hz: f64,
+        bounds: (f64, f64),
+    ) -> Vec<Self> {
+        let free = absorption.iter().enumerate().filter(|&(k, _)| standard_deviation[k] > 0.0);
         free.flat_map(|(material, &a)| {
             [(bounds.0, false), (bounds.1, true)]
                 .into_iter()

@@ -5,6 +5,7 @@ use crate::decay_slope::DecaySlope;
 use crate::expansion::Expansion;
 use crate::history::History;
 use crate::objective::SlopeModel;
+use crate::scale::Scale;
 use crate::single_paths::SinglePathSlope;
 use crate::{Error, FitConfig};
 use rayon::prelude::*;
@@ -82,34 +83,6 @@ pub(crate) struct Fitted {
     pub t60_s: Reading,
 }
 
-/// What a surface takes of the logarithm of energy: the slope of a decay is nearly linear in it, right up to full absorption.
-fn loss(absorption: f64) -> f64 {
-    -(-absorption).ln_1p()
-}
-
-/// The solver's variable for an absorption: its loss less that of the prior's mean, in units in which a step about the mean
-/// is one standard deviation of absorption.
-#[derive(Clone, Copy)]
-struct Scale {
-    origin: f64,
-    unit: f64,
-}
-
-impl Scale {
-    fn variable(&self, absorption: f64) -> f64 {
-        (loss(absorption) - self.origin) / self.unit
-    }
-
-    fn absorption(&self, variable: f64) -> f64 {
-        -(-(self.origin + self.unit * variable)).exp_m1()
-    }
-
-    /// Derivative of absorption by the variable.
-    fn by_variable(&self, variable: f64) -> f64 {
-        (1.0 - self.absorption(variable)) * self.unit
-    }
-}
-
 /// Passes over the paths before the fit falls back on evaluating all of them in every step.
 const PASSES: usize = 16;
 /// Greatest change of a slope that is aimed at in one pass, as a factor: farther off an expansion means little.
@@ -145,7 +118,7 @@ impl<'a, 'b> Group<'a, 'b> {
             .collect();
         let scale = |&(b, k): &(usize, usize)| {
             let mean = bands[b].mean[k].clamp(config.bounds.0, config.bounds.1);
-            Scale { origin: loss(mean), unit: bands[b].standard_deviation[k] / (1.0 - mean) }
+            Scale::about(mean, bands[b].standard_deviation[k])
         };
         let scales: Vec<Scale> = free.iter().map(scale).collect();
         let lower = scales.iter().map(|s| s.variable(config.bounds.0)).collect();

@@ -21,6 +21,7 @@ pub(crate) struct History {
     pub batches: Vec<u8>,
     /// Where in the path set each path stands.
     order: Vec<u32>,
+    speed_m_s: f64,
 }
 
 impl History {
@@ -65,6 +66,7 @@ impl History {
             starts,
             counts,
             order,
+            speed_m_s,
         }
     }
 
@@ -76,13 +78,14 @@ impl History {
         self.order.len()
     }
 
-    /// Energy of each path in one band if no surface absorbed: distance, scattering and air alone.
+    /// Energy of each path in one band if no surface absorbed, distance, scattering and air alone, times `share`.
     pub fn weights(
         &self,
         paths: &PathSet,
         materials: &[Material],
         air_exponent_per_m: f64,
         band: usize,
+        share: f64,
     ) -> Result<Vec<f32>, Error> {
         let rigid: Vec<Material> = materials
             .iter()
@@ -90,12 +93,20 @@ impl History {
             .collect::<Result<_, _>>()?;
         let scattering = paths.log_reflectance(&rigid, band)?;
         let exponent = air_exponent_per_m as f32;
+        let log_share = share.ln() as f32;
         let weight = |&i: &u32| {
             let i = i as usize;
             let surfaces = scattering[paths.chains()[i] as usize] + scattering[paths.tails()[i] as usize];
-            (paths.log_weights()[i] + surfaces - exponent * paths.lengths_m()[i]).exp()
+            (log_share + paths.log_weights()[i] + surfaces - exponent * paths.lengths_m()[i]).exp()
         };
-        Ok(self.order.iter().map(weight).collect())
+        let mut weights: Vec<f32> = self.order.iter().map(weight).collect();
+        // Few, if any: the ways around edges.
+        for (contribution, diffraction) in paths.diffractions() {
+            let gain = diffraction.octave_energy_gain(materials[0].bands(), band, self.speed_m_s) as f32;
+            let places = self.order.iter().zip(&mut weights).filter(|(i, _)| **i as usize == *contribution);
+            places.for_each(|(_, w)| *w *= gain);
+        }
+        Ok(weights)
     }
 
     /// Energy of each bin at an absorption of each material, and, where `moments` is not empty, the sum over paths of energy
@@ -193,8 +204,8 @@ impl History {
 }
 
 impl History {
-    /// Monte-Carlo variance of a linear functional of the bins' energies, from the scatter between batches of rays.
-    pub fn variance(&self, weights: &[f32], absorption: &[f64], functional: &[f64]) -> f64 {
+    /// What each batch of rays contributes to a linear functional of the bins' energies.
+    pub fn batch_sums(&self, weights: &[f32], absorption: &[f64], functional: &[f64]) -> Vec<f64> {
         let (powers, stride) = self.powers(absorption);
         let batches = usize::from(PathSet::BATCHES);
         // The last place is for exact paths, which do not scatter.
@@ -204,9 +215,20 @@ impl History {
                 parts[usize::from(batch)] += factor * e;
             }
         }
-        let parts = &parts[..batches];
-        let mean = parts.iter().sum::<f64>() / batches as f64;
-        let scatter: f64 = parts.iter().map(|p| (p - mean) * (p - mean)).sum();
-        scatter * batches as f64 / (batches as f64 - 1.0)
+        parts.truncate(batches);
+        parts
     }
+
+    /// Monte-Carlo variance of a linear functional of the bins' energies, from the scatter between batches of rays.
+    pub fn variance(&self, weights: &[f32], absorption: &[f64], functional: &[f64]) -> f64 {
+        variance_of_sum(&self.batch_sums(weights, absorption, functional))
+    }
+}
+
+/// Variance of the sum of independent parts, from their scatter.
+pub(crate) fn variance_of_sum(parts: &[f64]) -> f64 {
+    let n = parts.len() as f64;
+    let mean = parts.iter().sum::<f64>() / n;
+    let scatter: f64 = parts.iter().map(|p| (p - mean) * (p - mean)).sum();
+    scatter * n / (n - 1.0)
 }

@@ -85,12 +85,14 @@ impl SlopeEvaluation {
             .into_iter()
             .zip(paths)
             .map(|(history, paths)| {
-                let weights = history.weights(paths, materials, exponent, band)?;
+                let weights = history.weights(paths, materials, exponent, band, 1.0)?;
                 Ok((history, weights))
             })
             .collect::<Result<Vec<_>, Error>>()?;
         let model: Box<dyn SlopeModel> = match config.objective {
-            SlopeObjective::DecayCurve => Box::new(DecaySlope::new(pairs, config.range_db)),
+            SlopeObjective::DecayCurve => {
+                Box::new(DecaySlope::new(pairs.into_iter().map(|pair| vec![pair]).collect(), config.range_db))
+            }
             SlopeObjective::Paper => Box::new(SinglePathSlope::through_mean(&pairs)),
             SlopeObjective::Li2018 => Box::new(SinglePathSlope::through_first(&pairs)),
         };

@@ -14,11 +14,11 @@ const SHOWS: f64 = 1e-3;
 pub(crate) struct Spread {
     pub standard_error: Vec<Vec<f64>>,
     /// Share of the prior's variance that remains.
-    remaining: Vec<Vec<f64>>,
-    /// Share of the slope's variance under the prior that is due to each material.
-    share: Vec<Vec<f64>>,
+    pub remaining: Vec<Vec<f64>>,
+    /// Whether the data would tell each material, the others being known.
+    pub shows: Vec<Vec<bool>>,
     /// Whether the band has a slope at all.
-    data: Vec<bool>,
+    pub data: Vec<bool>,
 }
 
 impl Spread {
@@ -40,7 +40,7 @@ impl Spread {
         let mut spread = Self {
             standard_error: zeros(),
             remaining: zeros(),
-            share: zeros(),
+            shows: bands.iter().map(|b| vec![false; b.mean.len()]).collect(),
             data: vec![false; bands.len()],
         };
 
@@ -75,7 +75,7 @@ impl Spread {
             errors.push(relative_error[b] * relative_error[b] + rays);
             let total: f64 = row.norm_squared();
             for (i, &(of, k)) in free.iter().enumerate().filter(|(_, f)| f.0 == b) {
-                spread.share[of][k] = if total > 0.0 { row[i] * row[i] / total } else { 0.0 };
+                spread.shows[of][k] = total > 0.0 && row[i] * row[i] / total >= SHOWS;
             }
             rows.push(row);
         }
@@ -105,20 +105,20 @@ impl Spread {
     pub fn name_open(
         &self,
         b: usize,
-        band: &Band<'_>,
+        standard_deviation: &[f64],
         band_hz: f64,
         hits: &[u64],
         bounded: &[AtBound],
         findings: &mut Vec<Undetermined>,
     ) {
         // What is held is known, and what stands at a bound is said elsewhere.
-        let candidates = (0..band.mean.len())
-            .filter(|&k| band.standard_deviation[k] > 0.0 && bounded.iter().all(|a| a.material != k));
+        let candidates = (0..standard_deviation.len())
+            .filter(|&k| standard_deviation[k] > 0.0 && bounded.iter().all(|a| a.material != k));
         let (mut never, mut silent, mut mixed) = (Vec::new(), Vec::new(), Vec::new());
         for k in candidates {
             if hits[k] == 0 {
                 never.push(k);
-            } else if !self.data[b] || self.share[b][k] < SHOWS {
+            } else if !self.data[b] || !self.shows[b][k] {
                 silent.push(k);
             } else if self.remaining[b][k] > DETERMINED {
                 mixed.push(k);

@@ -1,0 +1,158 @@
+//! How the energy of a measured response decays, in every band, as far as the noise lets one see.
+
+use crate::Error;
+use sabine_acoustics::{
+    DecayFit, FilterBank, ImpulseResponse, NoReading, OctaveBands, PerBand, Reading, RoomParameters,
+};
+
+/// What follows the onset by less than this is direct sound, which the source's directivity changes, not decay; in seconds.
+const DIRECT_S: f64 = 0.005;
+/// The filter rings for about this long, in units of one over the bandwidth: the decay starts so much later, and no time
+/// bin is narrower.
+const RINGING: f64 = 1.5;
+/// Most time bins.
+const BINS: f64 = 48.0;
+/// Fewest time bins that a decay is read from.
+const LEAST_BINS: usize = 6;
+/// Noise may not exceed this share of what a bin holds.
+const MOST_NOISE: f64 = 0.5;
+
+/// A measured response, ready to be fitted: the energy of each octave in time bins from just after the direct sound to where it
+/// sinks into the noise, free of that noise, with the number of independent values that each bin holds.
+#[derive(Clone, Debug)]
+pub struct MeasuredDecay {
+    bands: OctaveBands,
+    onset_s: f64,
+    t30_s: PerBand<Reading>,
+    decays: Vec<Result<BinnedDecay, NoReading>>,
+}
+
+/// Energy of one band.
+#[derive(Clone, Debug)]
+pub(crate) struct BinnedDecay {
+    /// Edges of the bins in seconds from the first sample, one more than bins.
+    pub edges_s: Vec<f64>,
+    /// Energy of each bin less the noise; a unit impulse has energy 1.
+    pub energy: Vec<f64>,
+    /// Shape of its Gamma distribution: (mean / standard deviation)2.
+    pub shape: Vec<f64>,
+    /// Energy after the last bin, by the decay fit.
+    pub tail: f64,
+}
+
+impl MeasuredDecay {
+    /// Measures a response in `bands`. A band that cannot be read keeps the reason and is left out of the fit.
+    ///
+    /// # Errors
+    /// [`Error::NoOnset`] for a response without a direct sound that stands out.
+    pub fn new(response: &ImpulseResponse, bands: OctaveBands) -> Result<Self, Error> {
+        let parameters = RoomParameters::measure(response, bands)?;
+        let onset_s = parameters.onset.clone().map_err(|source| Error::NoOnset { source })?.time_s;
+        let rate = f64::from(response.sample_rate_hz());
+        let bank = FilterBank::new(bands, response.sample_rate_hz())?;
+        let filtered = bank.analyse(response.samples());
+        // What the filters leave of a unit impulse, whose energy counts as one in every band.
+        let mut impulse = vec![0.0; response.sample_rate_hz() as usize];
+        let middle = impulse.len() / 2;
+        impulse[middle] = 1.0;
+        let units =
+            bank.analyse(&impulse).map(|x| x.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>());
+        let of_band = |b: usize| {
+            let fit = parameters.fits.values()[b].as_ref().map_err(NoReading::clone)?;
+            let (lower_hz, upper_hz) = bands.edges_hz(b);
+            BinnedDecay::new(
+                &filtered.values()[b],
+                rate,
+                onset_s,
+                upper_hz - lower_hz,
+                units.values()[b],
+                fit,
+            )
+        };
+        let decays = (0..bands.len()).map(of_band).collect();
+        Ok(Self { bands, onset_s, t30_s: parameters.t30_s, decays })
+    }
+
+    /// The bands.
+    pub fn bands(&self) -> OctaveBands {
+        self.bands
+    }
+
+    /// When the direct sound begins, in seconds from the first sample.
+    pub fn onset_s(&self) -> f64 {
+        self.onset_s
+    }
+
+    /// T30 of the response (ISO 3382-1), in seconds.
+    pub fn t30_s(&self) -> &PerBand<Reading> {
+        &self.t30_s
+    }
+
+    pub(crate) fn band(&self, band: usize) -> &Result<BinnedDecay, NoReading> {
+        &self.decays[band]
+    }
+}
+
+impl BinnedDecay {
+    fn new(
+        samples: &[f32],
+        rate_hz: f64,
+        onset_s: f64,
+        bandwidth_hz: f64,
+        unit_energy: f64,
+        fit: &DecayFit,
+    ) -> Result<Self, NoReading> {
+        let from_s = onset_s + DIRECT_S.max(RINGING / bandwidth_hz);
+        let to_s = fit.knee_s().min(samples.len() as f64 / rate_hz);
+        let width_s = (RINGING / bandwidth_hz).max((to_s - from_s) / BINS);
+        let mut decay = Self { edges_s: Vec::new(), energy: Vec::new(), shape: Vec::new(), tail: 0.0 };
+        let mut end = (from_s * rate_hz).round() as usize;
+        loop {
+            let from = end;
+            let to = from + (width_s * rate_hz).ceil() as usize;
+            if to > samples.len() || to as f64 > to_s * rate_hz {
+                break;
+            }
+            let gross: f64 = samples[from..to].iter().map(|&x| f64::from(x) * f64::from(x)).sum();
+            let noise = fit.noise_power() * (to - from) as f64;
+            if noise > MOST_NOISE * gross {
+                break;
+            }
+            let signal = 1.0 - noise / gross;
+            decay.edges_s.push(from as f64 / rate_hz);
+            decay.energy.push((gross - noise) / unit_energy);
+            // Two degrees of freedom for each independent value of the band, of which there are B dt.
+            decay.shape.push(bandwidth_hz * (to - from) as f64 / rate_hz * signal * signal);
+            end = to;
+        }
+        if decay.energy.len() < LEAST_BINS {
+            let (needed_s, available_s) = (LEAST_BINS as f64 * width_s, (to_s - from_s).max(0.0));
+            return Err(NoReading::TooShort { needed_s, available_s });
+        }
+        decay.edges_s.push(end as f64 / rate_hz);
+        // 60 dB are ln(10^6) time constants.
+        let after = |slope: &sabine_acoustics::Slope| {
+            let tau_s = slope.t60_s.value / 1e6f64.ln();
+            slope.power * (-(end as f64 / rate_hz - fit.start_s()) / tau_s).exp() * tau_s * rate_hz
+        };
+        decay.tail = fit.slopes().iter().map(after).sum::<f64>() / unit_energy;
+        Ok(decay)
+    }
+
+    /// Level in dB of the energy still to come at the start of each bin, relative to that at the first.
+    pub fn level_db(&self) -> Vec<f64> {
+        let mut sum = self.tail;
+        let mut level: Vec<f64> = self
+            .energy
+            .iter()
+            .rev()
+            .map(|e| {
+                sum += e;
+                10.0 * sum.log10()
+            })
+            .collect();
+        level.reverse();
+        let first = level[0];
+        level.iter().map(|l| l - first).collect()
+    }
+}

@@ -1,0 +1,85 @@
+//! How far the decay of a simulation is from that of a measured response.
+
+use crate::history::History;
+use crate::objective::check_paths;
+use crate::responses::latencies_s;
+use crate::{Error, MeasuredPair};
+use sabine_acoustics::{Air, EnergyDecayCurve, Material, NoReading, PerBand, Reading, TimeZero};
+
+/// Levels below this, re the start, are not compared, in dB: T30 ends there.
+const LOWEST_DB: f64 = -35.0;
+/// Width of the time bins, in seconds.
+const BIN_S: f64 = 1e-3;
+
+/// One measured response against the paths between its source and receiver, in each band.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DecayMisfit {
+    /// T30 of the response, in seconds.
+    pub measured_t30_s: PerBand<Reading>,
+    /// T30 of the paths, in seconds.
+    pub simulated_t30_s: PerBand<Reading>,
+    /// Root mean square difference of the two decay curves, in dB: both start just after the direct sound at 0 dB and are
+    /// compared down to -35 dB or the noise.
+    pub rmse_db: PerBand<Result<f64, NoReading>>,
+    /// The curves compared: time after emission in seconds, measured and simulated level in dB; empty where there are none.
+    pub curves: PerBand<Vec<(f64, f64, f64)>>,
+}
+
+impl DecayMisfit {
+    /// Compares a response with what its paths give with these materials.
+    ///
+    /// # Errors
+    /// For paths and materials that do not belong together or have other bands than the response.
+    pub fn new(
+        pair: MeasuredPair<'_>,
+        time_zero: TimeZero,
+        materials: &[Material],
+        air: &Air,
+    ) -> Result<Self, Error> {
+        check_paths(&[pair.paths], materials)?;
+        let bands = pair.measured.bands();
+        if materials[0].bands() != bands {
+            let (left, right) = (bands, materials[0].bands());
+            return Err(sabine_acoustics::Error::BandMismatch { left, right }.into());
+        }
+        let history = History::new(pair.paths, air, BIN_S);
+        let latency_s = latencies_s(&[pair], std::slice::from_ref(&history), time_zero)[0];
+        let energy = pair.paths.energy_response(materials, air, BIN_S)?;
+        let simulated_t30_s = PerBand::from_fn(bands, |b| {
+            let t30 = energy.decay_curve(b).decay_time_s(-5.0, -35.0)?;
+            Ok(sabine_acoustics::Estimate::exact(t30))
+        });
+        let curves = |b: usize| -> Result<Vec<(f64, f64, f64)>, NoReading> {
+            let decay = pair.measured.band(b).as_ref().map_err(NoReading::clone)?;
+            let remaining = EnergyDecayCurve::from_energy(energy.band(b), BIN_S);
+            let at = |t: f64| -> f64 {
+                // Straight between the edges of bins.
+                let place = (t / BIN_S).max(0.0);
+                let of = |i: usize| remaining.remaining().get(i).copied().unwrap_or(0.0);
+                let (i, part) = (place as usize, place.fract());
+                of(i) * (1.0 - part) + of(i + 1) * part
+            };
+            let start = at(decay.edges_s[0] - latency_s);
+            let level = decay.level_db();
+            let points = decay.edges_s.iter().zip(level).map(|(t, measured)| {
+                let t = t - latency_s;
+                (t, measured, 10.0 * (at(t) / start).log10())
+            });
+            Ok(points.take_while(|p| p.1 >= LOWEST_DB && p.2.is_finite()).collect())
+        };
+        let rmse = |b: usize| {
+            let points = curves(b)?;
+            if points.len() < 3 {
+                return Err(NoReading::NoDecay);
+            }
+            let square: f64 = points.iter().map(|p| (p.1 - p.2).powi(2)).sum();
+            Ok((square / points.len() as f64).sqrt())
+        };
+        Ok(Self {
+            measured_t30_s: pair.measured.t30_s().clone(),
+            simulated_t30_s,
+            rmse_db: PerBand::from_fn(bands, rmse),
+            curves: PerBand::from_fn(bands, |b| curves(b).unwrap_or_default()),
+        })
+    }
+}

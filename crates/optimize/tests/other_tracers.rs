@@ -1,0 +1,245 @@
+//! Synthetic truth: the energy of all image sources of a box (testkit) with the statistics of a diffuse field, fitted on the
+//! paths of a ray tracer. Neither shares code with the other.
+
+// A test that cannot be set up should fail.
+#![allow(clippy::unwrap_used)]
+
+use rand::{Rng, SeedableRng};
+use sabine_acoustics::{
+    Air, EnergyResponse, Estimate, FilterBank, ImpulseResponse, Levels, Material, Measurement, NamedMaterial,
+    OctaveBands, PathSet, PerBand, Propagator, Receiver, Scene, Source, TimeZero, Triangle,
+};
+use sabine_optimize::{
+    AbsorptionPrior, DecayMisfit, Error, FitConfig, MaterialFitter, MeasuredDecay, MeasuredPair, ResponseFit,
+    UndeterminedKind,
+};
+use sabine_propagate::{PathTracer, TracerConfig};
+use sabine_testkit::ShoeboxImages;
+
+const SIZE_M: [f64; 3] = [6.0, 4.5, 3.0];
+const DURATION_S: f64 = 0.7;
+const SOURCES: [[f64; 3]; 3] = [[1.3, 1.1, 1.5], [4.6, 3.2, 1.2], [2.9, 2.4, 2.1]];
+const RECEIVERS: [[f64; 3]; 4] = [[4.9, 1.4, 1.4], [1.6, 3.6, 1.1], [3.4, 0.9, 1.9], [0.8, 2.0, 1.3]];
+
+fn octaves() -> OctaveBands {
+    OctaveBands::new(1000.0, 2000.0).unwrap()
+}
+
+/// The box, its six faces made of the given materials; no scattering, so that image sources are the whole truth.
+fn room(faces: [usize; 6], absorption: &[[f64; 2]]) -> Scene {
+    let material = |a: &[f64; 2]| {
+        let absorption = PerBand::new(octaves(), a.to_vec()).unwrap();
+        Material::new(absorption, PerBand::uniform(octaves(), 0.0)).unwrap()
+    };
+    let plain = Material::uniform(octaves(), 0.1, 0.0).unwrap();
+    let shell = Scene::shoebox(SIZE_M, std::array::from_fn(|_| plain.clone())).unwrap();
+    let triangle = |t: &Triangle| Triangle { material: faces[t.material as usize] as u32, ..*t };
+    let triangles = shell.triangles().iter().map(triangle).collect();
+    let named = absorption.iter().enumerate();
+    let materials =
+        named.map(|(k, a)| NamedMaterial { name: format!("m{k}"), material: material(a) }).collect();
+    Scene::new(shell.vertices().to_vec(), triangles, materials).unwrap()
+}
+
+/// Gaussian noise at 8 kHz whose energy follows an energy response in bins of 1 ms: what a diffuse field makes of it.
+fn noise_under(energy: &EnergyResponse, seed: u64) -> Vec<f32> {
+    let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
+    let mut normal = || {
+        let (u, v): (f64, f64) = (random.random(), random.random());
+        ((-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()) as f32
+    };
+    let white: Vec<f32> = (0..8 * energy.bins()).map(|_| normal()).collect();
+    let bands = FilterBank::new(octaves(), 8000).unwrap().split(&white);
+    let at = |i: usize| {
+        let shaped = |b: usize| bands.values()[b][i] * (energy.band(b)[i / 8] / 8.0).sqrt() as f32;
+        shaped(0) + shaped(1)
+    };
+    (0..white.len()).map(at).collect()
+}
+
+/// Walls, floor and ceiling. The walls, which carry the late decay, are alike in both octaves: else what the filter lets pass of a
+/// neighbour that rings longer is what is heard late.
+const THREE: [[f64; 2]; 3] = [[0.12, 0.12], [0.3, 0.35], [0.25, 0.2]];
+
+struct Measured {
+    decay: MeasuredDecay,
+    paths: PathSet,
+}
+
+fn tracer(rays: usize, seed: u64) -> PathTracer {
+    PathTracer::new(TracerConfig { rays, duration_s: DURATION_S, seed, ..TracerConfig::default() }).unwrap()
+}
+
+/// The response of the true room by image sources, scaled and delayed, and the paths of a tracer, which do not depend on
+/// absorption.
+fn measure(
+    truth: &Scene,
+    source: [f64; 3],
+    receiver: [f64; 3],
+    seed: u64,
+    gain: f32,
+    delay: usize,
+) -> Measured {
+    let (source, receiver) = (Source::omni("s", source).unwrap(), Receiver::omni("r", receiver).unwrap());
+    let air = Air::default();
+    let images = ShoeboxImages::new(DURATION_S).unwrap();
+    let energy = images.energy_response(truth, &source, &receiver, Some(&air), 1e-3).unwrap();
+    let response = noise_under(&energy, seed);
+    let mut samples = vec![0.0; delay];
+    samples.extend(response.iter().map(|s| gain * s));
+    let response = ImpulseResponse::new(samples, 8000).unwrap();
+    let paths = tracer(8_000, seed).trace(truth, &source, &receiver, &air, &()).unwrap();
+    Measured { decay: MeasuredDecay::new(&response, octaves()).unwrap(), paths }
+}
+
+fn fit(
+    truth: &Scene,
+    measured: &[Measured],
+    levels: Levels,
+    time_zero: TimeZero,
+    prior: (f64, f64),
+) -> ResponseFit {
+    let guess = vec![Material::uniform(octaves(), prior.0, 0.0).unwrap(); truth.materials().len()];
+    let priors = vec![AbsorptionPrior::uniform(octaves(), prior.0, prior.1); guess.len()];
+    let pairs: Vec<MeasuredPair<'_>> =
+        measured.iter().map(|m| MeasuredPair { measured: &m.decay, paths: &m.paths }).collect();
+    let measurement = Measurement { time_zero, levels };
+    MaterialFitter::new(FitConfig::default())
+        .unwrap()
+        .fit_responses(&pairs, measurement, &guess, &priors, &Air::default(), &())
+        .unwrap()
+}
+
+fn errors(truth: &Scene, fit: &ResponseFit) -> Vec<Vec<(f64, f64)>> {
+    let of = |(k, named): (usize, &NamedMaterial)| {
+        let found = fit.fit.materials[k].absorption().values();
+        let error = fit.fit.absorption_standard_error[k].values();
+        let truth = named.material.absorption().values();
+        (0..2).map(|b| (found[b] - truth[b], error[b])).collect()
+    };
+    truth.materials().iter().enumerate().map(of).collect()
+}
+
+#[test]
+fn one_material_from_the_reverberation_time_of_another_tracer() {
+    let truth = room([0; 6], &[[0.2, 0.3]]);
+    let (source, receiver) =
+        (Source::omni("s", SOURCES[0]).unwrap(), Receiver::omni("r", RECEIVERS[0]).unwrap());
+    let air = Air::default();
+    let energy =
+        ShoeboxImages::new(DURATION_S).unwrap().energy_response(&truth, &source, &receiver, Some(&air), 1e-3);
+    let energy = energy.unwrap();
+    let t30 = |b| Estimate::exact(energy.decay_curve(b).decay_time_s(-5.0, -35.0).unwrap());
+    let target = PerBand::from_fn(octaves(), t30);
+    let paths = tracer(100_000, 3).trace(&truth, &source, &receiver, &air, &()).unwrap();
+    let guess = Material::uniform(octaves(), 0.1, 0.0).unwrap();
+    let prior = AbsorptionPrior::uniform(octaves(), 0.1, 0.3);
+    let fit = MaterialFitter::new(FitConfig::default())
+        .unwrap()
+        .fit_t60(&[&paths], &[guess], &[prior], &air, &target, &())
+        .unwrap();
+    let found = fit.materials[0].absorption().values();
+    let error = ((found[0] - 0.2).abs() + (found[1] - 0.3).abs()) / 2.0;
+    println!("one material: mean absolute error {error:.5}");
+    assert!(error < 0.0013, "{found:?}");
+}
+
+#[test]
+fn three_materials_from_two_receivers_are_covered_by_their_intervals() {
+    // Walls, floor, ceiling: x0, x1, y0, y1, floor, ceiling.
+    let truth = room([0, 0, 0, 0, 1, 2], &THREE);
+    let measured: Vec<Measured> =
+        (0..2).map(|i| measure(&truth, SOURCES[0], RECEIVERS[i], i as u64, 1.0, 0)).collect();
+    let fit = fit(&truth, &measured, Levels::Common, TimeZero::Emission, (0.2, 0.15));
+    let errors = errors(&truth, &fit);
+    println!("three materials: {errors:.3?}, dispersion {:?}", fit.dispersion.values());
+    for (error, standard_error) in errors.iter().flatten() {
+        assert!(error.abs() < 3.0 * standard_error, "{errors:?}");
+    }
+    // Every material whose interval is no narrower than half its prior's is named.
+    for (k, errors) in fit.fit.absorption_standard_error.iter().enumerate() {
+        for (band_hz, error) in errors.iter().filter(|(_, e)| **e > 0.55 * 0.15) {
+            let named = |u: &sabine_optimize::Undetermined| {
+                u.kind != UndeterminedKind::NeverHit
+                    && u.materials.contains(&k)
+                    && u.bands_hz.contains(&band_hz)
+            };
+            assert!(fit.fit.not_determined.iter().any(named), "{k} at {band_hz} Hz: {error}");
+        }
+    }
+}
+
+#[test]
+#[ignore = "takes minutes, and misses its goal: docs/validation/optimize.md"]
+fn twelve_pairs_tell_the_large_surfaces() {
+    let absorption = [[0.1, 0.15], [0.2, 0.1], [0.3, 0.25], [0.12, 0.2], [0.35, 0.45], [0.15, 0.3]];
+    let truth = room([0, 1, 2, 3, 4, 5], &absorption);
+    let mut measured = Vec::new();
+    for (s, source) in SOURCES.iter().enumerate() {
+        for (r, receiver) in RECEIVERS.iter().enumerate() {
+            measured.push(measure(&truth, *source, *receiver, (4 * s + r) as u64, 1.0, 0));
+        }
+    }
+    let fit = fit(&truth, &measured, Levels::Common, TimeZero::Emission, (0.2, 0.2));
+    let errors = errors(&truth, &fit);
+    let areas = truth.material_areas_m2();
+    let total: f64 = areas.iter().sum();
+    let large = (0..6).filter(|&k| areas[k] > 0.15 * total);
+    let of_large: Vec<f64> = large.flat_map(|k| errors[k].iter().map(|e| e.0.abs())).collect();
+    let mean = of_large.iter().sum::<f64>() / of_large.len() as f64;
+    println!("twelve pairs: mean absolute error {mean:.4} of the large surfaces; {errors:.3?}");
+    assert!(mean < 0.02, "{errors:?}");
+}
+
+#[test]
+fn gains_latencies_and_held_out_places() {
+    let truth = room([0, 0, 0, 0, 1, 2], &THREE);
+    let gains = [0.1, 2.0, 30.0];
+    let measured: Vec<Measured> = (0..3)
+        .map(|i| measure(&truth, SOURCES[1], RECEIVERS[i], 20 + i as u64, gains[i], 400 * (i + 1)))
+        .collect();
+    let held_out = &measured[2];
+    let fit = fit(&truth, &measured[..2], Levels::PerResponse, TimeZero::PerResponse, (0.45, 0.2));
+    for (gain, expected) in fit.gain_db.iter().zip(gains) {
+        for found in gain.values() {
+            let wanted = 20.0 * f64::from(expected).log10();
+            // Floor and ceiling are hardly known here, and with them the level of the paths.
+            assert!((found.unwrap() - wanted).abs() < 3.0, "{found:?} dB for {wanted}");
+        }
+    }
+    let pair = MeasuredPair { measured: &held_out.decay, paths: &held_out.paths };
+    let misfit = |materials: &[Material]| {
+        let m = DecayMisfit::new(pair, TimeZero::PerResponse, materials, &Air::default()).unwrap();
+        m.rmse_db.values().iter().map(|r| r.clone().unwrap()).sum::<f64>() / 2.0
+    };
+    let guess = vec![Material::uniform(octaves(), 0.45, 0.0).unwrap(); 3];
+    let (before, after) = (misfit(&guess), misfit(&fit.fit.materials));
+    println!("held out: decay curve {before:.2} dB before, {after:.2} dB after");
+    // A time constant of 36 ms in an octave of 707 Hz holds 25 independent values: 0.9 dB of chance in the response alone, more
+    // where its decay ends.
+    assert!(after < 2.0 && before > 3.0 * after, "{before} {after}");
+}
+
+#[test]
+fn responses_that_say_nothing_are_refused() {
+    let silent = ImpulseResponse::new(vec![0.0; 4000], 8000).unwrap();
+    assert!(matches!(MeasuredDecay::new(&silent, octaves()), Err(Error::NoOnset { .. })));
+    // A click: an onset, but no decay in any band.
+    let truth = room([0; 6], &[[0.2, 0.3]]);
+    let mut click = vec![0.0; 4000];
+    click[500] = 1.0;
+    let click = MeasuredDecay::new(&ImpulseResponse::new(click, 8000).unwrap(), octaves()).unwrap();
+    let paths = measure(&truth, SOURCES[0], RECEIVERS[0], 1, 1.0, 0).paths;
+    let guess = [Material::uniform(octaves(), 0.1, 0.0).unwrap()];
+    let priors = [AbsorptionPrior::uniform(octaves(), 0.1, 0.1)];
+    let measurement = Measurement { time_zero: TimeZero::Emission, levels: Levels::Absolute };
+    let fitter = MaterialFitter::new(FitConfig::default()).unwrap();
+    let pair = MeasuredPair { measured: &click, paths: &paths };
+    let error =
+        fitter.fit_responses(&[pair], measurement, &guess, &priors, &Air::default(), &()).unwrap_err();
+    assert!(matches!(error, Error::NoDecay { responses: 1, bands: 2 }), "{error}");
+    assert!(matches!(
+        fitter.fit_responses(&[], measurement, &guess, &priors, &Air::default(), &()),
+        Err(Error::NoPaths { .. })
+    ));
+}

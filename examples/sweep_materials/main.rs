@@ -1,0 +1,254 @@
+//! How near fitted rooms come to the reverberation times asked for: five rooms, T60 from 0.2 to 2.5 s, seven octaves.
+//!
+//! Fits materials of which nothing is known, renders a response from rays and noise that the fit has not seen, and reads T30
+//! from it as ISO 3382 does. Writes the tables and plots of `docs/validation/optimize.md`.
+
+mod plots;
+mod rooms;
+
+use clap::Parser;
+use rooms::{Room, rooms};
+use sabine::acoustics::{
+    Air, Error as AcousticsError, Estimate, Material, MaterialPrior, OctaveBands, PathSet, PerBand,
+    Propagator, Reading, RoomParameters,
+};
+use sabine::optimize::{
+    AbsorptionPrior, FitConfig, MaterialFit, MaterialFitter, Retrace, RetraceConfig, SlopeObjective,
+};
+use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
+use sabine_examples::OutputFolder;
+use serde::Serialize;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+type AnyError = Box<dyn std::error::Error + Send + Sync>;
+
+/// Sweep reverberation times over five rooms and compare the three objectives.
+#[derive(Parser)]
+struct Arguments {
+    /// Reverberation times to ask for, in seconds
+    #[arg(long, value_delimiter = ',', default_value = "0.2,0.3,0.45,0.65,0.95,1.4,2.0,2.5")]
+    targets: Vec<f64>,
+    /// Rays of the first trace of every fit; more follow where they are needed
+    #[arg(long, default_value_t = 20_000)]
+    rays: usize,
+    /// Relative Monte-Carlo error of T60 that is aimed at
+    #[arg(long, default_value_t = 0.01)]
+    t60_error: f64,
+    /// Only the rooms whose name contains this
+    #[arg(long, default_value = "")]
+    room: String,
+    /// Expect of the materials what the library says, with a standard deviation of 0.1, instead of nothing
+    #[arg(long)]
+    tables: bool,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/sweep_materials")]
+    out: PathBuf,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// What is fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Method {
+    /// The decay curve, traced until verified, aimed at what is read from the rendered response.
+    Edc,
+    /// The decay curve on the first trace alone.
+    EdcOnce,
+    /// The paper's line through the paths that `edc` rests on.
+    Paper,
+    /// Li's.
+    Li2018,
+}
+
+/// One octave of one fit.
+#[derive(Clone, Debug, Serialize)]
+struct Point {
+    room: &'static str,
+    method: Method,
+    target_s: f64,
+    band_hz: f64,
+    reachable: bool,
+    /// T30 of the energy that independent rays give, in seconds.
+    energy_s: Option<f64>,
+    /// T30 of the response rendered from them, in seconds.
+    rendered_s: Option<f64>,
+    /// Monte-Carlo error of T60 on the paths of the fit, relative.
+    fit_error: Option<f64>,
+}
+
+#[derive(Clone, Debug, Serialize)]
+struct Run {
+    room: &'static str,
+    target_s: f64,
+    rounds: usize,
+    paths: usize,
+    trace_s: f64,
+    fit_s: f64,
+    single_fit_s: f64,
+}
+
+fn run(arguments: &Arguments) -> Result<(), AnyError> {
+    let mut out = OutputFolder::create(&arguments.out)?;
+    let (mut points, mut runs) = (Vec::new(), Vec::new());
+    for room in rooms()?.iter().filter(|room| room.name.contains(&arguments.room)) {
+        println!(
+            "{}: {:.0} m3, {:.0} m2, {} materials",
+            room.name,
+            room.scene.volume_m3(),
+            room.scene.surface_m2(),
+            room.scene.materials().len()
+        );
+        for &target_s in &arguments.targets {
+            let run = fit_room(room, target_s, arguments, &mut points)?;
+            let errors = |of: fn(&Point) -> Option<f64>| -> String {
+                let mine = points.iter().filter(|p: &&Point| {
+                    (p.room, p.target_s, p.method) == (room.name, target_s, Method::Edc)
+                });
+                mine.map(|p| match of(p).filter(|_| p.reachable) {
+                    Some(t) => format!("{:>6.1}", 100.0 * (t / target_s - 1.0)),
+                    None => "     -".to_owned(),
+                })
+                .collect()
+            };
+            println!(
+                "{target_s:.2} s, {} rounds, {:.1} M paths, {:.1} s + {:.1} s; energy {}; rendered {} %",
+                run.rounds,
+                run.paths as f64 / 1e6,
+                run.trace_s,
+                run.fit_s,
+                errors(|p| p.energy_s),
+                errors(|p| p.rendered_s)
+            );
+            runs.push(run);
+        }
+    }
+    let tables = plots::tables(&points);
+    println!("\n{tables}");
+    out.write("tables.md", tables.as_bytes())?;
+    out.write("sweep.json", serde_json::to_string_pretty(&(&points, &runs))?.as_bytes())?;
+    out.write("optimize_t60.svg", plots::reached(&points)?.as_bytes())?;
+    out.write("optimize_error.svg", plots::errors(&points)?.as_bytes())?;
+    out.finish()?;
+    Ok(())
+}
+
+/// A room that can be traced again, and in which T30 is read from what is rendered.
+struct Traced<'a> {
+    room: &'a Room,
+    air: Air,
+    rays: usize,
+    duration_s: f64,
+    noise_seed: u64,
+}
+
+impl Traced<'_> {
+    fn read(&self, paths: &PathSet, materials: &[Material]) -> Result<PerBand<Reading>, AcousticsError> {
+        let failed = |e: sabine::propagate::Error| AcousticsError::implementation("rendering", e);
+        let config =
+            RenderConfig { sample_rate_hz: 32_000, seed: self.noise_seed, ..RenderConfig::default() };
+        let renderer = PressureRenderer::new(config).map_err(failed)?;
+        let response = renderer.render(paths, materials, &self.air).map_err(failed)?;
+        Ok(RoomParameters::measure(&response, OctaveBands::T60)?.t30_s)
+    }
+}
+
+impl Retrace for Traced<'_> {
+    fn trace(&self, seed: u64, effort: f64) -> Result<Vec<PathSet>, AcousticsError> {
+        let rays = (effort * self.rays as f64).ceil() as usize;
+        let config = TracerConfig { rays, duration_s: self.duration_s, seed, ..TracerConfig::default() };
+        let tracer = PathTracer::new(config).map_err(|e| AcousticsError::implementation("tracing", e))?;
+        let Room { scene, source, receiver, .. } = self.room;
+        Ok(vec![tracer.trace(scene, source, receiver, &self.air, &())?])
+    }
+
+    fn read_t60_s(
+        &self,
+        paths: &[PathSet],
+        materials: &[Material],
+    ) -> Result<Option<PerBand<Reading>>, AcousticsError> {
+        self.read(&paths[0], materials).map(Some)
+    }
+}
+
+fn fit_room(
+    room: &Room,
+    target_s: f64,
+    arguments: &Arguments,
+    points: &mut Vec<Point>,
+) -> Result<Run, AnyError> {
+    let octaves = OctaveBands::T60;
+    let materials: Vec<Material> = room.scene.materials().iter().map(|m| m.material.clone()).collect();
+    let prior = |material: &Material| {
+        if arguments.tables {
+            let standard_deviation = PerBand::uniform(octaves, MaterialPrior::TABLE_SD);
+            return AbsorptionPrior { mean: material.absorption().clone(), standard_deviation };
+        }
+        let (mean, sd) = (MaterialPrior::UNKNOWN_ABSORPTION, MaterialPrior::UNKNOWN_ABSORPTION_SD);
+        AbsorptionPrior::uniform(octaves, mean, sd)
+    };
+    let priors: Vec<AbsorptionPrior> = materials.iter().map(prior).collect();
+    let targets = PerBand::uniform(octaves, Estimate::exact(target_s));
+    let air = Air::default();
+    let traced = Traced { room, air, rays: arguments.rays, duration_s: 1.25 * target_s, noise_seed: 1 };
+    let fitter = |objective| MaterialFitter::new(FitConfig { objective, ..FitConfig::default() });
+
+    let config = RetraceConfig { seed: 1, t60_error: arguments.t60_error, ..RetraceConfig::default() };
+    let edc = fitter(SlopeObjective::DecayCurve)?.fit_t60_retracing(
+        &traced,
+        &materials,
+        &priors,
+        &air,
+        &targets,
+        &config,
+        &(),
+    )?;
+    // Rays and noise that nothing was chosen by.
+    let total: usize = edc.fitted_paths.iter().map(|(_, sets)| sets[0].len()).sum();
+    let effort = edc.independent_paths[0].len() as f64 / edc.fitted_paths[0].1[0].len() as f64;
+    let other = &traced.trace(1_000, effort)?[0];
+    let listener = Traced { noise_seed: 2, ..traced };
+    let all: Vec<&PathSet> = edc.fitted_paths.iter().map(|(_, sets)| &sets[0]).collect();
+    let mut single_fit_s = 0.0;
+    let mut single = |objective, paths: &[&PathSet]| -> Result<MaterialFit, AnyError> {
+        let start = Instant::now();
+        let fit = fitter(objective)?.fit_t60(paths, &materials, &priors, &air, &targets, &())?;
+        single_fit_s = start.elapsed().as_secs_f64();
+        Ok(fit)
+    };
+    let fits = [
+        (Method::Paper, single(SlopeObjective::Paper, &all)?),
+        (Method::Li2018, single(SlopeObjective::Li2018, &all)?),
+        (Method::EdcOnce, single(SlopeObjective::DecayCurve, &all[..1])?),
+        (Method::Edc, edc.fit),
+    ];
+    for (method, fit) in fits {
+        let energy = other.energy_response(&fit.materials, &air, 1e-3)?;
+        let rendered = listener.read(other, &fit.materials)?;
+        for b in 0..octaves.len() {
+            let band_hz = octaves.nominal_hz(b);
+            points.push(Point {
+                room: room.name,
+                method,
+                target_s,
+                band_hz,
+                reachable: fit.unreachable.iter().all(|u| u.band_hz != band_hz),
+                energy_s: energy.decay_curve(b).decay_time_s(-5.0, -35.0).ok(),
+                rendered_s: rendered.values()[b].as_ref().ok().map(|t| t.value),
+                fit_error: fit.predicted_t60_s.values()[b].as_ref().ok().map(|t| t.standard_error / t.value),
+            });
+        }
+    }
+    let (trace_s, fit_s) = edc.seconds;
+    Ok(Run { room: room.name, target_s, rounds: edc.rounds, paths: total, trace_s, fit_s, single_fit_s })
+}
