@@ -73,16 +73,19 @@ mod drr;
 mod eq;
 mod eq_statistics;
 mod error;
+mod floor_plan;
 mod labels;
 mod manifest;
 mod noise;
 mod partition;
 mod plan;
+mod polyhedral_room;
 mod seed;
 mod shard;
 mod spectral_shape;
 mod synthetic;
 mod t60;
+mod traced_rooms;
 
 pub use chain::{AugmentedResponse, Chain};
 pub use clip::ClipConfig;
@@ -90,7 +93,7 @@ pub use corpus::{
     LeftOut, MeasuredResponse, NoiseCorpus, ResponseCorpus, ResponseFilter, SourceFile, SpeechCorpus,
 };
 pub use dataset::DatasetBuilder;
-pub use dataset_config::{Built, DatasetConfig, Worker};
+pub use dataset_config::{Built, DatasetConfig, DatasetSources, Worker};
 pub use drr::{DrrAugment, DrrConfig};
 pub use eq::{EqAugment, EqConfig};
 pub use eq_statistics::EqStatistics;
@@ -98,6 +101,8 @@ pub use error::Error;
 pub use labels::Labels;
 pub use manifest::{DATASET_FORMAT, Manifest, ShardEntry};
 pub use partition::{Partition, PartitionConfig};
+pub use polyhedral_room::{PolyhedralRoom, PolyhedralRoomConfig};
 pub use shard::{Distribution, LabelStatistics};
 pub use synthetic::{SyntheticRoomConfig, SyntheticRooms};
 pub use t60::{T60Augment, T60Config};
+pub use traced_rooms::{RenderPaths, RoomCache, TracedRooms};
