@@ -153,6 +153,9 @@ impl T60Augment {
                 *own = (*own / ratio.clamp(1.0 / LARGEST_CORRECTION, LARGEST_CORRECTION))
                     .clamp(factor / LARGEST_CORRECTION, factor * LARGEST_CORRECTION);
             }
+            // What the lowest octave leaks into the next is read there: it is corrected alike.
+            factors[0] = factors[1];
+            best[0] = best[1];
             if worst < TOLERANCE || (round == CORRECTIONS && best.iter().all(|b| b.0 == f64::INFINITY)) {
                 return Ok(changed);
             }
@@ -271,9 +274,6 @@ impl Octaves {
                 .filter_map(|other| self.fits[other].as_ref().ok().map(|f| (band.abs_diff(other), f)))
                 .min_by_key(|(far, _)| *far);
             let Some((_, fit)) = nearest else { continue };
-            if !own && factor > 1.0 {
-                continue;
-            }
             let change = Change::new(fit, factors[band], crossfade_s, own, &self.parts[band], self.rate);
             change.apply(&self.parts[band], &noises[band], self.direct.end, self.rate, &mut sum);
         }
@@ -304,6 +304,9 @@ struct Change<'a> {
     level: f64,
     /// Begin and end of the cross-fade to noise, s; none where the recording goes on to its end.
     crossfade_s: Option<(f64, f64)>,
+    /// For an octave without a decay of its own that is lengthened: when it begins to fade, s. It must not grow, but neither
+    /// must its noise outlast its neighbour, in which it would be read.
+    recede_s: Option<f64>,
 }
 
 impl<'a> Change<'a> {
@@ -316,6 +319,7 @@ impl<'a> Change<'a> {
             if fit.decay_power_at(middle) > margin * fit.noise_power() { low = middle } else { high = middle }
         }
         let crossfade_s = own.then(|| ((low - crossfade_s).max(fit.start_s()), low));
+        let recede_s = (!own && factor > 1.0).then_some(low);
         // The ratio that meets most of the decay best: of each sample's power to that of the fit.
         let first = (fit.start_s() * rate) as usize;
         let last = ((low * rate) as usize).min(part.len());
@@ -324,7 +328,7 @@ impl<'a> Change<'a> {
             f64::from(s).powi(2) / (fit.decay_power_at(t) + fit.noise_power())
         });
         let level = ratios.sum::<f64>() / last.saturating_sub(first).max(1) as f64;
-        Self { fit, factor, level, crossfade_s }
+        Self { fit, factor, level, crossfade_s, recede_s }
     }
 
     /// Power of the decay wanted at a time, on the scale of the fit.
@@ -352,6 +356,11 @@ impl<'a> Change<'a> {
                 Some((begin, end)) => ((t - begin) / (end - begin).max(1e-9)).clamp(0.0, 1.0),
                 None => 0.0,
             };
+            if let Some(begin) = self.recede_s {
+                let gain = (self.wanted_power_at(t.max(begin)) / self.wanted_power_at(begin)).sqrt();
+                *total += (gain - 1.0) * recorded;
+                continue;
+            }
             // Recording and noise are uncorrelated: their powers add up to one.
             let angle = std::f64::consts::FRAC_PI_2 * fade;
             let mut changed = 0.0;
