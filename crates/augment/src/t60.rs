@@ -61,8 +61,11 @@ impl Default for T60Config {
 /// this makes, so that where nothing changes nothing is touched.
 ///
 /// The full band begins at 88 Hz: below, the rumble of a recording would be read. An octave in which no decay can be read
-/// fades with the nearest octave that has one where the decay is shortened, and stays as it is where it is lengthened: its
-/// noise would grow.
+/// fades with the nearest octave that has one: where the decay is lengthened it does not grow, but its noise recedes as the
+/// neighbour's does.
+///
+/// The result is measured as labels are, and the factor of an octave that is off corrected: what an octave's filter hears of
+/// its neighbours, and the luck of a few modes, would otherwise stay in it.
 #[derive(Clone, Debug)]
 pub struct T60Augment {
     config: T60Config,
