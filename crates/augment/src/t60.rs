@@ -139,7 +139,7 @@ impl T60Augment {
         let noises = octaves.noises(length, seed);
         // For each octave the factor that came nearest, and how near.
         let mut best = vec![(f64::INFINITY, factor); factors.len()];
-        for round in 0..=CORRECTIONS {
+        for _ in 0..=CORRECTIONS {
             let changed = octaves.changed(response, factor, &factors, &noises, self.config.crossfade_s)?;
             let after = decay_times(&changed)?;
             let mut worst = 0.0_f64;
@@ -159,7 +159,7 @@ impl T60Augment {
             // What the lowest octave leaks into the next is read there: it is corrected alike.
             factors[0] = factors[1];
             best[0] = best[1];
-            if worst < TOLERANCE || (round == CORRECTIONS && best.iter().all(|b| b.0 == f64::INFINITY)) {
+            if worst < TOLERANCE {
                 return Ok(changed);
             }
         }

@@ -70,7 +70,7 @@ fn reverberation_times_of_measured_responses_meet_their_targets() {
                 continue;
             };
             // The direct sound and all before it stay to the bit.
-            let peak = changed_before(&measured.response);
+            let peak = peak_index(&measured.response);
             assert_eq!(changed.samples()[..peak + 40], measured.response.samples()[..peak + 40]);
             for (octave, (before, after)) in before.iter().zip(times(&changed)).enumerate() {
                 let Some(before) = before else { continue };
@@ -129,7 +129,7 @@ fn reverberation_times_of_measured_responses_meet_their_targets() {
 }
 
 /// Index of the largest sample: the direct sound reaches 40 samples (2.5 ms) beyond it.
-fn changed_before(response: &ImpulseResponse) -> usize {
+fn peak_index(response: &ImpulseResponse) -> usize {
     response.samples().iter().position(|s| s.abs() == response.peak()).unwrap()
 }
 
@@ -189,7 +189,7 @@ fn ratio_and_equalisation_of_measured_responses_meet_their_targets() {
     let (mut met, mut refused) = ([0, 0], [0, 0]);
     for (i, measured) in few_of_each(&corpus).into_iter().enumerate() {
         let response = &measured.response;
-        let end = changed_before(response) + 41;
+        let end = peak_index(response) + 41;
         for target_db in [-6.0, 0.0, 6.0, 12.0, 18.0] {
             let Ok(changed) = drr.to_db(response, target_db) else {
                 refused[0] += 1;
