@@ -119,7 +119,7 @@ impl T60Augment {
         Ok(fit.t60_s().value)
     }
 
-    /// The response with the reverberation time of every octave times `factor`, as [`Labels::measure`] reads it before and
+    /// The response with the reverberation time of every octave times `factor`, as [`crate::Labels::measure`] reads it before and
     /// after: what is off by more than 2 % is corrected, at most twice.
     ///
     /// # Errors
