@@ -2,10 +2,14 @@
 
 use clap::Parser;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
-use sabine::augment::{
-    Built, DatasetBuilder, DatasetConfig, Error, Manifest, NoiseCorpus, Partition, ResponseCorpus,
-    ResponseFilter, SpeechCorpus, Worker,
+use sabine::acoustics::{
+    Air, DiffuseRoom, Material, Observer, OctaveBands, PathSet, Propagator, Receiver, Scene, Source,
 };
+use sabine::augment::{
+    Built, DatasetBuilder, DatasetConfig, DatasetSources, Error, Manifest, NoiseCorpus, Partition,
+    PolyhedralRoomConfig, ResponseCorpus, ResponseFilter, RoomCache, SpeechCorpus, TracedRooms, Worker,
+};
+use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -25,6 +29,13 @@ struct Arguments {
     /// Folder of noise.
     #[arg(long)]
     noise: Option<PathBuf>,
+    /// Polyhedral rooms to draw and trace as a further source of responses: none, or three at least. Their responses are
+    /// kept in OUT/rooms for other workers and for the next time.
+    #[arg(long, default_value_t = 0)]
+    rooms: usize,
+    /// Rays for each of these rooms.
+    #[arg(long, default_value_t = 3000)]
+    rays: usize,
     /// Folder to write to.
     #[arg(long)]
     out: PathBuf,
@@ -140,12 +151,15 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         Some(folder) => NoiseCorpus::read(folder, rate_hz, &observer)?,
         None => NoiseCorpus::default(),
     };
-    for (what, left_out) in [("speech", speech.left_out()), ("response", responses.left_out())] {
+    let traced = traced_rooms(arguments, rate_hz, &filter, &observer)?;
+    for (what, left_out) in
+        [("speech", speech.left_out()), ("response", responses.left_out()), ("room", traced.left_out())]
+    {
         for file in left_out {
             bar.suspend(|| eprintln!("left out: {what} {}: {}", file.path, file.reason));
         }
     }
-    let builder = DatasetBuilder::new(config, speech, responses, noise)?;
+    let builder = DatasetBuilder::new(config, DatasetSources { speech, responses, traced, noise })?;
     for partition in Partition::ALL {
         let of = |dealt: &std::collections::BTreeMap<String, Partition>| {
             dealt
@@ -162,6 +176,63 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     bar.finish_and_clear();
     tell(&built, start);
     Ok(())
+}
+
+/// A path tracer that follows each room's paths for as long as the room needs.
+struct RoomTracer {
+    config: TracerConfig,
+}
+
+/// Paths are followed for so many reverberation times by Eyring: uneven rooms ring longer than he says.
+const TIMES_EYRING: f64 = 1.2;
+/// Range of that duration, s.
+const DURATION_S: (f64, f64) = (0.3, 2.4);
+
+impl Propagator for RoomTracer {
+    fn trace(
+        &self,
+        scene: &Scene,
+        source: &Source,
+        receiver: &Receiver,
+        air: &Air,
+        observer: &dyn Observer,
+    ) -> Result<PathSet, sabine::acoustics::Error> {
+        let rooms = DiffuseRoom::of_scene(scene, air, OctaveBands::SIMULATION)?;
+        let longest_s = rooms.values().iter().map(DiffuseRoom::eyring_t60_s).fold(0.0, f64::max);
+        let duration_s = (TIMES_EYRING * longest_s).clamp(DURATION_S.0, DURATION_S.1);
+        PathTracer::new(TracerConfig { duration_s, ..self.config.clone() })?
+            .trace(scene, source, receiver, air, observer)
+    }
+}
+
+/// Draws, traces and renders the rooms of `--rooms`.
+fn traced_rooms(
+    arguments: &Arguments,
+    rate_hz: u32,
+    filter: &ResponseFilter,
+    observer: &dyn Observer,
+) -> Result<ResponseCorpus, Error> {
+    if arguments.rooms == 0 {
+        return Ok(ResponseCorpus::default());
+    }
+    let tracer = RoomTracer { config: TracerConfig { rays: arguments.rays, ..TracerConfig::default() } };
+    let rendering = RenderConfig { sample_rate_hz: rate_hz, ..RenderConfig::default() };
+    let render = |paths: &PathSet, scene: &Scene, air: &Air, seed: u64| {
+        let materials: Vec<Material> = scene.materials().iter().map(|m| m.material.clone()).collect();
+        let renderer = PressureRenderer::new(RenderConfig { seed, ..rendering.clone() })?;
+        Ok(renderer.render(paths, &materials, air)?)
+    };
+    let cache = RoomCache {
+        folder: arguments.out.join("rooms"),
+        tracer: format!("{:?} {rendering:?} {TIMES_EYRING} {DURATION_S:?}", tracer.config),
+    };
+    TracedRooms::new(PolyhedralRoomConfig::default(), &tracer, &render)?.corpus(
+        arguments.rooms,
+        arguments.seed,
+        filter,
+        Some(&cache),
+        observer,
+    )
 }
 
 fn tell(built: &Built, start: Instant) {

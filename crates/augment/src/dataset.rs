@@ -2,10 +2,8 @@
 
 use crate::chain::Chain;
 use crate::clip::{ClipMaker, ClipScratch};
-use crate::corpus::{
-    MeasuredResponse, NoiseCorpus, ResponseCorpus, SpeechCorpus, Utterance, hash_bytes, hash_file,
-};
-use crate::dataset_config::{Built, DatasetConfig, Worker};
+use crate::corpus::{MeasuredResponse, ResponseCorpus, SpeechCorpus, Utterance, hash_bytes, hash_file};
+use crate::dataset_config::{Built, DatasetConfig, DatasetSources, Worker};
 use crate::error::{Error, check};
 use crate::labels::Labels;
 use crate::manifest::{DATASET_FORMAT, Manifest, ShardEntry, read_json, write_json};
@@ -16,6 +14,7 @@ use crate::shard::{LabelStatistics, ShardContent};
 use crate::synthetic::SyntheticRooms;
 use half::f16;
 use rand::Rng;
+use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use sabine_acoustics::{Augment, ImpulseResponse, Observer, OctaveBands, report};
 use std::collections::BTreeMap;
@@ -31,9 +30,7 @@ pub struct DatasetBuilder {
     maker: ClipMaker,
     synthetic: SyntheticRooms,
     chain: Chain,
-    speech: SpeechCorpus,
-    responses: ResponseCorpus,
-    noise: NoiseCorpus,
+    sources: DatasetSources,
     refused: AtomicU64,
 }
 
@@ -50,23 +47,22 @@ impl DatasetBuilder {
     /// # Errors
     /// [`Error::Setting`], [`Error::Leak`], [`Error::Unknown`], [`Error::TooFew`] as [`PartitionConfig::deal`]; a sample rate
     /// of the responses other than that of the features.
-    pub fn new(
-        config: DatasetConfig,
-        speech: SpeechCorpus,
-        responses: ResponseCorpus,
-        noise: NoiseCorpus,
-    ) -> Result<Self, Error> {
+    pub fn new(config: DatasetConfig, sources: DatasetSources) -> Result<Self, Error> {
+        let DatasetSources { speech, responses, traced, noise } = &sources;
         check("shard_clips", config.shard_clips as f64, 1.0, 65_536.0, "between 1 and 65536")?;
         check("clips_per_response", config.clips_per_response as f64, 1.0, 64.0, "between 1 and 64")?;
         for fraction in config.measured_fraction {
             check("measured_fraction", fraction, 0.0, 1.0, "between 0 and 1")?;
+        }
+        for fraction in config.traced_fraction {
+            check("traced_fraction", fraction, 0.0, 1.0, "between 0 and 1")?;
         }
         for clips in config.clips {
             check("clips", clips as f64, 0.0, 1e9, "at most a thousand million")?;
         }
         let maker = ClipMaker::new(config.clip.clone(), config.synthetic.longest_s.max(2.5))?;
         let synthetic = SyntheticRooms::new(config.synthetic.clone())?;
-        for response in &responses.responses {
+        for response in responses.responses.iter().chain(&traced.responses) {
             if response.response.sample_rate_hz() != maker.sample_rate_hz() {
                 return Err(Error::SampleRate {
                     expected_hz: maker.sample_rate_hz(),
@@ -85,6 +81,12 @@ impl DatasetBuilder {
         } else {
             config.rooms.deal("room", "three partitions", &responses.rooms(), derive(config.seed, 12))?
         };
+        let traced_rooms = if traced.responses.is_empty() {
+            BTreeMap::new()
+        } else {
+            let seed = derive(config.seed, 14);
+            PartitionConfig::default().deal("traced room", "three partitions", &traced.rooms(), seed)?
+        };
         let noises = if noise.tracks.is_empty() {
             // All noise is computed then.
             BTreeMap::new()
@@ -100,13 +102,14 @@ impl DatasetBuilder {
         for (i, u) in speech.utterances.iter().enumerate() {
             content.insert(format!("speech {i} {}", u.speaker), hash_samples(&u.speech.samples));
         }
-        for r in &responses.responses {
+        for r in responses.responses.iter().chain(&traced.responses) {
             content.insert(format!("response {} {}", r.room, r.path), hash_samples(r.response.samples()));
         }
         for (name, samples) in &noise.tracks {
             content.insert(format!("noise {name}"), hash_samples(samples));
         }
-        check_copies(&responses, &speech, &rooms, &speakers)?;
+        check_copies(responses, speech, &rooms, &speakers)?;
+        check_copies(traced, &SpeechCorpus::default(), &traced_rooms, &BTreeMap::new())?;
         let chain = Chain::for_training(maker.sample_rate_hz())?;
         let plan = Plan {
             format: DATASET_FORMAT.to_owned(),
@@ -116,10 +119,12 @@ impl DatasetBuilder {
             shard_clips: config.shard_clips,
             clips_per_response: config.clips_per_response,
             measured_fraction: config.measured_fraction,
+            traced_fraction: config.traced_fraction,
             clip: config.clip.clone(),
             synthetic: format!("{:?}", config.synthetic),
             chain: chain.describe(),
             rooms,
+            traced_rooms,
             speakers,
             noise: noises,
             content,
@@ -127,18 +132,7 @@ impl DatasetBuilder {
         let text = serde_json::to_vec(&plan)
             .map_err(|source| Error::Json { path: PathBuf::from("plan.json"), source })?;
         let plan_sha256 = hash_bytes(&text);
-        Ok(Self {
-            config,
-            plan,
-            plan_sha256,
-            maker,
-            synthetic,
-            chain,
-            speech,
-            responses,
-            noise,
-            refused: AtomicU64::new(0),
-        })
+        Ok(Self { config, plan, plan_sha256, maker, synthetic, chain, sources, refused: AtomicU64::new(0) })
     }
 
     /// Partition of each measured room.
@@ -315,17 +309,24 @@ impl DatasetBuilder {
             shards: entries,
             statistics,
             clip: self.config.clip.clone(),
-            room_partitions: self.plan.rooms.clone(),
+            room_partitions: self
+                .plan
+                .rooms
+                .iter()
+                .chain(&self.plan.traced_rooms)
+                .map(|(n, &p)| (n.clone(), p))
+                .collect(),
             speaker_partitions: self.plan.speakers.clone(),
             noise_partitions: self.plan.noise.clone(),
             sources: BTreeMap::from([
-                ("speech".to_owned(), self.speech.files.clone()),
-                ("responses".to_owned(), self.responses.files.clone()),
-                ("noise".to_owned(), self.noise.files.clone()),
+                ("speech".to_owned(), self.sources.speech.files.clone()),
+                ("responses".to_owned(), self.sources.responses.files.clone()),
+                ("noise".to_owned(), self.sources.noise.files.clone()),
             ]),
             left_out: BTreeMap::from([
-                ("speech".to_owned(), self.speech.left_out.clone()),
-                ("responses".to_owned(), self.responses.left_out.clone()),
+                ("speech".to_owned(), self.sources.speech.left_out.clone()),
+                ("responses".to_owned(), self.sources.responses.left_out.clone()),
+                ("traced rooms".to_owned(), self.sources.traced.left_out.clone()),
             ]),
             speakers: self.plan.speakers.keys().cloned().collect(),
             rooms: self.room_names(),
@@ -334,9 +335,10 @@ impl DatasetBuilder {
         Ok(Some(manifest))
     }
 
-    /// Measured rooms, then the simulated ones of each partition.
+    /// Measured rooms, traced ones, then the others of each partition.
     fn room_names(&self) -> Vec<String> {
-        let mut names: Vec<String> = self.plan.rooms.keys().cloned().collect();
+        let mut names: Vec<String> =
+            self.plan.rooms.keys().chain(self.plan.traced_rooms.keys()).cloned().collect();
         for partition in Partition::ALL {
             names.extend(
                 (0..self.simulated_before(partition, self.groups(partition)))
@@ -366,30 +368,44 @@ impl DatasetBuilder {
         group: usize,
         seed: u64,
     ) -> Result<(ImpulseResponse, usize, Labels), Error> {
-        if self.measured_before(partition, group + 1) == self.measured_before(partition, group) {
-            let response = self.synthetic.draw(seed)?;
-            let labels = Labels::measure(&response)?;
-            let before: usize = Partition::ALL[..partition as usize]
-                .iter()
-                .map(|&p| self.simulated_before(p, self.groups(p)))
-                .sum();
-            return Ok((
-                response,
-                self.plan.rooms.len() + before + self.simulated_before(partition, group),
-                labels,
-            ));
-        }
         let rng = &mut generator(derive(seed, 1));
-        let rooms: Vec<(usize, &String)> = self
-            .plan
-            .rooms
+        if self.measured_before(partition, group + 1) > self.measured_before(partition, group) {
+            return self.augmented(rng, partition, &self.sources.responses, &self.plan.rooms, 0, seed);
+        }
+        let traced = &self.plan.traced_rooms;
+        if !traced.is_empty() && rng.random::<f64>() < self.config.traced_fraction[partition as usize] {
+            let before = self.plan.rooms.len();
+            return self.augmented(rng, partition, &self.sources.traced, traced, before, seed);
+        }
+        let response = self.synthetic.draw(seed)?;
+        let labels = Labels::measure(&response)?;
+        let before: usize = Partition::ALL[..partition as usize]
+            .iter()
+            .map(|&p| self.simulated_before(p, self.groups(p)))
+            .sum();
+        let room = self.plan.rooms.len() + traced.len() + before + self.simulated_before(partition, group);
+        Ok((response, room, labels))
+    }
+
+    /// A response of one of the rooms dealt to this partition, changed unless it is for the test; `before` is the index of
+    /// the first of these rooms.
+    fn augmented(
+        &self,
+        rng: &mut Pcg64,
+        partition: Partition,
+        corpus: &ResponseCorpus,
+        rooms: &BTreeMap<String, Partition>,
+        before: usize,
+        seed: u64,
+    ) -> Result<(ImpulseResponse, usize, Labels), Error> {
+        let own: Vec<(usize, &String)> = rooms
             .iter()
             .enumerate()
-            .filter_map(|(i, (name, &p))| (p == partition).then_some((i, name)))
+            .filter_map(|(i, (name, &p))| (p == partition).then_some((before + i, name)))
             .collect();
-        let (index, room) = rooms[rng.random_range(0..rooms.len())];
+        let (index, room) = own[rng.random_range(0..own.len())];
         let candidates: Vec<&MeasuredResponse> =
-            self.responses.responses.iter().filter(|r| &r.room == room).collect();
+            corpus.responses.iter().filter(|r| &r.room == room).collect();
         let measured = candidates[rng.random_range(0..candidates.len())];
         if partition == Partition::Test {
             return Ok((measured.response.clone(), index, measured.labels.clone()));
@@ -420,9 +436,15 @@ impl DatasetBuilder {
         let seed = derive(derive(self.config.seed, 1 + partition as u64), group as u64);
         let (response, room, labels) = self.response(partition, group, seed)?;
         let prepared = self.maker.prepare(response.samples())?;
-        let voices: Vec<&Utterance> =
-            self.speech.utterances.iter().filter(|u| self.plan.speakers[&u.speaker] == partition).collect();
+        let voices: Vec<&Utterance> = self
+            .sources
+            .speech
+            .utterances
+            .iter()
+            .filter(|u| self.plan.speakers[&u.speaker] == partition)
+            .collect();
         let noises: Vec<&[f32]> = self
+            .sources
             .noise
             .tracks
             .iter()

@@ -1,6 +1,7 @@
 //! What data set to build, and what came of it.
 
 use crate::clip::ClipConfig;
+use crate::corpus::{NoiseCorpus, ResponseCorpus, SpeechCorpus};
 use crate::manifest::Manifest;
 use crate::partition::PartitionConfig;
 use crate::synthetic::SyntheticRoomConfig;
@@ -19,6 +20,9 @@ pub struct DatasetConfig {
     /// Fraction of the responses that are measured ones, in each partition; the others are simulated. Default 0.3, 0.5, 1:
     /// the test is real.
     pub measured_fraction: [f64; 3],
+    /// Fraction of the simulated responses, in each partition, that come from [`DatasetSources::traced`], if there are any;
+    /// the others from [`crate::SyntheticRooms`]. Default 0.5. Traced responses are changed like measured ones.
+    pub traced_fraction: [f64; 3],
     /// How clips are made.
     pub clip: ClipConfig,
     /// How rooms are simulated.
@@ -37,12 +41,27 @@ impl Default for DatasetConfig {
             shard_clips: 512,
             clips_per_response: 4,
             measured_fraction: [0.3, 0.5, 1.0],
+            traced_fraction: [0.5; 3],
             clip: ClipConfig::default(),
             synthetic: SyntheticRoomConfig::default(),
             rooms: PartitionConfig::default(),
             speakers: PartitionConfig::default(),
         }
     }
+}
+
+/// What to build it from.
+#[derive(Clone, Debug, Default)]
+pub struct DatasetSources {
+    /// Speech, dealt out by speaker.
+    pub speech: SpeechCorpus,
+    /// Measured responses, dealt out by room.
+    pub responses: ResponseCorpus,
+    /// Traced responses ([`crate::TracedRooms::corpus`]), dealt out by room: 70, 15 and 15 %. None at all is fine; else
+    /// three rooms at least.
+    pub traced: ResponseCorpus,
+    /// Noise, dealt out by track. Without any, all noise is computed.
+    pub noise: NoiseCorpus,
 }
 
 /// Which shards to make: every `of`-th, from the `index`-th (counted from 1).

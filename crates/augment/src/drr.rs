@@ -4,7 +4,11 @@ use crate::direct::{Direct, HALF_DIRECT_S};
 use crate::error::{Error, check_span};
 use crate::seed::generator;
 use rand::Rng;
-use sabine_acoustics::{Augment, ImpulseResponse};
+use sabine_acoustics::{Augment, BandParameters, ImpulseResponse};
+
+/// Readings of the ratio before it is given up, and what is near enough, dB.
+const ROUNDS: usize = 5;
+const TOLERANCE_DB: f64 = 0.1;
 
 /// Settings of [`DrrAugment`].
 #[derive(Clone, Debug, PartialEq)]
@@ -42,22 +46,44 @@ impl DrrAugment {
     /// The response with this ratio.
     ///
     /// ```
-    /// use sabine_acoustics::ImpulseResponse;
+    /// use sabine_acoustics::{BandParameters, ImpulseResponse};
     /// use sabine_augment::{DrrAugment, DrrConfig};
-    /// // A direct sound of energy 1 and a late part of energy 0.1.
-    /// let mut samples = vec![0.0_f32; 8000];
+    /// // A direct sound, and a late part that falls by 60 dB in 0.4 s.
+    /// let mut samples: Vec<f32> =
+    ///     (0..8000).map(|i| if i % 2 == 0 { 0.05 } else { -0.05 } * (-6.9078 * i as f32 / 6400.0).exp()).collect();
+    /// samples[..100].fill(0.0);
     /// samples[100] = 1.0;
-    /// (1000..2000).for_each(|i| samples[i] = 0.01);
     /// let near = DrrAugment::new(DrrConfig::default())?.to_db(&ImpulseResponse::new(samples, 16_000)?, 16.0)?;
-    /// // 10 lg(a^2 / 0.1) = 16 dB
-    /// assert!((near.samples()[100] - 3.981_f32.sqrt()).abs() < 1e-3);
+    /// assert!((BandParameters::full_band(&near).drr_db.unwrap().value - 16.0).abs() < 0.1);
     /// # Ok::<(), sabine_augment::Error>(())
     /// ```
     ///
     /// # Errors
     /// [`Error::NoDirectSound`] and the like for a response that cannot be split, [`Error::DrrUnreachable`] where the direct
-    /// peak would sink below the largest sample of the late part.
+    /// peak would sink below the largest sample of the late part, or the ratio that [`BandParameters::full_band`] reads
+    /// does not come within 0.1 dB.
     pub fn to_db(&self, response: &ImpulseResponse, target_db: f64) -> Result<ImpulseResponse, Error> {
+        // What is read as late is free of the noise of the recording, what is summed here is not: ask for more or less
+        // until the reading is right.
+        let mut asked_db = target_db;
+        for _ in 0..ROUNDS {
+            let changed = Self::to_raw_db(response, asked_db, target_db)?;
+            let Ok(found) = BandParameters::full_band(&changed).drr_db else { return Ok(changed) };
+            let missing_db = target_db - found.value;
+            if missing_db.abs() < TOLERANCE_DB {
+                return Ok(changed);
+            }
+            asked_db += missing_db;
+        }
+        Err(Error::DrrUnreachable { target_db })
+    }
+
+    /// The response whose direct sound has `asked_db` more energy than all that follows, noise included.
+    fn to_raw_db(
+        response: &ImpulseResponse,
+        asked_db: f64,
+        target_db: f64,
+    ) -> Result<ImpulseResponse, Error> {
         let direct = Direct::find(response)?;
         let rate = f64::from(response.sample_rate_hz());
         let mut samples = response.samples().to_vec();
@@ -69,7 +95,7 @@ impl DrrAugment {
         let late_energy: f64 = late.iter().map(|&s| f64::from(s).powi(2)).sum();
         let late_peak = late.iter().fold(0.0_f32, |p, s| p.max(s.abs()));
         // The energy of (alpha w + 1 - w) h as a quadratic in alpha.
-        let (mut a, mut b, mut c) = (0.0, 0.0, -(10f64.powf(target_db / 10.0)) * late_energy);
+        let (mut a, mut b, mut c) = (0.0, 0.0, -(10f64.powf(asked_db / 10.0)) * late_energy);
         for (i, &s) in samples.iter().enumerate().take(direct.end).skip(direct.start) {
             let (w, energy) = (window(i), f64::from(s).powi(2));
             a += w * w * energy;

@@ -108,6 +108,12 @@ pub enum Error {
         /// How many there are.
         found: usize,
     },
+    /// Rooms were drawn in which a source and a receiver found no place clear of walls and furniture.
+    #[error("none of {rooms} rooms drawn has a place for a source and a receiver")]
+    NoPlace {
+        /// Rooms drawn.
+        rooms: u64,
+    },
     /// A room or speaker (or the same sound under another name) in two partitions.
     #[error("leak: {what} {name:?} is both in {first} and in {second}")]
     Leak {

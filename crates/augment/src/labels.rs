@@ -2,8 +2,8 @@
 
 use crate::error::Error;
 use sabine_acoustics::{
-    BandParameters, ImpulseResponse, OctaveBands, PerBand, Reading, RoomParameters, ThirdOctaveBands,
-    equalisation,
+    BandParameters, DecayFit, ImpulseResponse, NoReading, OctaveBands, PerBand, Reading, RoomParameters,
+    ThirdOctaveBands, equalisation,
 };
 
 /// What is measured on a response: reverberation time, equalisation and ratio of direct to reverberant energy, each a
@@ -25,19 +25,7 @@ impl Labels {
     /// [`Error::Acoustics`] for what [`RoomParameters::measure`] refuses; what cannot be read is no error but a reading that
     /// says why.
     pub fn measure(response: &ImpulseResponse) -> Result<Self, Error> {
-        let rate = f64::from(response.sample_rate_hz());
-        let bands = OctaveBands::T60;
-        let held = (0..bands.len()).take_while(|&b| bands.edges_hz(b).1 <= 0.5 * rate).count();
-        let t60_s = if held == bands.len() {
-            RoomParameters::measure(response, bands)?.t60_s
-        } else {
-            let lower = OctaveBands::new(125.0, bands.nominal_hz(held.max(1) - 1))?;
-            let mut readings = RoomParameters::measure(response, lower)?.t60_s.values().to_vec();
-            for band in held.max(1)..bands.len() {
-                readings.push(lowest_third(response, bands.exact_hz(band))?);
-            }
-            PerBand::new(bands, readings)?
-        };
+        let t60_s = PerBand::new(OctaveBands::T60, decay_times(response)?.t60_s)?;
         Ok(Self {
             t60_s,
             eq_db: equalisation(response, OctaveBands::EQ)?,
@@ -59,6 +47,26 @@ impl Labels {
     pub fn drr_db(&self) -> &Reading {
         &self.drr_db
     }
+}
+
+/// Reverberation times at 125 Hz to 8 kHz, and the decays of the octaves that the sample rate holds.
+pub(crate) struct DecayTimes {
+    pub(crate) t60_s: Vec<Reading>,
+    pub(crate) fits: Vec<Result<DecayFit, NoReading>>,
+}
+
+/// Measures the decays alone.
+pub(crate) fn decay_times(response: &ImpulseResponse) -> Result<DecayTimes, Error> {
+    let rate = f64::from(response.sample_rate_hz());
+    let bands = OctaveBands::T60;
+    let held = (0..bands.len()).take_while(|&b| bands.edges_hz(b).1 <= 0.5 * rate).count().max(1);
+    let lower = OctaveBands::new(125.0, bands.nominal_hz(held - 1))?;
+    let measured = RoomParameters::measure(response, lower)?;
+    let mut t60_s = measured.t60_s.values().to_vec();
+    for band in held..bands.len() {
+        t60_s.push(lowest_third(response, bands.exact_hz(band))?);
+    }
+    Ok(DecayTimes { t60_s, fits: measured.fits.values().to_vec() })
 }
 
 /// The reverberation time of the lowest third of an octave.

@@ -19,10 +19,12 @@ pub(crate) struct Plan {
     pub(crate) shard_clips: usize,
     pub(crate) clips_per_response: usize,
     pub(crate) measured_fraction: [f64; 3],
+    pub(crate) traced_fraction: [f64; 3],
     pub(crate) clip: ClipConfig,
     pub(crate) synthetic: String,
     pub(crate) chain: String,
     pub(crate) rooms: BTreeMap<String, Partition>,
+    pub(crate) traced_rooms: BTreeMap<String, Partition>,
     pub(crate) speakers: BTreeMap<String, Partition>,
     pub(crate) noise: BTreeMap<String, Partition>,
     /// Hash of the content of each source as it is used.

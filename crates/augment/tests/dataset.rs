@@ -6,8 +6,8 @@ mod material;
 use material::{response, speech};
 use sabine_acoustics::{Observer, Signal};
 use sabine_augment::{
-    DatasetBuilder, DatasetConfig, Error, Manifest, NoiseCorpus, Partition, PartitionConfig, ResponseCorpus,
-    ResponseFilter, SpeechCorpus, Worker,
+    DatasetBuilder, DatasetConfig, DatasetSources, Error, Manifest, NoiseCorpus, Partition, PartitionConfig,
+    ResponseCorpus, ResponseFilter, SpeechCorpus, Worker,
 };
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -52,8 +52,17 @@ fn config() -> DatasetConfig {
     }
 }
 
+fn sources(speakers: u64, measured: ResponseCorpus) -> DatasetSources {
+    DatasetSources {
+        speech: voices(speakers),
+        responses: measured,
+        traced: ResponseCorpus::default(),
+        noise: noise(),
+    }
+}
+
 fn builder() -> DatasetBuilder {
-    DatasetBuilder::new(config(), voices(5), rooms(4), noise()).unwrap()
+    DatasetBuilder::new(config(), sources(5, rooms(4))).unwrap()
 }
 
 /// Name and content of every file.
@@ -193,9 +202,9 @@ fn the_shards_hold_what_the_manifest_says() {
 
 #[test]
 fn what_leaks_or_cannot_be_partitioned_is_refused() {
-    let refused = DatasetBuilder::new(config(), voices(1), rooms(4), noise()).err().unwrap();
+    let refused = DatasetBuilder::new(config(), sources(1, rooms(4))).err().unwrap();
     assert!(matches!(refused, Error::TooFew { what: "speaker", .. }), "{refused}");
-    let refused = DatasetBuilder::new(config(), voices(5), rooms(2), noise()).err().unwrap();
+    let refused = DatasetBuilder::new(config(), sources(5, rooms(2))).err().unwrap();
     assert!(matches!(refused, Error::TooFew { what: "room", .. }), "{refused}");
 
     let leak = PartitionConfig {
@@ -204,7 +213,7 @@ fn what_leaks_or_cannot_be_partitioned_is_refused() {
         ..PartitionConfig::default()
     };
     let config_with_leak = DatasetConfig { rooms: leak, ..config() };
-    let refused = DatasetBuilder::new(config_with_leak, voices(5), rooms(4), noise()).err().unwrap();
+    let refused = DatasetBuilder::new(config_with_leak, sources(5, rooms(4))).err().unwrap();
     assert!(matches!(refused, Error::Leak { what: "room", .. }), "{refused}");
 
     // The same response under another name.
@@ -216,9 +225,8 @@ fn what_leaks_or_cannot_be_partitioned_is_refused() {
         test: vec!["r1".into()],
         ..PartitionConfig::default()
     };
-    let refused = DatasetBuilder::new(DatasetConfig { rooms: apart, ..config() }, voices(5), copied, noise())
-        .err()
-        .unwrap();
+    let refused =
+        DatasetBuilder::new(DatasetConfig { rooms: apart, ..config() }, sources(5, copied)).err().unwrap();
     assert!(matches!(refused, Error::Leak { .. }), "{refused}");
 }
 
@@ -228,8 +236,7 @@ fn another_set_is_not_overwritten() {
     built(2, folder.path());
     let again = builder().build(folder.path(), Worker::default(), false, &());
     assert!(matches!(again, Err(Error::NotEmpty { .. })), "{again:?}");
-    let other =
-        DatasetBuilder::new(DatasetConfig { seed: 6, ..config() }, voices(5), rooms(4), noise()).unwrap();
+    let other = DatasetBuilder::new(DatasetConfig { seed: 6, ..config() }, sources(5, rooms(4))).unwrap();
     let resumed = other.build(folder.path(), Worker::default(), true, &());
     assert!(matches!(resumed, Err(Error::OtherPlan { .. })), "{resumed:?}");
     let worker = builder().build(folder.path(), Worker { index: 4, of: 3 }, true, &());

@@ -1,6 +1,6 @@
 """The recipe of a training clip in numpy, scipy and librosa: what sabine-augment's speed is held against.
 
-usage: augment_peer.py SPEECH_DIR SECONDS
+usage: augment_peers.py SPEECH_DIR SECONDS
 Each clip: 4 s of speech (and 1.5 s before it) convolved with a response of 1.5 s, noise at a drawn ratio, a level, log-mel
 32 x 499, 16-bit floats. One process; prints clips per second.
 """
