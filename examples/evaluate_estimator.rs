@@ -232,8 +232,15 @@ fn write_recordings(
         let name = path.rsplit('/').next().unwrap_or(path);
         manifest.speaker_partitions.get(name.split(['-', '_']).next().unwrap_or(name)) == Some(&wanted)
     };
-    let voices =
-        files("speech").filter(speaks).map(|path| read(&speech.join(path))).collect::<Result<Vec<_>, _>>()?;
+    // All voices equally loud at their loudest.
+    let level = |voice: Signal| {
+        let gain = 1.0 / voice.peak().max(f32::MIN_POSITIVE);
+        voice.samples().iter().map(|s| s * gain).collect::<Vec<f32>>()
+    };
+    let voices = files("speech")
+        .filter(speaks)
+        .map(|path| Ok(level(read(&speech.join(path))?)))
+        .collect::<Result<Vec<_>, Box<dyn Error>>>()?;
     let tracks = files("noise")
         .filter(|path| manifest.noise_partitions.get(*path) == Some(&wanted))
         .map(|path| read(&noise.join(path)))
@@ -257,7 +264,8 @@ fn write_recordings(
         let dry: Vec<f32> = voices[turn..]
             .iter()
             .chain(voices.iter().cycle())
-            .flat_map(|voice| voice.samples().iter().map(|s| s / voice.peak()))
+            .flatten()
+            .copied()
             .take(samples)
             .collect();
         let mut wet = convolve(&dry, response.samples());
