@@ -194,7 +194,9 @@ fn judge_recordings(
         let bytes = model.to_safetensors(true)?;
         return Ok(write_atomically(path, |file| file.write_all(&bytes))?);
     }
-    println!("| length, windows | model | constant | best constant | model - constant | bias | 90 % coverage | excerpts |");
+    println!(
+        "| length, windows | model | constant | best constant | model - constant | bias | 90 % coverage | excerpts |"
+    );
     println!("|---|---|---|---|---|---|---|---|");
     for duration_s in LENGTHS_S {
         let evaluation = RecordingEvaluation::new(estimator, &recordings, duration_s)?;
@@ -250,9 +252,7 @@ fn write_recordings(
     }
     let mut out = OutputFolder::create(out)?;
     let mut entries = Vec::new();
-    for (index, (room, name, response)) in
-        responses(arguments, &manifest, wanted)?.into_iter().enumerate()
-    {
+    for (index, (room, name, response)) in responses(arguments, &manifest, wanted)?.into_iter().enumerate() {
         let labels = Labels::measure(&response)?;
         // Numbers that fill their range evenly: no two recordings are alike, and they are the same every time.
         let share = |ratio: f64| (index as f64 * ratio).fract();
@@ -261,13 +261,8 @@ fn write_recordings(
         let start = (share(0.754_878) * track.len() as f64) as usize;
         let samples = (LENGTHS_S[LENGTHS_S.len() - 1] * f64::from(rate_hz)) as usize;
         let turn = index * 7 % voices.len();
-        let dry: Vec<f32> = voices[turn..]
-            .iter()
-            .chain(voices.iter().cycle())
-            .flatten()
-            .copied()
-            .take(samples)
-            .collect();
+        let dry: Vec<f32> =
+            voices[turn..].iter().chain(voices.iter().cycle()).flatten().copied().take(samples).collect();
         let mut wet = convolve(&dry, response.samples());
         wet.truncate(samples);
         let noise = || track[start..].iter().chain(track.iter().cycle()).take(samples);
@@ -281,7 +276,9 @@ fn write_recordings(
         out.write(&file, &encode_wav(&Signal::new(wet, rate_hz)?, SampleFormat::Int16)?)?;
         let t60_s = labels.t60_s().values().iter().map(|t| t.as_ref().ok().map(|t| t.value)).collect();
         let eq_db = (T60_COUNT..LABEL_COUNT)
-            .map(|label| labels.eq_db().at_hz(label_hz(label)).and_then(|level| Some(level.as_ref().ok()?.value)))
+            .map(|label| {
+                labels.eq_db().at_hz(label_hz(label)).and_then(|level| Some(level.as_ref().ok()?.value))
+            })
             .collect();
         entries.push(Entry { file, room, response: name, snr_db, t60_s, eq_db });
     }

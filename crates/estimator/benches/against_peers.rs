@@ -4,6 +4,7 @@
 //! median time in ms for one window and for all of them in one call; `train` prints clips per second over an epoch of a
 //! synthetic set, reading and label handling included.
 
+#[allow(dead_code)] // the tests use more of it
 #[path = "../tests/support/mod.rs"]
 mod support;
 
@@ -62,8 +63,12 @@ fn train() -> Result<(), Box<dyn Error>> {
         folder.path(),
         &[("train", Shard::synthetic(512, 0, 1)), ("validation", Shard::synthetic(4, 5000, 2))],
     );
-    let config =
-        TrainConfig { network: NetworkConfig::averaged(), epochs: 3, perturb: None, ..TrainConfig::default() };
+    let config = TrainConfig {
+        network: NetworkConfig::averaged(),
+        epochs: 3,
+        perturb: None,
+        ..TrainConfig::default()
+    };
     let trained = Trainer::new(config, &Dataset::open(folder.path())?, None)?.train(false, &())?;
     let fastest = trained.history.iter().map(|epoch| epoch.clips_per_s).fold(0.0, f64::max);
     println!("train {fastest:.1}");

@@ -242,7 +242,9 @@ mod tests {
 
     #[test]
     fn a_line_is_found_and_never_steeper_than_one() {
-        let points = |slope: f64| (0..10).map(move |i| (f64::from(i), slope * f64::from(i) - 0.5, f64::from(1 + i % 2)));
+        let points = |slope: f64| {
+            (0..10).map(move |i| (f64::from(i), slope * f64::from(i) - 0.5, f64::from(1 + i % 2)))
+        };
         let (slope, offset) = line(points(0.6));
         assert!((slope - 0.6).abs() < 1e-12 && (offset + 0.5).abs() < 1e-12);
         // Twice as steep as allowed: the offset meets the mean of the points (their values weighted).

@@ -98,8 +98,7 @@ pub(crate) fn summarise<K>(rooms: &BTreeMap<K, Vec<ClipError>>, labels: usize) -
         return None;
     }
     let mean = |f: &dyn Fn(&ClipError) -> f64| {
-        let means: Vec<f64> =
-            rooms.values().map(|r| r.iter().map(f).sum::<f64>() / r.len() as f64).collect();
+        let means: Vec<f64> = rooms.values().map(|r| r.iter().map(f).sum::<f64>() / r.len() as f64).collect();
         bootstrap(&means)
     };
     let covered = rooms.values().flatten().filter(|e| e.covered).count();

@@ -168,9 +168,8 @@ impl LiveEstimator {
             recent[at..at + mels].copy_from_slice(levels_db);
             *frames += 1;
         });
-        let is_full = *frames > before
-            && *frames >= window
-            && (*frames - window).is_multiple_of(window_hop(window));
+        let is_full =
+            *frames > before && *frames >= window && (*frames - window).is_multiple_of(window_hop(window));
         if is_full {
             self.hear(self.frames - window);
             if self.heard.len() > self.most {
@@ -207,7 +206,8 @@ mod tests {
     #[test]
     fn memory_does_not_grow_with_the_stream() -> Result<(), Box<dyn std::error::Error>> {
         let mut live = LiveEstimator::with_windows(&Estimator::pretrained()?, 3);
-        let noise = |n: usize| 0.3 * ((n * n % 7919) as f32 / 7919.0 - 0.5) * (1.0 - (n % 8000) as f32 / 8000.0);
+        let noise =
+            |n: usize| 0.3 * ((n * n % 7919) as f32 / 7919.0 - 0.5) * (1.0 - (n % 8000) as f32 / 8000.0);
         let sound: Vec<f32> = (0..160_000).map(noise).collect();
         let mut failure = Ok::<(), AcousticsError>(());
         let mut capacities = Vec::new();

@@ -139,7 +139,8 @@ impl Estimator {
             let known: Vec<&Excerpt<'_>> = evaluations.iter().flat_map(|e| e.known(label)).collect();
             let rooms: BTreeSet<&str> = known.iter().map(|e| e.recording.room.as_str()).collect();
             if rooms.is_empty() {
-                let fault = DatasetFault::NoLabels { partition: "recordings", label: crate::label_name(label) };
+                let fault =
+                    DatasetFault::NoLabels { partition: "recordings", label: crate::label_name(label) };
                 return Err(Error::dataset("recordings", fault));
             }
             let coverage = |correlation: f64| {

@@ -88,8 +88,10 @@ fn a_short_stream_and_a_silent_one_are_judged_like_recordings() {
     live.reset();
     assert_eq!(live.duration_s(), 0.0);
     let mut silent = 0;
-    live.push(&[0.0; 70_000], |estimate| silent += usize::from(matches!(estimate, Err(Error::Silent { .. }))))
-        .unwrap();
+    live.push(&[0.0; 70_000], |estimate| {
+        silent += usize::from(matches!(estimate, Err(Error::Silent { .. })))
+    })
+    .unwrap();
     assert_eq!(silent, 1);
     let bad = live.push(&[0.0, f32::NAN], |_| {});
     assert!(matches!(bad, Err(Error::NotFinite { index: 70_001 })), "{bad:?}");

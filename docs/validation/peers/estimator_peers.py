@@ -135,7 +135,7 @@ def torch_training(inputs):
 
 
 def main():
-    programs = glob.glob(os.path.join(TARGET, "release", "deps", "against_peers-*"))
+    programs = glob.glob(os.path.join(TARGET, os.environ.get("PROFILE", "release"), "deps", "against_peers-*"))
     programs = [p for p in programs if "." not in os.path.basename(p) and b"estimator_peers" in open(p, "rb").read()]
     if not programs:
         raise SystemExit("build first: cargo bench -p sabine-estimator --bench against_peers --no-run")
