@@ -32,9 +32,11 @@
 //! |---|---|
 //! | an answer with its standard errors | [`Estimator::pretrained`], [`RoomEstimator::estimate`](sabine_acoustics::RoomEstimator::estimate) |
 //! | the windows it is made of, and reasons for doubt | [`Estimator::estimate_detailed`], [`Warning`] |
+//! | many recordings at once | [`Estimator::estimate_batch`] |
+//! | a live stream | [`LiveEstimator`] |
 //! | a guess to compare with | [`ConstantEstimator`] |
 //! | training | [`Dataset`], [`TrainConfig`], [`Trainer`] |
-//! | errors by octave and room | [`Evaluation`] |
+//! | errors by octave and room; by length of the recording | [`Evaluation`]; [`RecordingEvaluation`] |
 //! | the bare network | [`NetworkConfig`], [`Parameters`], [`Network`] |
 //!
 //! # Units and conventions

@@ -23,7 +23,7 @@ const DEFAULT_WINDOWS: usize = 30;
 /// let mut live = LiveEstimator::new(&Estimator::pretrained()?);
 /// // Noise bursts, four each second, in portions of 10 ms.
 /// let sound: Vec<f32> =
-///     (0..112_000).map(|n| ((n * n) as f32 * 0.7).sin() * 10f32.powf(-3.0 * (n % 4000) as f32 / 4800.0)).collect();
+///     (0..112_000_usize).map(|n| ((n * n) as f32 * 0.7).sin() * 10f32.powf(-3.0 * (n % 4000) as f32 / 4800.0)).collect();
 /// let mut estimates = 0;
 /// for portion in sound.chunks(160) {
 ///     live.push(portion, |estimate| estimates += usize::from(estimate.is_ok()))?;
