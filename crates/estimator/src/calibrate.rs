@@ -18,7 +18,7 @@ impl Calibration {
     pub(crate) fn uncalibrated(mels: usize) -> Self {
         Self {
             deviation: vec![1.0; LABEL_COUNT],
-            window_correlation: 1.0,
+            window_correlation: vec![1.0; LABEL_COUNT],
             t60_range_s: vec![[0.01, 100.0]; T60_COUNT],
             statistic_mean: vec![0.0; 2 * mels],
             statistic_deviation: vec![1.0; 2 * mels],
@@ -108,34 +108,47 @@ pub(crate) fn score(model: &Model, dataset: &Dataset, clips: &[usize]) -> Result
     })
 }
 
-/// Draws each label towards the mean of the training labels as far as the validation rooms ask for (least squares, each room
-/// with the same weight; a factor of 0 to 1). A network that knows its training voices by heart makes too much of what it
-/// hears in others, of the equalisation above all. The factors go into the weights of the output layer.
+/// Draws each label towards the mean of the training labels, and removes its bias, as far as the validation rooms ask for
+/// (a line by least squares, each room with the same weight; its slope is 0 to 1). A network that knows its training voices
+/// by heart makes too much of what it hears in others, of the equalisation above all. The lines go into the output layer.
 pub(crate) fn shrink(model: &Model, dataset: &Dataset) -> Result<Parameters, Error> {
     let validation = hear_all(model, dataset, dataset.partition(Partition::Validation))?;
     let counts = clips_by_room(&validation, dataset);
     let mut tensors = model.parameters.tensors().clone();
     for k in 0..LABEL_COUNT {
-        let (mut along, mut square) = (0.0, 0.0);
-        for heard in &validation {
+        let points = validation.iter().filter_map(|heard| {
             let clip = &dataset.clips()[heard.clip];
             let truth = model.labels.encode(k, f64::from(clip.labels[k]));
-            if !truth.is_nan() {
-                let value = f64::from(heard.outputs[k]);
-                along += value * truth / counts[&clip.room];
-                square += value * value / counts[&clip.room];
-            }
-        }
-        let factor = if square > 0.0 { (along / square).clamp(0.0, 1.0) as f32 } else { 1.0 };
+            (!truth.is_nan()).then(|| (f64::from(heard.outputs[k]), truth, 1.0 / counts[&clip.room]))
+        });
+        let (slope, offset) = line(points);
         if let Some(weights) = tensors.get_mut("output.weight") {
             let inputs = weights.len() / model.parameters.config().outputs;
-            weights[k * inputs..(k + 1) * inputs].iter_mut().for_each(|w| *w *= factor);
+            weights[k * inputs..(k + 1) * inputs].iter_mut().for_each(|w| *w *= slope as f32);
         }
         if let Some(bias) = tensors.get_mut("output.bias") {
-            bias[k] *= factor;
+            bias[k] = (f64::from(bias[k]) * slope + offset) as f32;
         }
     }
     Parameters::new(model.parameters.config().clone(), tensors)
+}
+
+/// Slope, 0 to 1, and offset of the line through (value, truth, weight) with the least squares; 1 and 0 without points.
+fn line(points: impl Iterator<Item = (f64, f64, f64)>) -> (f64, f64) {
+    let (mut n, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for (value, truth, weight) in points {
+        n += weight;
+        x += weight * value;
+        y += weight * truth;
+        xx += weight * value * value;
+        xy += weight * value * truth;
+    }
+    if n == 0.0 {
+        return (1.0, 0.0);
+    }
+    let variance = xx - x * x / n;
+    let slope = if variance > 0.0 { ((xy - x * y / n) / variance).clamp(0.0, 1.0) } else { 1.0 };
+    (slope, (y - slope * x) / n)
 }
 
 fn clips_by_room(heard: &[Heard], dataset: &Dataset) -> BTreeMap<i64, f64> {
@@ -221,4 +234,23 @@ pub(crate) fn weighted_quantile(mut values: Vec<(f64, f64)>, share: f64) -> Opti
         }
     }
     values.last().map(|v| v.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::line;
+
+    #[test]
+    fn a_line_is_found_and_never_steeper_than_one() {
+        let points = |slope: f64| {
+            (0..10).map(move |i| (f64::from(i), slope * f64::from(i) - 0.5, f64::from(1 + i % 2)))
+        };
+        let (slope, offset) = line(points(0.6));
+        assert!((slope - 0.6).abs() < 1e-12 && (offset + 0.5).abs() < 1e-12);
+        // Twice as steep as allowed: the offset meets the mean of the points (their values weighted).
+        let mean = (0..10).map(|i| f64::from(i * (1 + i % 2))).sum::<f64>() / 15.0;
+        let (slope, offset) = line(points(2.0));
+        assert!(slope == 1.0 && (offset - (mean - 0.5)).abs() < 1e-12);
+        assert_eq!(line(std::iter::empty()), (1.0, 0.0));
+    }
 }

@@ -28,6 +28,12 @@ pub enum Error {
         /// Largest magnitude; full scale is 1.
         peak: f32,
     },
+    /// A sample of a stream that is no number.
+    #[error("sample {index} of the stream is not a finite number")]
+    NotFinite {
+        /// Its place in the stream, from 0.
+        index: u64,
+    },
     /// A setting outside its range.
     #[error("{field} is {value}; it must be {range}")]
     Config {

@@ -1,13 +1,14 @@
 //! From a recording to the targets of a room.
 
 use crate::Error;
-use crate::labels::{LABEL_COUNT, T60_COUNT, label_hz, per_band};
+use crate::joint::{HeardWindow, WindowOutput};
+use crate::labels::LABEL_COUNT;
 use crate::layout::Normalisation;
 use crate::model::Model;
 use crate::network::{Network, Scratch, spectrum};
 use crate::warning::Warning;
-use crate::windows::{Loudness, clipped_share, first_frames};
-use ndarray::{ArrayView2, Axis, Slice};
+use crate::windows::{FlatTops, Loudness, first_frames, limit_range};
+use ndarray::Array2;
 use rayon::prelude::*;
 use sabine_acoustics::{FeatureExtractor, RoomEstimator, RoomTargets, Signal, resample};
 use sabine_features::LogMel;
@@ -25,20 +26,18 @@ const CLIPPED_SHARE: f64 = 1e-4;
 /// The network with everything around it: a recording in, reverberation time and equalisation with standard errors out.
 #[derive(Clone, Debug)]
 pub struct Estimator {
-    model: Model,
+    pub(crate) model: Model,
     network: Network,
-    extractor: LogMel,
+    pub(crate) extractor: LogMel,
 }
 
-/// What one window says, on the scale of the network.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct WindowOutput {
-    /// Standardised labels.
-    pub mean: Vec<f64>,
-    /// Their calibrated standard deviations.
-    pub deviation: Vec<f64>,
-    /// How unlike the training set the window is.
-    pub novelty: f64,
+/// A recording ready to be heard.
+struct Prepared {
+    /// Levels in dB, `[mel, frame]`.
+    spectrogram_db: Array2<f32>,
+    /// First frames of its windows.
+    firsts: Vec<usize>,
+    warnings: Vec<Warning>,
 }
 
 /// What one window of a recording says.
@@ -118,23 +117,45 @@ impl Estimator {
     /// # Errors
     /// [`Error::SampleRate`] below the network's rate, [`Error::TooShort`] below [`LEAST_DURATION_S`], or [`Error::Silent`].
     pub fn estimate_detailed(&self, speech: &Signal) -> Result<DetailedEstimate, Error> {
+        let prepared = self.prepare(speech)?;
+        let heard = self.hear_all(&prepared.windows().collect::<Vec<_>>());
+        self.judge(&heard, prepared.warnings)
+    }
+
+    /// Estimates each of many recordings, in order, on all threads: the windows of all of them go through the network
+    /// together. Each answer is that of [`Estimator::estimate_detailed`]; what is wrong with one recording does not keep the
+    /// others from theirs.
+    pub fn estimate_batch(&self, recordings: &[Signal]) -> Vec<Result<DetailedEstimate, Error>> {
+        let prepared: Vec<Result<Prepared, Error>> =
+            recordings.par_iter().map(|recording| self.prepare(recording)).collect();
+        let windows: Vec<_> = prepared.iter().flatten().flat_map(Prepared::windows).collect();
+        let mut heard = self.hear_all(&windows).into_iter();
+        prepared
+            .into_iter()
+            .map(|prepared| {
+                let prepared = prepared?;
+                let own: Vec<HeardWindow> = heard.by_ref().take(prepared.firsts.len()).collect();
+                self.judge(&own, prepared.warnings)
+            })
+            .collect()
+    }
+
+    /// The windows of a recording before they are joined.
+    pub(crate) fn windows(&self, speech: &Signal) -> Result<Vec<HeardWindow>, Error> {
+        Ok(self.hear_all(&self.prepare(speech)?.windows().collect::<Vec<_>>()))
+    }
+
+    /// Checks a recording and extracts its features.
+    fn prepare(&self, speech: &Signal) -> Result<Prepared, Error> {
         let layout = &self.model.layout;
         let (found_hz, needed_hz) = (speech.sample_rate_hz(), layout.sample_rate_hz);
         if found_hz < needed_hz {
             return Err(Error::SampleRate { found_hz, needed_hz });
         }
-        if speech.duration_s() < LEAST_DURATION_S {
-            return Err(Error::TooShort { duration_s: speech.duration_s(), needed_s: LEAST_DURATION_S });
-        }
-        if speech.peak() < SILENT_PEAK {
-            return Err(Error::Silent { peak: speech.peak() });
-        }
-        let mut warnings = Vec::new();
         // Flat tops are flat at the rate at which they were recorded only.
-        let clipped = clipped_share(speech.samples());
-        if clipped > CLIPPED_SHARE {
-            warnings.push(Warning::Clipped { share: clipped });
-        }
+        let mut tops = FlatTops::default();
+        tops.push(speech.samples());
+        let mut warnings = self.hearable(&tops, speech.duration_s())?;
         let resampled;
         let speech = if found_hz == needed_hz {
             speech
@@ -143,126 +164,69 @@ impl Estimator {
             resampled = resample(speech, needed_hz)?;
             &resampled
         };
-        if speech.samples().len() < layout.window_samples() {
-            warnings.push(Warning::Short { duration_s: speech.duration_s(), window_s: layout.window_s() });
-        }
-        // The floor of the features is absolute: a quiet recording would drown in it. A fixed level costs nothing where
-        // the network does not hear the level.
-        let gain = 0.5 / speech.peak();
-        let scaled: Vec<f32> = speech.samples().iter().map(|s| s * gain).collect();
-        let spectrogram = self.extractor.extract(&scaled);
-        self.judge(spectrogram.view(), warnings)
-    }
-
-    /// Joins the windows of a spectrogram in dB `[mel, frame]`.
-    fn judge(
-        &self,
-        spectrogram_db: ArrayView2<'_, f32>,
-        mut warnings: Vec<Warning>,
-    ) -> Result<DetailedEstimate, Error> {
-        let layout = &self.model.layout;
+        let spectrogram_db = self.extractor.extract(speech.samples());
         let firsts = first_frames(spectrogram_db.ncols(), layout.frames);
-        let heard: Vec<(Loudness, WindowOutput)> = firsts
+        Ok(Prepared { spectrogram_db, firsts, warnings })
+    }
+
+    /// Whether there is anything to hear, and what may be wrong with it.
+    pub(crate) fn hearable(&self, tops: &FlatTops, duration_s: f64) -> Result<Vec<Warning>, Error> {
+        if duration_s < LEAST_DURATION_S {
+            return Err(Error::TooShort { duration_s, needed_s: LEAST_DURATION_S });
+        }
+        if tops.peak() < SILENT_PEAK {
+            return Err(Error::Silent { peak: tops.peak() });
+        }
+        let mut warnings = Vec::new();
+        if tops.share() > CLIPPED_SHARE {
+            warnings.push(Warning::Clipped { share: tops.share() });
+        }
+        let window_s = self.model.layout.window_s();
+        if duration_s < window_s {
+            warnings.push(Warning::Short { duration_s, window_s });
+        }
+        Ok(warnings)
+    }
+
+    /// Hears windows, each of a spectrogram from a first frame on, on all threads.
+    fn hear_all(&self, windows: &[(&Array2<f32>, usize)]) -> Vec<HeardWindow> {
+        windows
             .par_iter()
-            .map_init(Scratch::default, |scratch, &first| {
-                let end = (first + layout.frames).min(spectrogram_db.ncols());
-                let loudness = Loudness::of(spectrogram_db.slice_axis(Axis(1), Slice::from(first..end)));
-                let window = Normalisation::cut(spectrogram_db, first, layout.frames);
-                (loudness, self.hear(window, scratch))
-            })
-            .collect();
-        let loudest_db = heard.iter().map(|(l, _)| l.high_db).fold(f64::NEG_INFINITY, f64::max);
-        let weights: Vec<f64> = heard
-            .iter()
-            .map(|(loudness, _)| if loudness.is_active(loudest_db) { loudness.weight() } else { 0.0 })
-            .collect();
-        let inactive = weights.iter().filter(|w| **w == 0.0).count();
-        if inactive > 0 {
-            warnings.push(Warning::Inactive { windows: inactive, of: heard.len() });
-        }
-        let active = || heard.iter().zip(&weights).filter(|(_, w)| **w > 0.0).map(|(heard, _)| heard);
-        let range_db = active().map(|(l, _)| l.range_db).fold(f64::NEG_INFINITY, f64::max);
-        if active().all(|(l, _)| l.is_noisy()) {
-            warnings.push(Warning::Noisy { range_db });
-        }
-        let count = active().count().max(1) as f64;
-        let novelty = active().map(|(_, output)| output.novelty).sum::<f64>() / count;
-        if novelty > self.model.calibration.novelty_limit {
-            warnings.push(Warning::Unfamiliar { novelty, limit: self.model.calibration.novelty_limit });
-        }
-        let outputs: Vec<&WindowOutput> = heard.iter().map(|(_, output)| output).collect();
-        let targets = self.targets(&self.join(&outputs, &weights))?;
-        for (band, range) in self.model.calibration.t60_range_s.iter().enumerate().take(T60_COUNT) {
-            let t60_s = targets.t60_s().values()[band].value;
-            if t60_s < range[0] || t60_s > range[1] {
-                let band_hz = label_hz(band);
-                warnings.push(Warning::EdgeOfRange { band_hz, t60_s, low_s: range[0], high_s: range[1] });
-            }
-        }
-        let total: f64 = weights.iter().sum();
-        let windows = firsts
-            .iter()
-            .zip(&outputs)
-            .zip(&weights)
-            .map(|((&first, output), weight)| {
-                Ok(WindowEstimate {
-                    start_s: first as f64 * layout.frame_s(),
-                    targets: self.targets(output)?,
-                    weight: weight / total,
-                })
-            })
-            .collect::<Result<_, Error>>()?;
-        Ok(DetailedEstimate { targets, windows, warnings })
+            .map_init(
+                || (Vec::new(), Scratch::default()),
+                |(window, scratch), &(spectrogram_db, first)| {
+                    Normalisation::cut(spectrogram_db.view(), first, self.model.layout.frames, window);
+                    self.hear(first, window, scratch)
+                },
+            )
+            .collect()
     }
 
-    /// Hears one window of levels in dB, `[mel][frame]`.
-    pub(crate) fn hear(&self, mut window_db: Vec<f32>, scratch: &mut Scratch) -> WindowOutput {
-        self.model.normalisation.apply(&mut window_db);
-        let novelty = self.novelty(&window_db);
-        let raw = self.network.infer_with_scratch(&window_db, scratch);
-        let factor = |label: usize| self.model.calibration.deviation[label];
-        let learned = self.model.learned_variance();
-        let deviation = (0..LABEL_COUNT)
-            .map(|k| factor(k) * if learned { (0.5 * f64::from(raw[LABEL_COUNT + k])).exp() } else { 1.0 })
-            .collect();
-        WindowOutput { mean: raw[..LABEL_COUNT].iter().map(|v| f64::from(*v)).collect(), deviation, novelty }
-    }
-
-    fn novelty(&self, window: &[f32]) -> f64 {
+    /// Hears one window of levels in dB, `[mel][frame]`, and overwrites it.
+    pub(crate) fn hear(&self, first: usize, window_db: &mut [f32], scratch: &mut Scratch) -> HeardWindow {
+        limit_range(window_db);
+        let loudness = Loudness::of(window_db, self.model.layout.frames);
+        self.model.normalisation.apply(window_db);
         let mut statistics = Vec::new();
-        spectrum(window, self.model.layout.frames, &mut statistics);
-        self.model.calibration.novelty(&statistics)
+        spectrum(window_db, self.model.layout.frames, &mut statistics);
+        let novelty = self.model.calibration.novelty(&statistics);
+        let raw = self.network.infer_with_scratch(window_db, scratch);
+        let learned = self.model.learned_variance();
+        let factor = &self.model.calibration.deviation;
+        let output = WindowOutput {
+            mean: std::array::from_fn(|k| f64::from(raw[k])),
+            deviation: std::array::from_fn(|k| {
+                factor[k] * if learned { (0.5 * f64::from(raw[LABEL_COUNT + k])).exp() } else { 1.0 }
+            }),
+            novelty,
+        };
+        HeardWindow { first, loudness, output }
     }
+}
 
-    /// One answer from many: the mean weighted by precision and `weights`, label by label.
-    ///
-    /// Windows of one recording err together, so their joint variance falls less than with independent errors: to
-    /// `correlation + (1 - correlation) / n` of one window's, n being the effective number of windows.
-    fn join(&self, outputs: &[&WindowOutput], weights: &[f64]) -> WindowOutput {
-        let correlation = self.model.calibration.window_correlation.min(1.0);
-        let mut joint = WindowOutput { mean: Vec::new(), deviation: Vec::new(), novelty: 0.0 };
-        for label in 0..LABEL_COUNT {
-            let precision: Vec<f64> =
-                outputs.iter().zip(weights).map(|(o, w)| w / o.deviation[label].powi(2)).collect();
-            let total: f64 = precision.iter().sum();
-            let average = |f: &dyn Fn(&WindowOutput) -> f64| {
-                outputs.iter().zip(&precision).map(|(o, p)| p * f(o)).sum::<f64>() / total
-            };
-            let mean = average(&|o| o.mean[label]);
-            let variance = average(&|o| o.deviation[label].powi(2));
-            let effective = total * total / precision.iter().map(|p| p * p).sum::<f64>();
-            joint.mean.push(mean);
-            joint.deviation.push((variance * (correlation + (1.0 - correlation) / effective)).sqrt());
-        }
-        joint
-    }
-
-    fn targets(&self, output: &WindowOutput) -> Result<RoomTargets, Error> {
-        let labels: Vec<_> = (0..LABEL_COUNT)
-            .map(|k| self.model.labels.decode(k, output.mean[k], output.deviation[k]))
-            .collect();
-        let (t60_s, eq_db) = per_band(&labels);
-        Ok(RoomTargets::new(t60_s, eq_db)?)
+impl Prepared {
+    fn windows(&self) -> impl Iterator<Item = (&Array2<f32>, usize)> {
+        self.firsts.iter().map(|&first| (&self.spectrogram_db, first))
     }
 }
 

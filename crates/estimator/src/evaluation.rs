@@ -81,14 +81,36 @@ pub struct Evaluation<'a> {
     heard: Vec<Heard>,
 }
 
-/// Errors of one clip.
+/// Errors of one clip in one label.
 #[derive(Clone, Copy, Default)]
-struct ClipError {
-    model: f64,
-    constant: f64,
-    best: f64,
-    bias: f64,
-    covered: bool,
+pub(crate) struct ClipError {
+    pub model: f64,
+    pub constant: f64,
+    pub best: f64,
+    pub bias: f64,
+    pub covered: bool,
+}
+
+/// Errors by room of so many labels.
+pub(crate) fn summarise<K>(rooms: &BTreeMap<K, Vec<ClipError>>, labels: usize) -> Option<Errors> {
+    let count: usize = rooms.values().map(Vec::len).sum();
+    if count == 0 {
+        return None;
+    }
+    let mean = |f: &dyn Fn(&ClipError) -> f64| {
+        let means: Vec<f64> = rooms.values().map(|r| r.iter().map(f).sum::<f64>() / r.len() as f64).collect();
+        bootstrap(&means)
+    };
+    let covered = rooms.values().flatten().filter(|e| e.covered).count();
+    Some(Errors {
+        model: mean(&|e| e.model),
+        constant: mean(&|e| e.constant),
+        best_constant: mean(&|e| e.best),
+        gain: mean(&|e| e.model - e.constant),
+        bias: mean(&|e| e.bias),
+        coverage_90: covered as f64 / count as f64,
+        clips: count / labels.max(1),
+    })
 }
 
 impl<'a> Evaluation<'a> {
@@ -141,25 +163,7 @@ impl<'a> Evaluation<'a> {
                 rooms.entry(room).or_default().push(error);
             }
         }
-        let count: usize = rooms.values().map(Vec::len).sum();
-        if count == 0 {
-            return None;
-        }
-        let mean = |f: &dyn Fn(&ClipError) -> f64| {
-            let means =
-                rooms.values().map(|r| r.iter().map(f).sum::<f64>() / r.len() as f64).collect::<Vec<_>>();
-            bootstrap(&means)
-        };
-        let covered = rooms.values().flatten().filter(|e| e.covered).count();
-        Some(Errors {
-            model: mean(&|e| e.model),
-            constant: mean(&|e| e.constant),
-            best_constant: mean(&|e| e.best),
-            gain: mean(&|e| e.model - e.constant),
-            bias: mean(&|e| e.bias),
-            coverage_90: covered as f64 / count as f64,
-            clips: count / labels.len().max(1),
-        })
+        summarise(&rooms, labels.len())
     }
 
     fn errors(&self, label: usize, selection: &Selection) -> Vec<(i64, ClipError)> {

@@ -22,7 +22,7 @@ pub struct FeatureLayout {
     pub low_hz: f64,
     /// Upper end of the highest band in Hz.
     pub high_hz: f64,
-    /// Power below which a level is not told apart.
+    /// Power below which a level was not told apart in the clips that were trained on.
     pub floor_power: f64,
 }
 
@@ -44,7 +44,8 @@ impl Default for FeatureLayout {
 }
 
 impl FeatureLayout {
-    /// The extractor of these features.
+    /// The extractor of these features, with a floor so low that it is no limit: the level of a recording is free, and each
+    /// window is given its own floor when it is heard.
     ///
     /// # Errors
     /// [`Error::Weights`] if no extractor can be so.
@@ -56,7 +57,7 @@ impl FeatureLayout {
             mels: self.mels,
             low_hz: self.low_hz,
             high_hz: self.high_hz,
-            floor_power: self.floor_power,
+            floor_power: LEAST_POWER,
         };
         LogMel::new(config).map_err(|source| Error::Weights {
             name: "feature layout".into(),
@@ -79,6 +80,9 @@ impl FeatureLayout {
         self.hop as f64 / f64::from(self.sample_rate_hz)
     }
 }
+
+/// Floor of the features as they are extracted to be heard, relative to full scale.
+const LEAST_POWER: f64 = 1e-30;
 
 /// How features in dB become the input of the network.
 #[derive(Clone, Debug, PartialEq)]
@@ -104,13 +108,17 @@ impl Normalisation {
     }
 
     /// Copies `frames` frames from `first` on out of a longer spectrogram; where it ends, it begins again.
-    pub(crate) fn cut(spectrogram_db: ArrayView2<'_, f32>, first: usize, frames: usize) -> Vec<f32> {
+    pub(crate) fn cut(
+        spectrogram_db: ArrayView2<'_, f32>,
+        first: usize,
+        frames: usize,
+        window_db: &mut Vec<f32>,
+    ) {
         let available = spectrogram_db.ncols();
-        let mut window = Vec::with_capacity(spectrogram_db.nrows() * frames);
+        window_db.clear();
         for row in spectrogram_db.rows() {
-            window.extend((first..first + frames).map(|frame| row[frame % available]));
+            window_db.extend((first..first + frames).map(|frame| row[frame % available]));
         }
-        window
     }
 }
 

@@ -32,9 +32,11 @@
 //! |---|---|
 //! | an answer with its standard errors | [`Estimator::pretrained`], [`RoomEstimator::estimate`](sabine_acoustics::RoomEstimator::estimate) |
 //! | the windows it is made of, and reasons for doubt | [`Estimator::estimate_detailed`], [`Warning`] |
+//! | many recordings at once | [`Estimator::estimate_batch`] |
+//! | a live stream | [`LiveEstimator`] |
 //! | a guess to compare with | [`ConstantEstimator`] |
 //! | training | [`Dataset`], [`TrainConfig`], [`Trainer`] |
-//! | errors by octave and room | [`Evaluation`] |
+//! | errors by octave and room; by length of the recording | [`Evaluation`]; [`RecordingEvaluation`] |
 //! | the bare network | [`NetworkConfig`], [`Parameters`], [`Network`] |
 //!
 //! # Units and conventions
@@ -72,8 +74,10 @@ mod error;
 mod estimator;
 mod evaluation;
 mod graph;
+mod joint;
 mod labels;
 mod layout;
+mod live;
 mod loss;
 mod model;
 mod network;
@@ -81,6 +85,7 @@ mod norm;
 mod parameters;
 mod perturb;
 mod pool;
+mod recordings;
 mod shape;
 mod stack;
 mod trainer;
@@ -95,10 +100,12 @@ pub use estimator::{DetailedEstimate, Estimator, LEAST_DURATION_S, WindowEstimat
 pub use evaluation::{Errors, Evaluation, RoomMean, Selection};
 pub use labels::{EQ_COUNT, LABEL_COUNT, LabelScale, T60_COUNT, T60Scale, label_hz, label_name};
 pub use layout::{FeatureLayout, Normalisation};
+pub use live::LiveEstimator;
 pub use loss::Loss;
 pub use model::{Calibration, Model};
 pub use network::{Network, Scratch};
 pub use parameters::Parameters;
 pub use perturb::PerturbConfig;
+pub use recordings::{Recording, RecordingEvaluation};
 pub use trainer::{EpochRecord, Schedule, TrainConfig, Trained, Trainer};
 pub use warning::Warning;

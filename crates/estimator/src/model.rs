@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 
 /// Name and version of the format.
-const FORMAT: &str = "sabine-estimator-1";
+const FORMAT: &str = "sabine-estimator-2";
 /// The one metadata field.
 const FIELD: &str = "sabine";
 
@@ -22,8 +22,9 @@ pub struct Calibration {
     /// Factor on the standard deviation of each label, on the network's scale: of the learned deviation where the network
     /// gives one, else the deviation itself.
     pub deviation: Vec<f64>,
-    /// Correlation of the errors of different windows of one recording, 0..=1: with 1, many windows are no surer than one.
-    pub window_correlation: f64,
+    /// Correlation, label by label, of the errors of different windows of one recording, 0..=1: with 1, many windows are no
+    /// surer than one. Training leaves 1; [`Estimator::calibrated`](crate::Estimator::calibrated) measures it.
+    pub window_correlation: Vec<f64>,
     /// Range of each reverberation time that was trained on, in seconds: 1st and 99th percentile.
     pub t60_range_s: Vec<[f64; 2]>,
     /// Mean of each long-term statistic (mean and deviation over time of each normalised mel band) over the training set.
@@ -58,7 +59,6 @@ struct Header {
     network: NetworkConfig,
     t60: T60Scale,
     remove_level: bool,
-    window_correlation: f64,
     novelty_limit: f64,
 }
 
@@ -80,7 +80,6 @@ impl Model {
             network: self.parameters.config().clone(),
             t60: self.labels.t60,
             remove_level: self.normalisation.remove_level,
-            window_correlation: self.calibration.window_correlation,
             novelty_limit: self.calibration.novelty_limit,
         };
         let header =
@@ -121,6 +120,7 @@ impl Model {
             ("labels.mean", self.labels.mean.clone()),
             ("labels.deviation", self.labels.deviation.clone()),
             ("calibration.deviation", self.calibration.deviation.clone()),
+            ("calibration.window_correlation", self.calibration.window_correlation.clone()),
             ("calibration.t60_low_s", range(0)),
             ("calibration.t60_high_s", range(1)),
             ("calibration.statistic_mean", self.calibration.statistic_mean.clone()),
@@ -177,12 +177,17 @@ impl Model {
         let deviation_db = positive("normalisation.deviation_db", wide("normalisation.deviation_db", mels)?)?;
         let low = wide("calibration.t60_low_s", T60_COUNT)?;
         let high = wide("calibration.t60_high_s", T60_COUNT)?;
-        for (field, value) in
-            [("window_correlation", header.window_correlation), ("novelty_limit", header.novelty_limit)]
-        {
-            if !value.is_finite() || value < 0.0 {
-                return Err(ReadFault::Weights(WeightsFault::Metadata { field }));
-            }
+        let novelty_limit = header.novelty_limit;
+        if !novelty_limit.is_finite() || novelty_limit < 0.0 {
+            return Err(ReadFault::Weights(WeightsFault::Metadata { field: "novelty_limit" }));
+        }
+        let window_correlation = wide("calibration.window_correlation", LABEL_COUNT)?;
+        if let Some(value) = window_correlation.iter().find(|v| !(0.0..=1.0).contains(*v)) {
+            return Err(ReadFault::Weights(WeightsFault::Layout {
+                field: "calibration.window_correlation",
+                found: value.to_string(),
+                expected: "0 to 1".into(),
+            }));
         }
         Ok(Self {
             normalisation: Normalisation {
@@ -197,14 +202,14 @@ impl Model {
             },
             calibration: Calibration {
                 deviation: positive("calibration.deviation", wide("calibration.deviation", LABEL_COUNT)?)?,
-                window_correlation: header.window_correlation,
+                window_correlation,
                 t60_range_s: low.into_iter().zip(high).map(|(low, high)| [low, high]).collect(),
                 statistic_mean: wide("calibration.statistic_mean", 2 * mels)?,
                 statistic_deviation: positive(
                     "calibration.statistic_deviation",
                     wide("calibration.statistic_deviation", 2 * mels)?,
                 )?,
-                novelty_limit: header.novelty_limit,
+                novelty_limit,
             },
             parameters: Parameters::new(network, arrays).map_err(ReadFault::Other)?,
             layout: header.layout,

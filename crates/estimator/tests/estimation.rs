@@ -2,32 +2,16 @@
 
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
+#[path = "support/bursts.rs"]
+mod bursts;
+
+use bursts::bursts;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sabine_acoustics::{RoomEstimator, Signal};
 use sabine_estimator::{ConstantEstimator, Error, Estimator, Model, Warning, WeightsFault};
 
 const WEIGHTS: &[u8] = include_bytes!("../weights/room.safetensors");
-
-/// Bursts of noise, every half second or so, through an exponential decay: speech enough for a test of the machinery.
-fn bursts(seconds: f64, t60_s: f64, rate_hz: u32, seed: u64) -> Signal {
-    let mut rng = Pcg64Mcg::seed_from_u64(seed);
-    let rate = f64::from(rate_hz);
-    let fall = (-6.9078 / (t60_s * rate)).exp();
-    let (mut level, mut left) = (0.0f64, 0usize);
-    let samples = (0..(seconds * rate) as usize)
-        .map(|_| {
-            if left == 0 {
-                left = (rng.random_range(0.2..0.7) * rate) as usize;
-                level = rng.random_range(0.1..0.5);
-            }
-            left -= 1;
-            level *= fall;
-            (level * rng.random_range(-1.0..1.0)) as f32 + rng.random_range(-1e-4f32..1e-4)
-        })
-        .collect();
-    Signal::new(samples, rate_hz).expect("finite samples")
-}
 
 #[test]
 fn a_longer_decay_is_heard_as_longer() {
@@ -82,9 +66,27 @@ fn what_cannot_be_judged_is_refused_and_what_is_doubtful_is_said() {
     says(&Signal::new(noise, 16_000).unwrap(), |w| matches!(w, Warning::Noisy { .. }));
     let tone = (0..64_000).map(|n| (n as f32 * 0.4).sin()).collect();
     says(&Signal::new(tone, 16_000).unwrap(), |w| matches!(w, Warning::Unfamiliar { .. }));
+    // A chord of steady tones with a beat: music rather than speech.
+    let chord = |n: usize| {
+        let s = n as f32 / 16_000.0;
+        let beat = (1.0 - (s * 2.0).fract()).powi(2) + 0.05;
+        beat * [220.0f32, 277.2, 329.6, 440.0].iter().map(|hz| (6.2832 * hz * s).sin()).sum::<f32>() * 0.2
+    };
+    let music = Signal::new((0..128_000).map(chord).collect(), 16_000).unwrap();
+    says(&music, |w| matches!(w, Warning::Unfamiliar { .. }));
     let mut pause = speech.into_samples();
     pause.extend(vec![1e-5; 160_000]);
     says(&Signal::new(pause, 16_000).unwrap(), |w| matches!(w, Warning::Inactive { .. }));
+}
+
+#[test]
+fn a_reverberation_time_outside_the_range_that_was_trained_on_is_said() {
+    let mut model = Estimator::pretrained().unwrap().model().clone();
+    model.calibration.t60_range_s = vec![[0.05, 0.2]; 7];
+    let estimator = Estimator::new(model).unwrap();
+    let found = estimator.estimate_detailed(&bursts(6.0, 0.8, 16_000, 1)).unwrap().warnings;
+    let edges = found.iter().filter(|w| matches!(w, Warning::EdgeOfRange { high_s, .. } if *high_s == 0.2));
+    assert_eq!(edges.count(), 7, "{found:?}");
 }
 
 #[test]
@@ -125,7 +127,7 @@ fn weights_that_do_not_fit_are_refused_with_the_reason() {
         fault(&bytes)
     };
     assert!(matches!(
-        replaced("sabine-estimator-1", "sabine-estimator-9"),
+        replaced("sabine-estimator-2", "sabine-estimator-9"),
         WeightsFault::Layout { field: "format", .. }
     ));
     assert!(matches!(replaced("\"sabine\"", "\"nobody\""), WeightsFault::Metadata { .. }));

@@ -1,0 +1,130 @@
+//! One answer from many windows.
+
+use crate::Error;
+use crate::estimator::{DetailedEstimate, Estimator, WindowEstimate};
+use crate::labels::{LABEL_COUNT, T60_COUNT, label_hz, per_band};
+use crate::warning::Warning;
+use crate::windows::Loudness;
+use sabine_acoustics::RoomTargets;
+
+/// What one window says, on the scale of the network.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct WindowOutput {
+    /// Standardised labels.
+    pub mean: [f64; LABEL_COUNT],
+    /// Their calibrated standard deviations.
+    pub deviation: [f64; LABEL_COUNT],
+    /// How unlike the training set the window is.
+    pub novelty: f64,
+}
+
+/// A window that was heard, not yet weighed against others.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct HeardWindow {
+    /// Its first frame.
+    pub first: usize,
+    pub loudness: Loudness,
+    pub output: WindowOutput,
+}
+
+/// One label joined over windows, before the correlation of their errors is taken into account.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct JointLabel {
+    pub mean: f64,
+    /// Variance of one window.
+    pub variance: f64,
+    /// Number of windows, less where some count more than others.
+    pub windows: f64,
+}
+
+impl JointLabel {
+    /// The mean weighted by precision and `weights`.
+    pub fn new(heard: &[HeardWindow], weights: &[f64], label: usize) -> Self {
+        let (mut total, mut squares, mut mean, mut variance) = (0.0, 0.0, 0.0, 0.0);
+        for (window, weight) in heard.iter().zip(weights) {
+            let own = window.output.deviation[label].powi(2);
+            let precision = weight / own;
+            total += precision;
+            squares += precision * precision;
+            mean += precision * window.output.mean[label];
+            variance += precision * own;
+        }
+        Self { mean: mean / total, variance: variance / total, windows: total * total / squares }
+    }
+
+    /// Standard deviation where the errors of windows have this correlation: the variance of one window is
+    /// `correlation + (1 - correlation) / windows` of what it was.
+    pub fn deviation(&self, correlation: f64) -> f64 {
+        (self.variance * (correlation + (1.0 - correlation) / self.windows)).sqrt()
+    }
+}
+
+/// What each window is worth beside the others: nothing without speech.
+pub(crate) fn weigh(heard: &[HeardWindow]) -> Vec<f64> {
+    let loudest_db = heard.iter().map(|h| h.loudness.high_db).fold(f64::NEG_INFINITY, f64::max);
+    let weight = |loudness: &Loudness| if loudness.is_active(loudest_db) { loudness.weight() } else { 0.0 };
+    heard.iter().map(|h| weight(&h.loudness)).collect()
+}
+
+impl Estimator {
+    /// Joins windows and says what may be wrong with them.
+    pub(crate) fn judge(
+        &self,
+        heard: &[HeardWindow],
+        mut warnings: Vec<Warning>,
+    ) -> Result<DetailedEstimate, Error> {
+        let calibration = &self.model.calibration;
+        let weights = weigh(heard);
+        let inactive = weights.iter().filter(|w| **w == 0.0).count();
+        if inactive > 0 {
+            warnings.push(Warning::Inactive { windows: inactive, of: heard.len() });
+        }
+        let active = || heard.iter().zip(&weights).filter(|(_, w)| **w > 0.0).map(|(heard, _)| heard);
+        let range_db = active().map(|h| h.loudness.range_db).fold(f64::NEG_INFINITY, f64::max);
+        if active().all(|h| h.loudness.is_noisy()) {
+            warnings.push(Warning::Noisy { range_db });
+        }
+        let novelty = active().map(|h| h.output.novelty).sum::<f64>() / active().count().max(1) as f64;
+        if novelty > calibration.novelty_limit {
+            warnings.push(Warning::Unfamiliar { novelty, limit: calibration.novelty_limit });
+        }
+        let joint: [JointLabel; LABEL_COUNT] =
+            std::array::from_fn(|label| JointLabel::new(heard, &weights, label));
+        let targets = self.targets(|label| {
+            (joint[label].mean, joint[label].deviation(calibration.window_correlation[label]))
+        })?;
+        for (band, range) in calibration.t60_range_s.iter().enumerate().take(T60_COUNT) {
+            let t60_s = targets.t60_s().values()[band].value;
+            if t60_s < range[0] || t60_s > range[1] {
+                let band_hz = label_hz(band);
+                warnings.push(Warning::EdgeOfRange { band_hz, t60_s, low_s: range[0], high_s: range[1] });
+            }
+        }
+        let total: f64 = weights.iter().sum();
+        let frame_s = self.model.layout.frame_s();
+        let windows = heard
+            .iter()
+            .zip(&weights)
+            .map(|(HeardWindow { first, output, .. }, weight)| {
+                Ok(WindowEstimate {
+                    start_s: *first as f64 * frame_s,
+                    targets: self.targets(|label| (output.mean[label], output.deviation[label]))?,
+                    weight: weight / total,
+                })
+            })
+            .collect::<Result<_, Error>>()?;
+        Ok(DetailedEstimate { targets, windows, warnings })
+    }
+
+    /// Targets from a mean and a deviation of each label on the network's scale.
+    fn targets(&self, label: impl Fn(usize) -> (f64, f64)) -> Result<RoomTargets, Error> {
+        let labels: Vec<_> = (0..LABEL_COUNT)
+            .map(|k| {
+                let (mean, deviation) = label(k);
+                self.model.labels.decode(k, mean, deviation)
+            })
+            .collect();
+        let (t60_s, eq_db) = per_band(&labels);
+        Ok(RoomTargets::new(t60_s, eq_db)?)
+    }
+}
