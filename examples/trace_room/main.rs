@@ -46,7 +46,7 @@ struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 3)]
     order: usize,
     /// Length of the response in seconds [default: until T30 can be read]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     duration: Option<f64>,
     /// How the source radiates, along its orientation in the room file or else towards the receiver
     #[arg(long, value_enum, default_value = "omni")]

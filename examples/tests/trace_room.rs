@@ -1,0 +1,106 @@
+//! `trace_room` as a user runs it: what it writes, that threads change nothing, and what it says of bad input.
+
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
+use sabine::acoustics::{Channel, ImpulseResponse, OctaveBands, RoomParameters, read_audio};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// `cargo test` builds the examples beside the tests.
+fn program() -> PathBuf {
+    let tests = std::env::current_exe().unwrap();
+    let folder = tests.ancestors().nth(2).unwrap().join("examples");
+    let program = folder.join(format!("trace_room{}", std::env::consts::EXE_SUFFIX));
+    assert!(program.exists(), "{} is missing: run `cargo test --workspace`", program.display());
+    program
+}
+
+fn run(arguments: &[&str]) -> Output {
+    Command::new(program()).args(arguments).output().unwrap()
+}
+
+fn traced(out: &Path, more: &[&str]) -> Value {
+    let output =
+        run(&[&["--rays", "4000", "--rate", "16000", "--out", out.to_str().unwrap()], more].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_str(&std::fs::read_to_string(out.join("parameters.json")).unwrap()).unwrap()
+}
+
+fn numbers(result: &Value, key: &str) -> Vec<f64> {
+    result[key]
+        .as_array()
+        .unwrap_or_else(|| panic!("{key} is missing"))
+        .iter()
+        .map(|v| v.as_f64().unwrap())
+        .collect()
+}
+
+#[test]
+fn the_response_measures_what_the_paths_say() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let result = traced(&out, &[]);
+    let t30_s = numbers(&result, "t30_s");
+    assert_eq!(numbers(&result, "bands_hz"), [125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0]);
+    for key in ["edt_s", "t20_s", "c50_db", "c80_db", "d50", "centre_time_s", "drr_db"] {
+        assert_eq!(numbers(&result, key).len(), 7);
+    }
+    for (sd, t30) in numbers(&result, "t30_sd_s").iter().zip(&t30_s) {
+        assert!(*sd > 0.0 && *sd < 0.2 * t30, "{sd} of {t30}");
+    }
+    assert!(
+        result["contributions"].as_u64().unwrap() > 1000
+            && result["seconds"]["trace"].as_f64().unwrap() > 0.0
+    );
+    assert!(std::fs::read_to_string(out.join("plan.svg")).unwrap().contains("<polyline"));
+
+    // Measured by ISO 3382 on the sound itself, by code that knows nothing of paths.
+    let response =
+        ImpulseResponse::from(read_audio(out.join("impulse_response.wav"), Channel::Mono).unwrap());
+    let bands = OctaveBands::new(250.0, 4000.0).unwrap();
+    let room = RoomParameters::measure(&response, bands).unwrap();
+    for (measured, expected) in room.t30_s.values().iter().zip(&t30_s[1..6]) {
+        let measured = measured.as_ref().unwrap().value;
+        assert!((measured / expected - 1.0).abs() < 0.06, "{measured} s, {expected} s by the paths");
+    }
+    let ambisonics = out.join("ambisonics.wav");
+    assert!(
+        read_audio(&ambisonics, Channel::Index(3)).is_ok()
+            && read_audio(&ambisonics, Channel::Index(4)).is_err()
+    );
+}
+
+#[test]
+fn threads_change_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = |name: &str, threads: &str| {
+        let out = folder.path().join(name);
+        traced(&out, &["--threads", threads, "--seed", "5", "--duration", "0.5"]);
+        ["impulse_response.wav", "ambisonics.wav", "plan.svg"]
+            .map(|file| std::fs::read(out.join(file)).unwrap())
+    };
+    assert!(bytes("one", "1") == bytes("three", "3"));
+}
+
+#[test]
+fn bad_input_is_named_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let empty = folder.path().join("no_room");
+    for (arguments, named) in [
+        (vec!["--source", "nobody"], "nobody"),
+        (vec!["--rays", "0"], "rays"),
+        (vec!["--order", "99"], "image_order"),
+        (vec!["--ambisonics", "7"], "ambisonic order"),
+        (vec!["--rate", "10"], "sample_rate_hz"),
+        (vec!["--duration", "-1"], "duration_s"),
+        (vec!["--room", empty.to_str().unwrap()], "room.toml"),
+    ] {
+        let output = run(&[&arguments[..], &["--out", out.to_str().unwrap()]].concat());
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_ne!(output.status.code(), Some(0), "{arguments:?}");
+        assert!(message.contains(named) && !message.contains("panicked"), "{arguments:?}: {message}");
+        assert!(!out.exists(), "{arguments:?} left {}", out.display());
+    }
+}
