@@ -252,7 +252,9 @@ fn write_recordings(
     }
     let mut out = OutputFolder::create(out)?;
     let mut entries = Vec::new();
-    for (index, (room, name, response)) in responses(arguments, &manifest, wanted)?.into_iter().enumerate() {
+    for (index, Place { room, name, response }) in
+        responses(arguments, &manifest, wanted)?.into_iter().enumerate()
+    {
         let labels = Labels::measure(&response)?;
         // Numbers that fill their range evenly: no two recordings are alike, and they are the same every time.
         let share = |ratio: f64| (index as f64 * ratio).fract();
@@ -288,12 +290,20 @@ fn write_recordings(
     Ok(())
 }
 
-/// Room, name and response: some of each measured room of the part, and for validation simulated rooms as well.
+/// Where a recording is made.
+struct Place {
+    room: String,
+    /// File and channel of the response, or its seed.
+    name: String,
+    response: ImpulseResponse,
+}
+
+/// Some responses of each measured room of the part, and for validation simulated rooms as well.
 fn responses(
     arguments: &Arguments,
     manifest: &Manifest,
     wanted: Dealt,
-) -> Result<Vec<(String, String, ImpulseResponse)>, Box<dyn Error>> {
+) -> Result<Vec<Place>, Box<dyn Error>> {
     // Rooms of other parts are not even read.
     let others = manifest.room_partitions.iter().filter(|(_, part)| **part != wanted);
     let filter = ResponseFilter {
@@ -315,7 +325,8 @@ fn responses(
             let of_room: Vec<_> = corpus.responses().iter().filter(|r| r.room == room).collect();
             for k in 0..PER_ROOM {
                 let response = of_room[k * of_room.len() / PER_ROOM];
-                chosen.push((room.clone(), response.path.clone(), response.response.clone()));
+                let (name, response) = (response.path.clone(), response.response.clone());
+                chosen.push(Place { room: room.clone(), name, response });
             }
         }
     }
@@ -326,7 +337,7 @@ fn responses(
         // Seeds that the data set has not used: it derives its own from a hash.
         for seed in 0..SIMULATED_ROOMS as u64 {
             let name = format!("simulated/{seed}");
-            chosen.push((name.clone(), name, rooms.draw(seed)?));
+            chosen.push(Place { room: name.clone(), name, response: rooms.draw(seed)? });
         }
     }
     Ok(chosen)

@@ -70,7 +70,11 @@ fn what_cannot_be_judged_is_refused_and_what_is_doubtful_is_said() {
     let chord = |n: usize| {
         let s = n as f32 / 16_000.0;
         let beat = (1.0 - (s * 2.0).fract()).powi(2) + 0.05;
-        beat * [220.0f32, 277.2, 329.6, 440.0].iter().map(|hz| (6.2832 * hz * s).sin()).sum::<f32>() * 0.2
+        beat * [220.0f32, 277.2, 329.6, 440.0]
+            .iter()
+            .map(|hz| (std::f32::consts::TAU * hz * s).sin())
+            .sum::<f32>()
+            * 0.2
     };
     let music = Signal::new((0..128_000).map(chord).collect(), 16_000).unwrap();
     says(&music, |w| matches!(w, Warning::Unfamiliar { .. }));

@@ -7,6 +7,7 @@
 Needs numpy, onnx, onnxruntime and safetensors; PyTorch is left out, and said so, where it is absent. The network is written as
 an ONNX graph from the weights file. Prints how far the outputs are apart, clips per second (median, best) at one window and at
 64 windows in a call, training clips per second at a batch of 64, and ratios. Rounds alternate, so load falls on all alike.
+PROFILE=debug takes a development build instead.
 Training: here a whole epoch of the trainer, reading and labels included; in PyTorch the bare steps on tensors in memory.
 """
 import glob
