@@ -15,6 +15,12 @@ const RANGE_DB: f64 = 30.0;
 
 type Point = [f64; 3];
 
+/// A side that triangles share, and their normals.
+struct Edge {
+    ends: [Point; 2],
+    normals: Vec<Point>,
+}
+
 /// A reflection of first order.
 struct FirstReflection {
     point: Point,
@@ -178,7 +184,7 @@ fn first_reflections(
 fn outlines(room: &MeasuredRoom) -> Vec<[Point; 2]> {
     let scene = room.scene();
     let key = |p: Point| p.map(|c| (c * 1e4).round() as i64);
-    let mut edges: BTreeMap<[[i64; 3]; 2], ([Point; 2], Vec<Point>)> = BTreeMap::new();
+    let mut edges: BTreeMap<[[i64; 3]; 2], Edge> = BTreeMap::new();
     for i in 0..scene.triangles().len() {
         let corners = scene.corners_m(i);
         let side = |a: Point, b: Point| -> Point { std::array::from_fn(|k| b[k] - a[k]) };
@@ -193,12 +199,16 @@ fn outlines(room: &MeasuredRoom) -> Vec<[Point; 2]> {
             let (a, b) = (corners[k], corners[(k + 1) % 3]);
             let mut ends = [key(a), key(b)];
             ends.sort_unstable();
-            edges.entry(ends).or_insert_with(|| ([a, b], Vec::new())).1.push(normal);
+            edges
+                .entry(ends)
+                .or_insert_with(|| Edge { ends: [a, b], normals: Vec::new() })
+                .normals
+                .push(normal);
         }
     }
     let bends = |normals: &[Point]| {
         let cosine = |n: &Point| (0..3).map(|k| n[k] * normals[0][k]).sum::<f64>().abs();
         normals.len() == 1 || normals.iter().any(|n| cosine(n) < FLAT)
     };
-    edges.into_values().filter(|(_, normals)| bends(normals)).map(|(ends, _)| ends).collect()
+    edges.into_values().filter(|edge| bends(&edge.normals)).map(|edge| edge.ends).collect()
 }
