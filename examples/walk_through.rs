@@ -106,7 +106,7 @@ fn run(arguments: &Arguments) -> Result<(), Anything> {
         seed: arguments.seed,
         ..Default::default()
     };
-    let mut tracer = MovingTracer::new(scene, air.clone(), MovingConfig { tracer, ..Default::default() })?;
+    let mut tracer = MovingTracer::new(scene, air, MovingConfig { tracer, ..Default::default() })?;
 
     let rate = f64::from(arguments.rate);
     let block = (arguments.rate as usize / 375).next_power_of_two().max(16);
@@ -355,11 +355,7 @@ fn two_rooms() -> Result<Setting, Anything> {
     ];
     let lines_m = [vec![0.0, 6.0, 6.2, 11.2], vec![0.0, 2.0, 3.0, 4.0, 5.0], vec![0.0, 2.1, 3.0]];
     // Which cells between these lines are air.
-    let is_air = |cell: [isize; 3]| match cell {
-        [0, 0..4, 0..2] | [2, 0..3, 0..2] => true,
-        [1, 1, 0] => true,
-        _ => false,
-    };
+    let is_air = |cell: [isize; 3]| matches!(cell, [0, 0..4, 0..2] | [2, 0..3, 0..2] | [1, 1, 0]);
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
     let mut numbers = BTreeMap::new();
     for x in 0..3isize {

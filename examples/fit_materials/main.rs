@@ -89,8 +89,11 @@ struct Outcome {
     warnings: Vec<String>,
     seconds: Seconds,
     /// For each octave, what a chart shows: name, look, and points.
-    curves: Vec<Vec<(&'static str, Look, Vec<(f64, f64)>)>>,
+    curves: Vec<Vec<Curve>>,
 }
+
+/// A line of a plot: its name, how it is drawn, its points.
+type Curve = (&'static str, Look, Vec<(f64, f64)>);
 
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
@@ -378,11 +381,7 @@ fn values(readings: &PerBand<Reading>) -> Vec<Option<f64>> {
     readings.values().iter().map(|r| r.as_ref().ok().map(|t| t.value)).collect()
 }
 
-fn response_curves(
-    before: &DecayMisfit,
-    after: &DecayMisfit,
-    b: usize,
-) -> Vec<(&'static str, Look, Vec<(f64, f64)>)> {
+fn response_curves(before: &DecayMisfit, after: &DecayMisfit, b: usize) -> Vec<Curve> {
     let of = |m: &DecayMisfit, pick: fn(&(f64, f64, f64)) -> f64| -> Vec<(f64, f64)> {
         m.curves.values()[b].iter().map(|p| (p.0, pick(p))).collect()
     };
@@ -393,7 +392,7 @@ fn response_curves(
     ]
 }
 
-fn decay_chart(curves: &[(&'static str, Look, Vec<(f64, f64)>)]) -> Chart {
+fn decay_chart(curves: &[Curve]) -> Chart {
     let longest_s = curves.iter().flat_map(|c| &c.2).map(|p| p.0).fold(0.1, f64::max);
     let colours = [4, 0, 1];
     let series = curves.iter().zip(colours);

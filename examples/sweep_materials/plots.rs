@@ -38,7 +38,8 @@ pub fn tables(points: &[Point]) -> String {
     let mut text = String::from(
         "| objective | read from | targets | reachable | not read | median % | 95th percentile % | largest % |\n|---|---|---|---|---|---|---|---|\n",
     );
-    let readings: [(&str, fn(&Point) -> Option<f64>); 2] =
+    type Reading = fn(&Point) -> Option<f64>;
+    let readings: [(&str, Reading); 2] =
         [("rendered response", |p| p.rendered_s), ("energy", |p| p.energy_s)];
     for (method, name) in METHODS {
         for (what, read) in readings {
