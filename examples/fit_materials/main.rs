@@ -86,6 +86,7 @@ struct Outcome {
     /// What the response is rendered from.
     independent: PathSet,
     compared: Vec<Compared>,
+    /// Besides those of the fit.
     warnings: Vec<String>,
     seconds: Seconds,
     /// For each octave, what a chart shows: name, look, and points.
@@ -129,7 +130,7 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
         out.write("responses.json", serde_json::to_string_pretty(&outcome.compared)?.as_bytes())?;
     }
     let mut page = Page::new("Materials fitted");
-    page.warnings(&outcome.warnings).heading("Decay before and after");
+    page.warnings(&summary.notes).heading("Decay before and after");
     page.markup("<div class=\"small\">");
     for (b, curves) in outcome.curves.iter().enumerate() {
         let chart = decay_chart(curves);
@@ -242,8 +243,7 @@ impl<'a> Room<'a> {
                 ("wanted", Look::Dashed, vec![(0.0, 0.0), (t60_s[b], -60.0)]),
             ]
         });
-        let warnings = done.not_verified.iter().map(ToString::to_string);
-        let warnings = warnings.chain(done.fit.warnings.iter().map(ToString::to_string)).collect();
+        let warnings = done.not_verified.iter().map(ToString::to_string).collect();
         let (trace, fit) = done.seconds;
         Ok(Outcome {
             target_s: t60_s.iter().map(|&t| Some(t)).collect(),
@@ -330,10 +330,9 @@ impl<'a> Room<'a> {
                 decay_rmse_after_db: levels(&after),
             });
         }
-        let mut warnings: Vec<String> = done.fit.warnings.iter().map(ToString::to_string).collect();
-        warnings.extend(
-            done.left_out.iter().map(|(i, hz, why)| format!("response {i} at {hz} Hz is left out: {why}")),
-        );
+        let left_out = done.left_out.iter();
+        let warnings =
+            left_out.map(|(i, hz, why)| format!("response {i} at {hz} Hz is left out: {why}")).collect();
         let mean = |of: &dyn Fn(&Compared) -> &Vec<Option<f64>>| -> Vec<Option<f64>> {
             let used = || compared.iter().filter(|c| !c.held_out);
             (0..OCTAVES.len()).map(|b| mean_of(used().filter_map(|c| of(c)[b]))).collect()

@@ -14,6 +14,8 @@ pub struct Summary {
     pub unreachable: Vec<UnreachableBand>,
     pub materials: BTreeMap<String, Fitted>,
     pub not_determined: Vec<String>,
+    /// Bounds that were reached and warnings, in words; `not_determined` is among them.
+    pub notes: Vec<String>,
     pub seconds: Seconds,
 }
 
@@ -62,7 +64,12 @@ impl Summary {
             absorption: fit.materials[k].absorption().values().to_vec(),
             absorption_sd: fit.absorption_standard_error[k].values().to_vec(),
         };
+        let not_determined: Vec<String> = fit.not_determined.iter().map(|u| u.describe(names)).collect();
+        let bounds = fit.at_bounds.iter().map(|bound| bound.describe(names));
+        let warnings = fit.warnings.iter().map(|warning| warning.describe(names));
+        let notes = bounds.chain(warnings).chain(outcome.warnings.clone()).chain(not_determined.clone());
         Self {
+            notes: notes.collect(),
             bands_hz: OCTAVES.iter_hz().collect(),
             target_t60_s: outcome.target_s.clone(),
             reached_t60_s: outcome.reached_s.clone(),
@@ -72,7 +79,7 @@ impl Summary {
                 .map(|u| UnreachableBand { band_hz: u.band_hz, reason: u.reason.to_string() })
                 .collect(),
             materials: names.iter().enumerate().map(|(k, n)| ((*n).to_owned(), fitted(k))).collect(),
-            not_determined: fit.not_determined.iter().map(|u| u.describe(names)).collect(),
+            not_determined,
             seconds: Seconds { ..outcome.seconds },
         }
     }
@@ -121,10 +128,7 @@ impl Summary {
         for band in &self.unreachable {
             println!("unreachable: {} Hz: {}", band.band_hz, band.reason);
         }
-        for bound in &outcome.fit.at_bounds {
-            println!("at a bound: {bound}");
-        }
-        for text in self.not_determined.iter().chain(&outcome.warnings) {
+        for text in &self.notes {
             println!("note: {text}");
         }
         println!(

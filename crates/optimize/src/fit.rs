@@ -129,14 +129,18 @@ pub struct AtBound {
     pub upper: bool,
 }
 
+impl AtBound {
+    /// The finding in words, with a name for each material; one without a name is called by its number.
+    pub fn describe(&self, names: &[&str]) -> String {
+        let side = if self.upper { "upper" } else { "lower" };
+        let (name, absorption) = (name_of(self.material, names), self.absorption);
+        format!("{} Hz: {name} stands at the {side} bound of absorption, {absorption}", self.band_hz)
+    }
+}
+
 impl fmt::Display for AtBound {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let side = if self.upper { "upper" } else { "lower" };
-        write!(
-            f,
-            "{} Hz: material {} stands at the {side} bound of absorption, {}",
-            self.band_hz, self.material, self.absorption
-        )
+        f.write_str(&self.describe(&[]))
     }
 }
 
@@ -167,8 +171,7 @@ impl Undetermined {
     /// The finding in words, with a name for each material: "floor and ceiling cannot be told apart at 2 kHz".
     /// A material without a name is called by its number.
     pub fn describe(&self, names: &[&str]) -> String {
-        let name = |&m: &usize| names.get(m).map_or_else(|| format!("material {m}"), |&n| n.to_owned());
-        let materials = in_words(&self.materials.iter().map(name).collect::<Vec<_>>());
+        let materials = in_words(&self.materials.iter().map(|&m| name_of(m, names)).collect::<Vec<_>>());
         let bands = bands_in_words(&self.bands_hz);
         let several = self.materials.len() > 1;
         match self.kind {
@@ -222,24 +225,33 @@ pub enum Warning {
     },
 }
 
-impl fmt::Display for Warning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl Warning {
+    /// The warning in words, with a name for each material; one without a name is called by its number.
+    pub fn describe(&self, names: &[&str]) -> String {
         match self {
-            Self::FarFromPrior { material, band_hz, deviations } => write!(
-                f,
-                "{band_hz} Hz: material {material} had to move {deviations:+.1} standard deviations from its prior"
+            Self::FarFromPrior { material, band_hz, deviations } => format!(
+                "{band_hz} Hz: {} had to move {deviations:+.1} standard deviations from its prior",
+                name_of(*material, names)
             ),
-            Self::FewPaths { band_hz, relative_error } => write!(
-                f,
+            Self::FewPaths { band_hz, relative_error } => format!(
                 "{band_hz} Hz: the rays leave T60 uncertain by {:.0} %; trace more of them",
                 100.0 * relative_error
             ),
-            Self::ShortPaths { band_hz, traced_s, advised_s } => write!(
-                f,
+            Self::ShortPaths { band_hz, traced_s, advised_s } => format!(
                 "{band_hz} Hz: paths end after {traced_s:.2} s; {advised_s:.2} s are advised, or T60 is read short"
             ),
         }
     }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.describe(&[]))
+    }
+}
+
+fn name_of(material: usize, names: &[&str]) -> String {
+    names.get(material).map_or_else(|| format!("material {material}"), |&name| name.to_owned())
 }
 
 fn in_words(items: &[String]) -> String {
