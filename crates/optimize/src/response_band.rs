@@ -263,7 +263,7 @@ impl<'b> BandFit<'b> {
             }
         }
         let shows = (0..n).map(|k| sd[k] > 0.0 && information[(k, k)] >= SHOWS).collect();
-        let mean = parts.iter().sum::<DVector<f64>>() / batches.max(1) as f64;
+        let mean = parts.iter().fold(DVector::zeros(n), |sum, part| sum + part) / batches.max(1) as f64;
         let mut rays = DMatrix::<f64>::zeros(n, n);
         for part in &parts {
             let off = part - &mean;
