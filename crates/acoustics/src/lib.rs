@@ -114,6 +114,7 @@ mod measured_room;
 mod mesh_file;
 mod onset;
 mod orientation;
+mod packed_direction;
 mod parameters;
 mod path_parameters;
 mod paths;

@@ -1,5 +1,6 @@
 //! Traced paths: the seam between a tracer and everything after it.
 
+use crate::packed_direction::{pack_direction, unpack_direction};
 use crate::reweighting::{LANES, Lanes, exp, sums_along};
 use crate::{
     Air, Conditions, Directivity, EdgeDiffraction, EnergyResponse, Error, Material, OctaveBands, Orientation,
@@ -566,50 +567,14 @@ fn log_steps(materials: &[Material], first: usize, bands: usize) -> Vec<Lanes> {
     materials.iter().flat_map(|material| [event(material, false), event(material, true)]).collect()
 }
 
-/// Octahedral map to two 16-bit integers (Cigolle et al. 2014, JCGT 3(2)): four bytes for a direction.
-fn pack_direction(direction: [f64; 3]) -> u32 {
-    let [x, y, z] = direction;
-    let sum = x.abs() + y.abs() + z.abs();
-    let (mut u, mut v) = (x / sum, y / sum);
-    if z < 0.0 {
-        (u, v) = ((1.0 - v.abs()) * u.signum(), (1.0 - u.abs()) * v.signum());
-    }
-    let quantise = |c: f64| ((c * 32767.0).round() as i16) as u16;
-    u32::from(quantise(u)) << 16 | u32::from(quantise(v))
-}
-
-fn unpack_direction(packed: u32) -> [f64; 3] {
-    let restore = |bits: u16| f64::from(bits as i16) / 32767.0;
-    let (mut x, mut y) = (restore((packed >> 16) as u16), restore(packed as u16));
-    let z = 1.0 - x.abs() - y.abs();
-    if z < 0.0 {
-        (x, y) = ((1.0 - y.abs()) * x.signum(), (1.0 - x.abs()) * y.signum());
-    }
-    let norm = (x * x + y * y + z * z).sqrt();
-    [x / norm, y / norm, z / norm]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
 
     const UP: [f64; 3] = [0.0, 0.0, 1.0];
 
     fn path(length_m: f64, log_weight: f64, chain: u32, batch: Option<u8>) -> Contribution {
         Contribution { length_m, log_weight, chain, tail: PathSet::DIRECT, departure: UP, arrival: UP, batch }
-    }
-
-    proptest! {
-        #[test]
-        fn packed_directions_keep_their_angle(z in -1.0f64..1.0, azimuth in 0.0f64..std::f64::consts::TAU) {
-            let r = (1.0 - z * z).sqrt();
-            let d = [r * azimuth.cos(), r * azimuth.sin(), z];
-            let back = unpack_direction(pack_direction(d));
-            let cross = [d[1] * back[2] - d[2] * back[1], d[2] * back[0] - d[0] * back[2], d[0] * back[1] - d[1] * back[0]];
-            let sine = cross.iter().map(|c| c * c).sum::<f64>().sqrt();
-            prop_assert!(sine.asin().to_degrees() < 0.005, "{d:?} became {back:?}");
-        }
     }
 
     #[test]
