@@ -1,165 +1,154 @@
-//! A named physical cause of a misfit, and its fit.
+//! A named physical cause of a misfit, and the cases in which it can come.
 
-use crate::{Error, Misfit};
-use nalgebra::{DMatrix, DVector};
-use sabine_acoustics::{EnergyResponse, OctaveBands};
+use crate::{ArrivalView, BandView, Survey};
 
 /// A parameter of an effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
-    /// Name, with the band where it belongs to one.
+    /// Name, with the octave where it belongs to one.
     pub name: String,
-    /// Unit.
+    /// Unit; empty for a pure number.
     pub unit: &'static str,
-    /// Value at which the effect is absent.
+    /// Most probable value before anything is measured; that at which the effect is absent, where there is one.
     pub neutral: f64,
-    /// Standard deviation of the prior about the neutral value.
+    /// Standard deviation of the prior, a normal distribution about the neutral value.
     pub prior_sd: f64,
     /// Least and greatest value.
     pub bounds: (f64, f64),
+    /// A value at which the effect is plain to see: where its signature is compared with those of others.
+    pub typical: f64,
+    /// The only band that it bears on, where there is one.
+    pub band: Option<usize>,
 }
 
-/// One named physical cause: a small parametric extension of the prediction.
+impl Parameter {
+    /// A parameter of all bands.
+    pub fn new(
+        name: impl Into<String>,
+        unit: &'static str,
+        neutral: f64,
+        prior_sd: f64,
+        bounds: (f64, f64),
+    ) -> Self {
+        Self { name: name.into(), unit, neutral, prior_sd, bounds, typical: neutral, band: None }
+    }
+
+    /// The same, with the value at which its signature is plain.
+    #[must_use]
+    pub fn typically(self, typical: f64) -> Self {
+        Self { typical, ..self }
+    }
+
+    /// The same, for one band alone, whose nominal centre is added to the name.
+    #[must_use]
+    pub fn in_band(self, band: usize, survey: &Survey) -> Self {
+        let name = format!("{}_{}_hz", self.name, survey.bands().nominal_hz(band));
+        Self { name, band: Some(band), ..self }
+    }
+}
+
+/// Something that every fit leaves open within a prior, and whose prior an effect may widen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Nuisance {
+    /// Absorption of a material (index) in all bands; standard deviation as a share of energy.
+    Absorption(usize),
+    /// Place of a source (index); metres along each axis.
+    SourcePosition(usize),
+    /// Place of a receiver (index); metres along each axis.
+    ReceiverPosition(usize),
+    /// Gain of a response (index) in all bands; dB.
+    ResponseGain(usize),
+}
+
+/// What part of the data an effect bears on. Decays and arrival times are fitted separately: no effect needs both at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Evidence {
+    /// Energy over time in octaves.
+    Energy,
+    /// Arrival times of the direct sound and of early reflections.
+    Arrivals,
+    /// Which response is which, or its sign: both of the above and polarity.
+    Assignment,
+}
+
+/// Where in the chain from loudspeaker to file an effect sits: earlier ones are applied first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// Source, surfaces and air.
+    Room,
+    /// Sound that joins from elsewhere.
+    Added,
+    /// Loudspeaker and microphone response.
+    Transducer,
+    /// Noise.
+    Noise,
+    /// What the recorder cuts.
+    Recorder,
+}
+
+/// A named physical cause: an entry of the catalogue.
+///
+/// To add one, implement this and [`Case`], and hand it to [`Diagnoser::with_effects`](crate::Diagnoser::with_effects) beside
+/// [`catalogue`](crate::catalogue).
 pub trait Effect: Send + Sync {
     /// Identifier in the catalogue.
     fn id(&self) -> &'static str;
 
-    /// Parameters, given the bands of the data.
-    fn parameters(&self, bands: OctaveBands) -> Vec<Parameter>;
+    /// One sentence for people: what is the matter.
+    fn explanation(&self) -> &'static str;
 
-    /// The prediction with the effect at work; `values` in the order of [`Effect::parameters`].
-    ///
-    /// # Errors
-    /// Where the vocabulary refuses the result.
-    fn apply(&self, values: &[f64], predicted: &EnergyResponse) -> Result<EnergyResponse, Error>;
+    /// The cases in which it may come: one for each receiver, material, response ..., or a single one. None if it cannot be at
+    /// work here.
+    fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>>;
 }
 
-/// Measured and predicted energy of one source-receiver pair.
-#[derive(Clone, Debug)]
-pub struct Pair {
-    /// What was measured.
-    pub measured: EnergyResponse,
-    /// What the simulation says.
-    pub predicted: EnergyResponse,
-}
-
-/// What an effect found and what it gains.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Explanation {
-    /// Identifier of the effect.
-    pub effect: &'static str,
-    /// Fitted values, in the order of [`Effect::parameters`].
-    pub values: Vec<f64>,
-    /// Standard error of each.
-    pub standard_errors: Vec<f64>,
-    /// Root mean square residual on the held-out pairs without the effect, in dB.
-    pub held_out_before_db: f64,
-    /// The same with the effect, its parameters fitted to the other pairs only.
-    pub held_out_after_db: f64,
-}
-
-/// Range below the strongest bin that is compared, in dB.
-const RANGE_DB: f64 = 40.0;
-/// Gauss-Newton steps; the effects are mild enough for a handful.
-const STEPS: usize = 25;
-
-/// Fits an effect to some pairs and scores it on others, which it has not seen.
-///
-/// Gauss-Newton on residuals in dB, weighted by their expected spread, with the prior as one more residual a parameter.
-///
-/// # Errors
-/// [`Error::NoPairs`] without pairs to fit or to test, [`Error::Singular`] if the step cannot be solved for, and the
-/// errors of [`Misfit::between`].
-pub fn explain(effect: &dyn Effect, fit: &[Pair], held_out: &[Pair]) -> Result<Explanation, Error> {
-    let first = fit.first().ok_or(Error::NoPairs { what: "pairs to fit" })?;
-    if held_out.is_empty() {
-        return Err(Error::NoPairs { what: "held-out pairs" });
+/// An effect with its subject: "this receiver stands elsewhere". Its parameters are fitted with everything else left open.
+pub trait Case: Send + Sync {
+    /// What it concerns, by name, where the effect has several cases.
+    fn subject(&self) -> Option<String> {
+        None
     }
-    let parameters = effect.parameters(first.measured.bands());
-    let n = parameters.len();
-    let mut values: Vec<f64> = parameters.iter().map(|p| p.neutral).collect();
-    let mut covariance = DMatrix::identity(n, n);
-    for _ in 0..STEPS {
-        let mut normal = DMatrix::zeros(n, n);
-        let mut right = DVector::zeros(n);
-        for (i, p) in parameters.iter().enumerate() {
-            normal[(i, i)] += p.prior_sd.powi(-2);
-            right[i] += (p.neutral - values[i]) * p.prior_sd.powi(-2);
-        }
-        for pair in fit {
-            accumulate(effect, &parameters, &values, pair, &mut normal, &mut right)?;
-        }
-        let inverse = normal.cholesky().ok_or(Error::Singular { effect: effect.id() })?.inverse();
-        let step = &inverse * right;
-        let mut moved = 0.0f64;
-        for (i, p) in parameters.iter().enumerate() {
-            let next = (values[i] + step[i]).clamp(p.bounds.0, p.bounds.1);
-            moved = moved.max(((next - values[i]) / p.prior_sd).abs());
-            values[i] = next;
-        }
-        covariance = inverse;
-        if moved < 1e-6 {
-            break;
-        }
-    }
-    Ok(Explanation {
-        effect: effect.id(),
-        standard_errors: (0..n).map(|i| covariance[(i, i)].sqrt()).collect(),
-        held_out_before_db: rmse_db(held_out, |p| Ok(p.clone()))?,
-        held_out_after_db: rmse_db(held_out, |p| effect.apply(&values, p))?,
-        values,
-    })
-}
 
-fn rmse_db(
-    pairs: &[Pair],
-    extend: impl Fn(&EnergyResponse) -> Result<EnergyResponse, Error>,
-) -> Result<f64, Error> {
-    let (mut sum, mut count) = (0.0, 0.0);
-    for pair in pairs {
-        let misfit = Misfit::between(&pair.measured, &extend(&pair.predicted)?, RANGE_DB)?;
-        let n = misfit.residuals().len() as f64;
-        sum += misfit.rmse_db().powi(2) * n;
-        count += n;
+    /// The data that it bears on.
+    fn evidence(&self) -> Evidence {
+        Evidence::Energy
     }
-    Ok((sum / count).sqrt())
-}
 
-/// Adds one pair's part of the normal equations; the Jacobian by central differences of the predicted level.
-fn accumulate(
-    effect: &dyn Effect,
-    parameters: &[Parameter],
-    values: &[f64],
-    pair: &Pair,
-    normal: &mut DMatrix<f64>,
-    right: &mut DVector<f64>,
-) -> Result<(), Error> {
-    let predicted = effect.apply(values, &pair.predicted)?;
-    let misfit = Misfit::between(&pair.measured, &predicted, RANGE_DB)?;
-    let mut shifted = Vec::with_capacity(parameters.len());
-    for (i, p) in parameters.iter().enumerate() {
-        let step = 1e-4 * p.prior_sd;
-        let at = |offset: f64| {
-            let mut moved = values.to_vec();
-            moved[i] += offset;
-            effect.apply(&moved, &pair.predicted)
-        };
-        shifted.push((at(step)?, at(-step)?, 2.0 * step));
+    /// Its place in the chain.
+    fn stage(&self) -> Stage {
+        Stage::Room
     }
-    for r in misfit.residuals() {
-        let weight = r.expected_sd_db.powi(-2);
-        let row: Vec<f64> = shifted
-            .iter()
-            .map(|(up, down, width)| {
-                10.0 * (up.band(r.band)[r.bin] / down.band(r.band)[r.bin]).log10() / width
-            })
-            .collect();
-        for (i, a) in row.iter().enumerate() {
-            right[i] += weight * a * r.level_db;
-            for (j, b) in row.iter().enumerate() {
-                normal[(i, j)] += weight * a * b;
-            }
-        }
+
+    /// Parameters.
+    fn parameters(&self, survey: &Survey) -> Vec<Parameter>;
+
+    /// Values to start the fit from; the best end counts.
+    fn starts(&self, survey: &Survey) -> Vec<Vec<f64>> {
+        vec![self.parameters(survey).iter().map(|p| p.neutral).collect()]
     }
-    Ok(())
+
+    /// Changes the natural logarithm of the predicted energy in the time bins of one band and pair. Each bin must depend on its own
+    /// energy alone.
+    fn energy(&self, _values: &[f64], _view: &BandView<'_>, _ln_energy: &mut [f64]) {}
+
+    /// Seconds by which an arrival comes later.
+    fn delay_s(&self, _values: &[f64], _arrival: &ArrivalView<'_>) -> f64 {
+        0.0
+    }
+
+    /// Priors that it widens, with their new standard deviation.
+    fn widens(&self) -> Vec<(Nuisance, f64)> {
+        Vec::new()
+    }
+
+    /// Two responses (indices) that were exchanged.
+    fn exchanged(&self) -> Option<(usize, usize)> {
+        None
+    }
+
+    /// A response (index) whose sign is turned.
+    fn inverted(&self) -> Option<usize> {
+        None
+    }
 }

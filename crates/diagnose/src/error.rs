@@ -1,34 +1,62 @@
-//! What can go wrong in a comparison.
+//! What can go wrong in a diagnosis.
 
 /// Errors of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The vocabulary refused a value.
+    /// The vocabulary refused a value, or long work was cancelled.
     #[error(transparent)]
     Acoustics(#[from] sabine_acoustics::Error),
-    /// Measured and predicted energies have different bands or bins.
-    #[error("measured and predicted energies differ in {what}")]
-    Layout {
-        /// What differs: the bands or the bin width.
-        what: &'static str,
+    /// The tracer refused its settings or a place.
+    #[error(transparent)]
+    Propagate(#[from] sabine_propagate::Error),
+    /// A setting is out of range.
+    #[error("{field} is {value}, but must be {range}")]
+    OutOfRange {
+        /// The setting.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// What is allowed.
+        range: &'static str,
     },
-    /// No time bin of any band can be compared.
-    #[error("no time bin holds both measured and predicted energy within {range_db} dB of the maximum")]
+    /// The room has no measured responses.
+    #[error("the room has no measured responses: there is nothing to compare the simulation with")]
+    NoResponses,
+    /// No response can be compared in any band.
+    #[error("none of the {responses} responses can be compared with the simulation in any octave")]
     NothingToCompare {
-        /// The range looked at, in dB.
-        range_db: f64,
+        /// Responses looked at.
+        responses: usize,
     },
-    /// Nothing to fit to, or nothing left to test on.
-    #[error("{what}: at least one pair of responses is needed")]
-    NoPairs {
-        /// Which set is empty.
+    /// A receiver to be held out does not exist or has no response.
+    #[error("no response was measured at the receiver {id:?}, so that it cannot be held out")]
+    UnknownHoldOut {
+        /// The name asked for.
+        id: String,
+    },
+    /// Everything is held out.
+    #[error("all responses are held out: none is left to fit")]
+    AllHeldOut,
+    /// An effect that the catalogue does not have.
+    #[error("the catalogue has no effect {id:?}")]
+    UnknownEffect {
+        /// The name asked for.
+        id: String,
+    },
+    /// The data and their priors leave a combination of parameters free: a prior of infinite width.
+    #[error("the parameters of {what} are not determined")]
+    Singular {
+        /// The model.
         what: &'static str,
     },
-    /// The data leave a parameter free even with its prior.
-    #[error("the data do not determine the parameters of {effect}")]
-    Singular {
-        /// Catalogue identifier of the effect.
-        effect: &'static str,
+    /// An extended model cannot be read.
+    #[error("{path}: {source}", path = path.display())]
+    Model {
+        /// The file.
+        path: std::path::PathBuf,
+        /// Why.
+        #[source]
+        source: Box<toml::de::Error>,
     },
 }

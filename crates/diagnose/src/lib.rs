@@ -1,44 +1,66 @@
-//! Compares measured with simulated responses: how far they are apart, whether chance explains it, and what a named
-//! physical cause gains on positions that it has not seen.
-//!
-//! Sits at the end of the workspace, after `acoustics`, `propagate` and `optimize`.
-//!
-//! # Does not
-//! - name a cause by itself yet: it fits and scores the [`Effect`] that it is given, one at a time, with the materials
-//!   held fixed. The catalogue holds two effects, [`TransducerResponse`] and [`BackgroundNoise`].
-//! - read responses or trace rooms: it takes energies per band and time bin.
-//!
-//! # Example
-//! A loudspeaker that is 6 dB too loud in one octave, hidden in the "measurement" and found:
-//! ```
-//! use sabine_acoustics::{EnergyResponse, OctaveBands};
-//! use sabine_diagnose::{Effect, Pair, TransducerResponse, explain};
-//! let bands = OctaveBands::new(500.0, 2000.0)?;
-//! let decay: Vec<f64> = (0..3 * 60).map(|i| 10f64.powf(-0.1 * (i % 60) as f64)).collect();
-//! let predicted = EnergyResponse::new(bands, 0.01, decay, vec![0.0; 180])?;
-//! let measured = TransducerResponse.apply(&[0.0, 6.0, 0.0], &predicted)?;
-//! let pair = Pair { measured, predicted };
-//! let found = explain(&TransducerResponse, &[pair.clone()], &[pair])?;
-//! assert!((found.values[1] - 6.0).abs() < 0.05);
-//! assert!(found.held_out_after_db < 0.1 * found.held_out_before_db);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
-//!
-//! # Units
-//! Energies as in [`sabine_acoustics::EnergyResponse`], residuals in dB, bins in seconds.
-//!
-//! # Accuracy
-//! `tests/hidden.rs`: with exponentially distributed energy the reduced chi-squared of a right prediction is near its
-//! expectation, hidden gains and noise levels lie within four standard errors, and an effect that is absent gains nothing.
-
-mod background_noise;
+//! draft
+mod arrival_model;
+mod bins;
+mod config;
+mod discrepancy;
 mod effect;
+mod effects;
+mod energy_model;
 mod error;
-mod misfit;
-mod transducer_response;
+mod gauss_newton;
+mod kernel;
+mod measured;
+mod search;
+mod survey;
+mod traced_pair;
+mod views;
+mod workbench;
 
-pub use background_noise::BackgroundNoise;
-pub use effect::{Effect, Explanation, Pair, Parameter, explain};
+pub use config::DiagnoseConfig;
+pub use effect::{Case, Effect, Evidence, Nuisance, Parameter, Stage};
+pub use effects::*;
 pub use error::Error;
-pub use misfit::{Misfit, Residual};
-pub use transducer_response::TransducerResponse;
+pub use survey::{Place, Survey, SurveyedResponse};
+pub use views::{ArrivalView, BandView};
+
+/// Draft: everything printed.
+pub fn draft(room: &sabine_acoustics::MeasuredRoom, config: &DiagnoseConfig) -> Result<(), Error> {
+    use std::time::Instant;
+    let t = Instant::now();
+    let mut bench = workbench::Workbench::new(room, config, &())?;
+    eprintln!("{:?} total {:?}", bench.seconds, t.elapsed());
+    let used = vec![true; bench.pairs.len()];
+    let all: Vec<usize> = (0..bench.pairs.len()).collect();
+    let (b, _) = bench.fit_energy(&[], &used, None)?;
+    let r = bench.residuals(&[], &b.values, &all);
+    eprintln!("bins {} dispersion raw {:.2?}", r.len(), workbench::dispersion(&r, bench.survey.bands.len()));
+    bench.calibrate_dispersion(&[], &used)?;
+    eprintln!("dispersion {:.2?}", bench.dispersion);
+    let effects = catalogue();
+    let cases = search::cases(&effects, &bench.survey);
+    let t = Instant::now();
+    let search = search::Search::new(&bench, &cases, effects.len(), used.clone());
+    let mut state = search.state(&[], None)?;
+    let free = bench.free_discrepancy();
+    for round in 0..3 {
+        let mut e = search.cases_of(&state.chosen, Evidence::Energy);
+        e.push(&free);
+        let z = bench.fit_energy(&e, &used, Some(&state.energy.values))?.0;
+        eprintln!("state Z {:.1} (E {:.1} A {:.1} P {:.1}) free {:+.1}", state.log_evidence(), state.energy.log_evidence, state.arrivals.log_evidence, state.polarity, z.log_evidence - state.energy.log_evidence);
+        let scores = search.by_effect(&search.scores(&state, &())?);
+        for s in scores.iter().take(8) {
+            eprintln!("  {:22} {:8.1} {:?}", s.id, s.nats, search.candidates[s.best].case.subject());
+        }
+        if scores[0].nats < search.threshold() || round == 2 { break; }
+        for s in search.rivals(&state, &scores)? { eprintln!("  rival {}", s.id); }
+        state = search.with(&state, scores[0].best)?;
+        let n = search.candidates[scores[0].best].case.parameters(&bench.survey).len();
+        let m = if search.candidates[scores[0].best].case.evidence() == Evidence::Arrivals { &state.arrivals } else { &state.energy };
+        for (i, p) in search.candidates[scores[0].best].case.parameters(&bench.survey).iter().enumerate() {
+            let k = m.values.len() - n + i;
+            eprintln!("     {} {:.3} +- {:.3} {}", p.name, m.values[k], m.sd(k), p.unit);
+        }
+    }
+    eprintln!("search {:?}", t.elapsed());
+    Ok(())
+}

@@ -1,0 +1,278 @@
+//! How probable measured arrival times are under places, latency and effects.
+//!
+//! The direct sound comes when it should, give or take; every later peak belongs to one of the predicted specular reflections or to none
+//! (a mixture of normal distributions about the predicted times and an even background).
+
+use crate::effect::{Case, Nuisance};
+use crate::energy_model::Placed;
+use crate::gauss_newton::{Maximum, Model, Prior, Slopes, maximise};
+use crate::measured::{Measured, PEAKS_S};
+use crate::traced_pair::Arrival;
+use crate::views::ArrivalView;
+use crate::{Error, Survey};
+use sabine_acoustics::TimeZero;
+
+/// How well the time of a direct sound can be read: a third of a sample at 16 kHz.
+const DIRECT_SD_S: f64 = 2.5e-5;
+/// The same of a reflection, whose neighbours pull at its peak.
+const REFLECTION_SD_S: f64 = 5e-5;
+/// Share of peaks that belong to no predicted reflection.
+const STRAY_SHARE: f64 = 0.4;
+/// Share of direct sounds whose time was misread.
+const MISREAD_SHARE: f64 = 0.02;
+/// Times at which the fit starts to look for partners of a peak, and how it narrows.
+const WIDTHS_S: [f64; 3] = [4e-4, 1.2e-4, 0.0];
+/// Latency of a recording whose time zero means nothing.
+const FREE_LATENCY_S: f64 = 1.0;
+/// Time zero where the file says that it is the emission: half a sample or so.
+const EMISSION_SD_S: f64 = 1e-5;
+
+pub(crate) struct ArrivalData<'a> {
+    pub survey: &'a Survey,
+    pub measured: &'a [Measured],
+    /// Predicted arrivals of each pair, the shortest first; empty where the direct line is blocked.
+    pub arrivals: &'a [Vec<Arrival>],
+    pub speed_m_s: &'a [f64],
+    pub position_sd_m: f64,
+}
+
+pub(crate) struct ArrivalModel<'a> {
+    data: &'a ArrivalData<'a>,
+    pub effects: Vec<Placed<'a>>,
+    priors: Vec<Prior>,
+    used: &'a [bool],
+    assignment: Vec<usize>,
+    first_receiver: usize,
+    first_latency: usize,
+    /// Reflections count with this much more than their own width; `None`: only the direct sound counts, and is never misread.
+    width_s: Option<f64>,
+}
+
+fn normal(residual: f64, sd: f64) -> f64 {
+    (-0.5 * (residual / sd).powi(2)).exp() / (sd * std::f64::consts::TAU.sqrt())
+}
+
+impl<'a> ArrivalModel<'a> {
+    pub fn new(data: &'a ArrivalData<'a>, cases: &[&'a dyn Case], used: &'a [bool]) -> Self {
+        let survey = data.survey;
+        let place = Prior::normal(0.0, data.position_sd_m);
+        let mut priors = vec![place; 3 * survey.sources.len()];
+        let first_receiver = priors.len();
+        priors.extend(vec![place; 3 * survey.receivers.len()]);
+        let first_latency = priors.len();
+        match survey.measurement.time_zero {
+            TimeZero::PerResponse => {
+                priors.extend(survey.responses.iter().map(|_| Prior::normal(0.0, FREE_LATENCY_S)));
+            }
+            TimeZero::Common => priors.push(Prior::normal(0.0, FREE_LATENCY_S)),
+            _ => priors.push(Prior::normal(0.0, EMISSION_SD_S)),
+        }
+        let mut assignment: Vec<usize> = (0..survey.responses.len()).collect();
+        let mut effects = Vec::new();
+        for &case in cases {
+            for (nuisance, sd) in case.widens() {
+                let first = match nuisance {
+                    Nuisance::SourcePosition(i) => 3 * i,
+                    Nuisance::ReceiverPosition(i) => first_receiver + 3 * i,
+                    Nuisance::Absorption(_) | Nuisance::ResponseGain(_) => continue,
+                };
+                priors[first..first + 3].iter_mut().for_each(|p| p.sd = p.sd.max(sd));
+            }
+            if let Some((a, b)) = case.exchanged() {
+                assignment.swap(a, b);
+            }
+            let parameters = case.parameters(survey);
+            let first = priors.len();
+            priors.extend(parameters.iter().map(|p| Prior {
+                mean: p.neutral,
+                sd: p.prior_sd,
+                low: p.bounds.0,
+                high: p.bounds.1,
+            }));
+            effects.push(Placed { case, parameters, first });
+        }
+        Self { data, effects, priors, used, assignment, first_receiver, first_latency, width_s: None }
+    }
+
+    pub fn source_index(&self, source: usize) -> usize {
+        3 * source
+    }
+
+    pub fn receiver_index(&self, receiver: usize) -> usize {
+        self.first_receiver + 3 * receiver
+    }
+
+    fn latency_index(&self, response: usize) -> usize {
+        match self.data.survey.measurement.time_zero {
+            TimeZero::PerResponse => self.first_latency + response,
+            _ => self.first_latency,
+        }
+    }
+
+    fn effect_delay_s(&self, values: &[f64], view: &ArrivalView<'_>) -> f64 {
+        self.effects
+            .iter()
+            .map(|p| p.case.delay_s(&values[p.first..p.first + p.parameters.len()], view))
+            .sum()
+    }
+
+    /// Time of an arrival in the file, and its change with each parameter that matters.
+    fn time(&self, values: &[f64], pair: usize, arrival: &Arrival, slopes: bool) -> (f64, Vec<(usize, f64)>) {
+        let response = &self.data.survey.responses[pair];
+        let speed = self.data.speed_m_s[pair];
+        let view = ArrivalView {
+            survey: self.data.survey,
+            pair,
+            length_m: arrival.length_m,
+            speed_m_s: speed,
+            departure: arrival.departure,
+            arrival: arrival.arrival,
+        };
+        let (source, receiver) = (self.source_index(response.source), self.receiver_index(response.receiver));
+        let latency = self.latency_index(self.assignment[pair]);
+        let mut time_s =
+            arrival.length_m / speed + values[latency] + self.effect_delay_s(values, &view);
+        let mut found = Vec::new();
+        for k in 0..3 {
+            let (s, r) = (-arrival.departure[k] / speed, -arrival.arrival[k] / speed);
+            time_s += s * values[source + k] + r * values[receiver + k];
+            if slopes {
+                found.push((source + k, s));
+                found.push((receiver + k, r));
+            }
+        }
+        if slopes {
+            found.push((latency, 1.0));
+            for placed in &self.effects {
+                for i in 0..placed.parameters.len() {
+                    let index = placed.first + i;
+                    let step = 1e-4 * self.priors[index].sd;
+                    let at = |offset: f64| {
+                        let mut moved = values.to_vec();
+                        moved[index] += offset;
+                        self.effect_delay_s(&moved, &view)
+                    };
+                    found.push((index, (at(step) - at(-step)) / (2.0 * step)));
+                }
+            }
+        }
+        (time_s, found)
+    }
+
+    fn pair_likelihood(&self, values: &[f64], pair: usize, mut slopes: Option<&mut Slopes>) -> f64 {
+        let Some((direct, later)) = self.data.arrivals[pair].split_first() else { return 0.0 };
+        let measured = &self.data.measured[self.assignment[pair]];
+        let mut push = |found: &[(usize, f64)], residual: f64, sd: f64, share: f64| {
+            let Some(slopes) = slopes.as_deref_mut() else { return };
+            let weight = share / (sd * sd);
+            for &(a, x) in found {
+                slopes.gradient[a] += weight * residual * x;
+                for &(b, y) in found {
+                    slopes.information[(a, b)] += weight * x * y;
+                }
+            }
+        };
+        let (time_s, found) = self.time(values, pair, direct, true);
+        let residual = measured.direct_s - time_s;
+        let Some(width_s) = self.width_s else {
+            push(&found, residual, DIRECT_SD_S, 1.0);
+            return -0.5 * (residual / DIRECT_SD_S).powi(2);
+        };
+        let sd = DIRECT_SD_S.hypot(width_s);
+        let (right, wrong) = ((1.0 - MISREAD_SHARE) * normal(residual, sd), MISREAD_SHARE / PEAKS_S);
+        push(&found, residual, sd, right / (right + wrong));
+        let mut value = (right + wrong).ln();
+
+        let sd = REFLECTION_SD_S.hypot(width_s);
+        let amplitude: f64 = later.iter().map(|a| a.energy.sqrt()).sum();
+        if amplitude <= 0.0 {
+            return value;
+        }
+        let times: Vec<(f64, Vec<(usize, f64)>)> =
+            later.iter().map(|a| self.time(values, pair, a, true)).collect();
+        for peak in &measured.peaks_s {
+            let densities: Vec<f64> = later
+                .iter()
+                .zip(&times)
+                .map(|(a, (t, _))| {
+                    (1.0 - STRAY_SHARE) * a.energy.sqrt() / amplitude * normal(peak - t, sd)
+                })
+                .collect();
+            let total = densities.iter().sum::<f64>() + STRAY_SHARE / PEAKS_S;
+            value += total.ln();
+            for (density, (t, found)) in densities.iter().zip(&times) {
+                let share = density / total;
+                if share > 1e-3 {
+                    push(found, peak - t, sd, share);
+                }
+            }
+        }
+        value
+    }
+
+    pub fn by_pair(&self, values: &[f64]) -> Vec<f64> {
+        (0..self.assignment.len()).map(|pair| self.pair_likelihood(values, pair, None)).collect()
+    }
+
+    /// Measured less predicted time of each direct sound, by pair.
+    pub fn direct_residuals_s(&self, values: &[f64]) -> Vec<Option<f64>> {
+        (0..self.assignment.len())
+            .map(|pair| {
+                let direct = self.data.arrivals[pair].first()?;
+                let measured = self.data.measured[self.assignment[pair]].direct_s;
+                Some(measured - self.time(values, pair, direct, false).0)
+            })
+            .collect()
+    }
+}
+
+impl Model for ArrivalModel<'_> {
+    fn priors(&self) -> &[Prior] {
+        &self.priors
+    }
+
+    fn log_likelihood(&self, values: &[f64], mut slopes: Option<&mut Slopes>) -> f64 {
+        (0..self.assignment.len())
+            .filter(|&pair| self.used[pair])
+            .map(|pair| self.pair_likelihood(values, pair, slopes.as_deref_mut()))
+            .sum()
+    }
+}
+
+/// Fits from the direct sounds on, reflections joining with ever less tolerance.
+pub(crate) fn fit(
+    data: &ArrivalData<'_>,
+    cases: &[&dyn Case],
+    used: &[bool],
+) -> Result<(Maximum, Vec<usize>), Error> {
+    let mut model = ArrivalModel::new(data, cases, used);
+    let start: Vec<f64> = model.priors.iter().map(|p| p.mean).collect();
+    let mut best: Option<Maximum> = None;
+    // From where the direct sounds point, and from where everything should be: a single response far off must not carry the
+    // others away.
+    let direct = maximise(&model, &start, "arrival times")?.values;
+    for first in [direct, start] {
+        let mut x = first;
+        let mut found = None;
+        for width_s in WIDTHS_S {
+            model.width_s = Some(width_s);
+            let top = maximise(&model, &x, "arrival times")?;
+            x = top.values.clone();
+            found = Some(top);
+        }
+        if let Some(found) = found.filter(|f| best.as_ref().is_none_or(|b| f.log_evidence > b.log_evidence)) {
+            best = Some(found);
+        }
+    }
+    let firsts = model.effects.iter().map(|p| p.first).collect();
+    best.map(|b| (b, firsts)).ok_or(Error::Singular { what: "arrival times" })
+}
+
+/// A model that is ready to be looked at with fitted values.
+pub(crate) fn settled<'a>(
+    data: &'a ArrivalData<'a>,
+    cases: &[&'a dyn Case],
+    used: &'a [bool],
+) -> ArrivalModel<'a> {
+    ArrivalModel { width_s: Some(0.0), ..ArrivalModel::new(data, cases, used) }
+}

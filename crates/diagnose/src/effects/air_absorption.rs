@@ -1,0 +1,58 @@
+//! `air_absorption`: the air was drier or moister than the room file says.
+
+use crate::{BandView, Case, Effect, Parameter, Survey};
+use sabine_acoustics::Air;
+
+/// Relative humidity other than stated; responses with air of their own shift by as much. Attenuation by ISO 9613-1.
+///
+/// Mark: an error of the decay that is proportional to time, rises with frequency, and is the same at every position. Mimicked by:
+/// surfaces whose absorption rises with frequency, which is why materials are refitted beside it; a second humidity tells them
+/// apart. Temperature has its own entry (`sound_speed`): its effect on attenuation is small beside that on arrival times.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct AirAbsorption;
+
+const DRIEST_PERCENT: f64 = 3.0;
+const MOISTEST_PERCENT: f64 = 98.0;
+
+impl Effect for AirAbsorption {
+    fn id(&self) -> &'static str {
+        "air_absorption"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "The air swallowed more or less than the stated climate says: its humidity was another one."
+    }
+
+    fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
+        vec![Box::new(*self)]
+    }
+}
+
+impl Case for AirAbsorption {
+    fn parameters(&self, survey: &Survey) -> Vec<Parameter> {
+        let stated = survey.air().relative_humidity_percent();
+        let dry = if stated > 35.0 { 0.5 * stated } else { 2.0 * stated };
+        vec![
+            Parameter::new("relative_humidity", "%", stated, 20.0, (DRIEST_PERCENT, MOISTEST_PERCENT))
+                .typically(dry),
+        ]
+    }
+
+    fn starts(&self, survey: &Survey) -> Vec<Vec<f64>> {
+        let stated = survey.air().relative_humidity_percent();
+        vec![vec![stated], vec![0.4 * stated], vec![0.5 * (stated + MOISTEST_PERCENT)]]
+    }
+
+    fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+        let stated = view.pair().air;
+        let change = values[0] - view.survey().air().relative_humidity_percent();
+        let percent = (stated.relative_humidity_percent() + change).clamp(DRIEST_PERCENT, MOISTEST_PERCENT);
+        let Ok(found) = Air::new(stated.temperature_c(), percent, stated.pressure_kpa()) else { return };
+        let bands = view.survey().bands();
+        let exponent = |air: &Air| air.energy_exponent_per_m(bands).values()[view.band()];
+        let per_s = (exponent(&stated) - exponent(&found)) * stated.speed_of_sound_m_s();
+        for (bin, l) in ln_energy.iter_mut().enumerate() {
+            *l += per_s * view.time_s(bin);
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! `background_noise`: sound that was there without the source.
+
+use super::add_energy;
+use crate::{BandView, Case, Effect, Parameter, Stage, Survey};
+
+/// The same energy in every time bin and response, one level for each octave, relative to a typical early bin of that octave.
+///
+/// Mark: decays flatten at a level that the excitation does not change. Mimicked by: a coupled volume, whose level still
+/// falls. A longer response, or a louder one, tells them apart.
+///
+/// Source: Lundeby et al., Acustica 81, 1995.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct BackgroundNoise;
+
+impl Effect for BackgroundNoise {
+    fn id(&self) -> &'static str {
+        "background_noise"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "Noise that has nothing to do with the loudspeaker fills the end of the responses."
+    }
+
+    fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
+        vec![Box::new(*self)]
+    }
+}
+
+impl Case for BackgroundNoise {
+    fn stage(&self) -> Stage {
+        Stage::Noise
+    }
+
+    fn parameters(&self, survey: &Survey) -> Vec<Parameter> {
+        (0..survey.bands().len())
+            .map(|b| {
+                // Neutral is where it cannot be told from none.
+                Parameter::new("level", "dB", -60.0, 20.0, (-90.0, 0.0)).typically(-30.0).in_band(b, survey)
+            })
+            .collect()
+    }
+
+    fn starts(&self, survey: &Survey) -> Vec<Vec<f64>> {
+        vec![vec![-35.0; survey.bands().len()]]
+    }
+
+    fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+        let noise = view.reference_energy() * 10f64.powf(values[view.band()] / 10.0);
+        ln_energy.iter_mut().for_each(|l| *l = add_energy(*l, noise));
+    }
+}

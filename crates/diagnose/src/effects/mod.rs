@@ -1,0 +1,60 @@
+//! The catalogue: one file an effect.
+
+mod air_absorption;
+mod background_noise;
+mod channel_fault;
+mod coupled_volume;
+mod position_error;
+mod room_dimensions;
+mod sampling_clock;
+mod scattering;
+mod sound_speed;
+mod source_directivity;
+mod surface_absorption;
+mod time_zero;
+mod transducer_response;
+mod truncation;
+
+pub use air_absorption::AirAbsorption;
+pub use background_noise::BackgroundNoise;
+pub use channel_fault::ChannelFault;
+pub use coupled_volume::CoupledVolume;
+pub use position_error::PositionError;
+pub use room_dimensions::RoomDimensions;
+pub use sampling_clock::SamplingClock;
+pub use scattering::Scattering;
+pub use sound_speed::SoundSpeed;
+pub use source_directivity::SourceDirectivity;
+pub use surface_absorption::SurfaceAbsorption;
+pub use time_zero::TimeZero;
+pub use transducer_response::TransducerResponse;
+pub use truncation::Truncation;
+
+use crate::Effect;
+
+/// All effects that come with this crate.
+pub fn catalogue() -> Vec<Box<dyn Effect>> {
+    vec![
+        Box::new(TransducerResponse),
+        Box::new(AirAbsorption),
+        Box::new(SourceDirectivity),
+        Box::new(Scattering),
+        Box::new(SurfaceAbsorption),
+        Box::new(BackgroundNoise),
+        Box::new(CoupledVolume),
+        Box::new(Truncation),
+        Box::new(SoundSpeed),
+        Box::new(SamplingClock),
+        Box::new(RoomDimensions),
+        Box::new(PositionError),
+        Box::new(TimeZero),
+        Box::new(ChannelFault),
+    ]
+}
+
+/// Logarithm of a sum of energies, one of them given as its logarithm.
+fn add_energy(ln_energy: f64, more: f64) -> f64 {
+    let ln_more = more.max(1e-300).ln();
+    let (high, low) = if ln_energy > ln_more { (ln_energy, ln_more) } else { (ln_more, ln_energy) };
+    high + (low - high).exp().ln_1p()
+}

@@ -1,0 +1,63 @@
+//! `room_dimensions`: the room is longer, wider or higher than its model.
+
+use crate::{ArrivalView, Case, Effect, Evidence, Parameter, Survey};
+
+/// Scale of the room along each axis, and a shift of it against sources and receivers, which stay where they are.
+///
+/// A path of length L along which the component of the unit vector along an axis keeps its size c lengthens by L c2 per unit
+/// of scale: exact between walls parallel to the axes, an approximation between others.
+///
+/// Mark: reflections shift with their order along an axis, the direct sound does not. Mimicked by: the speed of sound, which
+/// moves the direct sound too.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RoomDimensions;
+
+impl Effect for RoomDimensions {
+    fn id(&self) -> &'static str {
+        "room_dimensions"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "Walls, floor or ceiling stand elsewhere than in the model."
+    }
+
+    fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
+        vec![Box::new(*self)]
+    }
+}
+
+impl Case for RoomDimensions {
+    fn evidence(&self) -> Evidence {
+        Evidence::Arrivals
+    }
+
+    fn parameters(&self, _: &Survey) -> Vec<Parameter> {
+        let axes = ["x", "y", "z"];
+        let scale = axes.map(|a| {
+            Parameter::new(format!("scale_{a}"), "%", 0.0, 2.0, (-15.0, 15.0)).typically(1.0)
+        });
+        let shift =
+            axes.map(|a| Parameter::new(format!("shift_{a}"), "m", 0.0, 0.05, (-0.5, 0.5)));
+        scale.into_iter().chain(shift).collect()
+    }
+
+    fn delay_s(&self, values: &[f64], arrival: &ArrivalView<'_>) -> f64 {
+        let survey = arrival.survey();
+        let [low, high] = survey.box_m();
+        let source = survey.sources()[arrival.pair().source].position_m;
+        let receiver = survey.receivers()[arrival.pair().receiver].position_m;
+        let (out, back) = (arrival.departure(), arrival.arrival());
+        let longer_m: f64 = (0..3)
+            .map(|k| {
+                let middle = 0.5 * (low[k] + high[k]);
+                let squared = 0.5 * (out[k] * out[k] + back[k] * back[k]);
+                // Everything grows; then source and receiver go back to where they stand.
+                let per_scale = arrival.length_m() * squared
+                    + out[k] * (source[k] - middle)
+                    + back[k] * (receiver[k] - middle);
+                0.01 * values[k] * per_scale + values[3 + k] * (out[k] + back[k])
+            })
+            .sum();
+        longer_m / arrival.speed_m_s()
+    }
+}

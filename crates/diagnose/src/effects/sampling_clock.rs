@@ -1,0 +1,38 @@
+//! `sampling_clock`: player and recorder do not count seconds alike.
+
+use crate::{ArrivalView, Case, Effect, Evidence, Parameter, Survey};
+
+/// Deviation of the recorder's clock in parts per million, up to a thousand: all arrival times scale.
+///
+/// Mark and mimic: as `sound_speed`; 1000 ppm are what 0.6 K do. What sets it apart is only that clocks are better than
+/// thermometers are. A loopback click at the end of the recording tells them apart.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SamplingClock;
+
+impl Effect for SamplingClock {
+    fn id(&self) -> &'static str {
+        "sampling_clock"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "The recorder's sampling clock runs fast or slow against the player's."
+    }
+
+    fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
+        vec![Box::new(*self)]
+    }
+}
+
+impl Case for SamplingClock {
+    fn evidence(&self) -> Evidence {
+        Evidence::Arrivals
+    }
+
+    fn parameters(&self, _: &Survey) -> Vec<Parameter> {
+        vec![Parameter::new("deviation", "ppm", 0.0, 400.0, (-1000.0, 1000.0)).typically(800.0)]
+    }
+
+    fn delay_s(&self, values: &[f64], arrival: &ArrivalView<'_>) -> f64 {
+        arrival.time_s() * values[0] * 1e-6
+    }
+}

@@ -1,0 +1,50 @@
+//! `scattering`: the surfaces are rougher (or smoother) than the room file says.
+
+use crate::{BandView, Case, Effect, Parameter, Survey};
+
+/// All surfaces scatter a share more of what they now reflect specularly (or, below zero, less of what they scatter), with one
+/// slope over frequency.
+///
+/// Mark: early specular energy is missing, decays are straighter and differ less between positions. Mimicked by: absorption,
+/// which is refitted beside it.
+///
+/// Source: Vorländer, Auralization, 2008, 11.3; energy moves from the specular to the Lambert part and none is lost.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Scattering;
+
+impl Effect for Scattering {
+    fn id(&self) -> &'static str {
+        "scattering"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "The surfaces (or furniture that the model leaves out) scatter sound more or less than stated."
+    }
+
+    fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
+        vec![Box::new(*self)]
+    }
+}
+
+impl Case for Scattering {
+    fn parameters(&self, survey: &Survey) -> Vec<Parameter> {
+        // Where nothing is scattered already, nothing can be taken away.
+        let least = if survey.declared_scattering > 0.01 { -1.0 } else { 0.0 };
+        vec![
+            Parameter::new("extra_share_1_khz", "", 0.0, 0.3, (least, 0.95)).typically(0.25),
+            Parameter::new("extra_share_per_octave", "", 0.0, 0.05, (-0.2, 0.2)).typically(0.02),
+        ]
+    }
+
+    fn starts(&self, _: &Survey) -> Vec<Vec<f64>> {
+        vec![vec![0.05, 0.0], vec![0.3, 0.0]]
+    }
+
+    fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+        let extra = values[0] + values[1] * view.survey().octaves_from_1khz(view.band());
+        let extra = if view.survey().declared_scattering > 0.01 { extra } else { extra.max(0.0) };
+        for (bin, l) in ln_energy.iter_mut().enumerate() {
+            *l += view.scattering_change(bin, extra);
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! `sound_speed`: the room was warmer or colder than the room file says.
+
+use crate::{ArrivalView, Case, Effect, Evidence, Parameter, Survey};
+use sabine_acoustics::Air;
+
+/// Another temperature: all arrival times scale. Its small effect on attenuation is left to `air_absorption`.
+///
+/// Mark: arrivals are late or early in proportion to their path, direct sound and reflections alike. Mimicked by: a sampling
+/// clock that is off, which scales the times just so; a thermometer or a loopback click tells them apart.
+///
+/// Source: ISO 9613-1:1993 (speed of sound with temperature).
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SoundSpeed;
+
+impl Effect for SoundSpeed {
+    fn id(&self) -> &'static str {
+        "sound_speed"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "Sound travelled faster or slower than at the stated temperature."
+    }
+
+    fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
+        vec![Box::new(*self)]
+    }
+}
+
+impl Case for SoundSpeed {
+    fn evidence(&self) -> Evidence {
+        Evidence::Arrivals
+    }
+
+    fn parameters(&self, survey: &Survey) -> Vec<Parameter> {
+        let stated = survey.air().temperature_c();
+        vec![
+            Parameter::new("temperature", "deg C", stated, 5.0, (-20.0, 50.0)).typically(stated + 3.0),
+        ]
+    }
+
+    fn delay_s(&self, values: &[f64], arrival: &ArrivalView<'_>) -> f64 {
+        let stated = arrival.pair().air;
+        let change = values[0] - arrival.survey().air().temperature_c();
+        let temperature_c = (stated.temperature_c() + change).clamp(-40.0, 60.0);
+        match Air::new(temperature_c, stated.relative_humidity_percent(), stated.pressure_kpa()) {
+            Ok(air) => arrival.length_m() / air.speed_of_sound_m_s() - arrival.time_s(),
+            Err(_) => 0.0,
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! `truncation`: the responses were cut off before they had died away.
+
+use crate::{BandView, Case, Effect, Parameter, Stage, Survey};
+
+/// The end of all responses in the time of the file, after a raised-cosine fade; nothing follows.
+///
+/// Mark: decays steepen towards one instant that is the same in all octaves and responses. Mimicked by: subtraction of noise.
+///
+/// Source: ISO 18233:2006, annex B, on windows after deconvolution.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Truncation;
+
+/// Energy that a cut leaves: rounding.
+const LEFT: f64 = 1e-9;
+/// Points within a bin at which the fade is averaged.
+const POINTS: usize = 8;
+
+impl Effect for Truncation {
+    fn id(&self) -> &'static str {
+        "truncation"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "The responses were faded out or cut off before the sound had died away."
+    }
+
+    fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
+        vec![Box::new(*self)]
+    }
+}
+
+fn longest_s(survey: &Survey) -> f64 {
+    survey.responses().iter().map(|r| r.duration_s).fold(0.0, f64::max)
+}
+
+impl Case for Truncation {
+    fn stage(&self) -> Stage {
+        Stage::Recorder
+    }
+
+    fn parameters(&self, survey: &Survey) -> Vec<Parameter> {
+        let longest_s = longest_s(survey);
+        vec![
+            Parameter::new("end", "s", 1.2 * longest_s, 0.6 * longest_s, (0.02, 2.0 * longest_s))
+                .typically(0.4 * longest_s),
+            Parameter::new("fade", "s", 0.03, 0.05, (0.002, 0.5)),
+        ]
+    }
+
+    fn starts(&self, survey: &Survey) -> Vec<Vec<f64>> {
+        let longest_s = longest_s(survey);
+        [0.15, 0.25, 0.35, 0.5, 0.7, 0.9].map(|share| vec![share * longest_s, 0.05]).to_vec()
+    }
+
+    fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+        let (end_s, fade_s) = (values[0], values[1]);
+        for (bin, l) in ln_energy.iter_mut().enumerate() {
+            let middle_s = view.file_time_s(bin);
+            let mean: f64 = (0..POINTS)
+                .map(|i| {
+                    let time_s = middle_s + ((i as f64 + 0.5) / POINTS as f64 - 0.5) * view.bin_s();
+                    let share = ((end_s - time_s) / fade_s).clamp(0.0, 1.0);
+                    (0.5 - 0.5 * (std::f64::consts::PI * share).cos()).powi(2)
+                })
+                .sum::<f64>()
+                / POINTS as f64;
+            *l += (mean + LEFT).ln();
+        }
+    }
+}

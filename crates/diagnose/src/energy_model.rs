@@ -1,0 +1,423 @@
+//! How probable measured energies are under materials, gains and effects.
+//!
+//! In each time bin the measured energy E is Gamma distributed about the predicted M with shape 1 / (relative variance), as
+//! the energy of band-limited noise is (Kuttruff, Room Acoustics, 6th ed., 3.5), and the prediction's own Monte-Carlo error makes it wider.
+
+use crate::effect::{Case, Nuisance, Parameter};
+use crate::gauss_newton::{Model, Prior, Slopes};
+use crate::measured::Measured;
+use crate::traced_pair::BandState;
+use crate::views::BandView;
+use crate::{Error, Survey};
+use sabine_acoustics::Levels;
+
+/// Logarithm of energy in one decibel.
+const LN_PER_DB: f64 = std::f64::consts::LN_10 / 10.0;
+/// Energy below the reference by so much counts as this much, measured or predicted: digital silence has no logarithm.
+const SILENCE: f64 = 1e-9;
+/// Gain of a whole recording whose level means nothing, in dB.
+const FREE_GAIN_DB: f64 = 40.0;
+/// Step of differences, in prior standard deviations (or logarithms of energy).
+const STEP: f64 = 1e-4;
+/// Bounds of absorption.
+pub(crate) const ABSORPTION: (f64, f64) = (0.002, 0.98);
+
+/// What all energy models of one diagnosis share.
+pub(crate) struct EnergyData<'a> {
+    pub survey: &'a Survey,
+    pub measured: &'a [Measured],
+    /// Predictions, `[pair][band]`, expanded about `absorption`.
+    pub states: &'a [Vec<BandState>],
+    /// Bins to compare, `[pair][band]`.
+    pub ends: &'a [Vec<usize>],
+    pub direct_s: &'a [f64],
+    /// Energy to which added sound refers, by band.
+    pub reference: &'a [f64],
+    /// Absorption of the expansion, `[material][band]`.
+    pub absorption: &'a [Vec<f64>],
+    /// What is known of it.
+    pub priors: &'a [Vec<Prior>],
+    pub gain_sd_db: f64,
+    /// Factor by which variances exceed what is expected, by band.
+    pub dispersion: &'a [f64],
+}
+
+/// An effect in a model, and where its parameters stand.
+pub(crate) struct Placed<'a> {
+    pub case: &'a dyn Case,
+    pub parameters: Vec<Parameter>,
+    pub first: usize,
+}
+
+pub(crate) struct EnergyModel<'a> {
+    data: &'a EnergyData<'a>,
+    pub effects: Vec<Placed<'a>>,
+    priors: Vec<Prior>,
+    /// Pairs that count.
+    used: &'a [bool],
+    /// Which response holds which pair.
+    assignment: Vec<usize>,
+    common_gain: Option<usize>,
+    first_gain: usize,
+}
+
+/// One compared bin.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BinResidual {
+    pub pair: usize,
+    pub band: usize,
+    pub bin: usize,
+    /// Logarithm of measured over predicted energy.
+    pub ln_ratio: f64,
+    pub ln_predicted: f64,
+    /// Expected relative variance, dispersion left out.
+    pub variance: f64,
+}
+
+impl<'a> EnergyModel<'a> {
+    pub fn new(data: &'a EnergyData<'a>, cases: &[&'a dyn Case], used: &'a [bool]) -> Self {
+        let survey = data.survey;
+        let bands = survey.bands.len();
+        let mut priors: Vec<Prior> = Vec::new();
+        for material in data.priors {
+            priors.extend_from_slice(&material[..bands]);
+        }
+        let levels = survey.measurement.levels;
+        let common_gain = (levels == Levels::Common).then(|| {
+            priors.push(Prior::normal(0.0, FREE_GAIN_DB));
+            priors.len() - 1
+        });
+        let first_gain = priors.len();
+        let sd = if levels == Levels::PerResponse { FREE_GAIN_DB } else { data.gain_sd_db };
+        priors.extend(survey.responses.iter().map(|_| Prior::normal(0.0, sd)));
+        let mut ordered: Vec<&dyn Case> = cases.to_vec();
+        ordered.sort_by_key(|c| c.stage());
+        let mut assignment: Vec<usize> = (0..survey.responses.len()).collect();
+        let mut effects = Vec::new();
+        for case in ordered {
+            for (nuisance, sd) in case.widens() {
+                match nuisance {
+                    Nuisance::Absorption(material) => {
+                        priors[material * bands..(material + 1) * bands]
+                            .iter_mut()
+                            .for_each(|p| p.sd = p.sd.max(sd));
+                    }
+                    Nuisance::ResponseGain(response) => {
+                        let prior = &mut priors[first_gain + response];
+                        prior.sd = prior.sd.max(sd);
+                    }
+                    Nuisance::SourcePosition(_) | Nuisance::ReceiverPosition(_) => {}
+                }
+            }
+            if let Some((a, b)) = case.exchanged() {
+                assignment.swap(a, b);
+            }
+            let parameters = case.parameters(survey);
+            let first = priors.len();
+            priors.extend(parameters.iter().map(|p| Prior {
+                mean: p.neutral,
+                sd: p.prior_sd,
+                low: p.bounds.0,
+                high: p.bounds.1,
+            }));
+            effects.push(Placed { case, parameters, first });
+        }
+        Self { data, effects, priors, used, assignment, common_gain, first_gain }
+    }
+
+    /// Values to start from: those of another fit as far as they go, and the effect's.
+    pub fn start(&self, before: Option<&[f64]>) -> Vec<f64> {
+        let mut x: Vec<f64> = self.priors.iter().map(|p| p.mean).collect();
+        if let Some(before) = before {
+            let n = self.nuisances().min(before.len());
+            x[..n].copy_from_slice(&before[..n]);
+        }
+        x
+    }
+
+    /// Parameters before those of the effects.
+    pub fn nuisances(&self) -> usize {
+        self.first_gain + self.data.survey.responses.len()
+    }
+
+    pub fn gain_index(&self, response: usize) -> usize {
+        self.first_gain + response
+    }
+
+    pub fn common_gain_index(&self) -> Option<usize> {
+        self.common_gain
+    }
+
+    pub fn set_prior(&mut self, index: usize, prior: Prior) {
+        self.priors[index] = prior;
+    }
+
+    fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+        for placed in &self.effects {
+            let own = &values[placed.first..placed.first + placed.parameters.len()];
+            placed.case.energy(own, view, ln_energy);
+        }
+        let silence = (SILENCE * view.reference).ln();
+        ln_energy.iter_mut().for_each(|l| *l = l.max(silence));
+    }
+
+    /// Energy of the paths in one band at these materials and gains, before any effect, and the change of its logarithm with
+    /// the absorption of each material.
+    fn paths(&self, values: &[f64], pair: usize, band: usize, count: usize) -> (Vec<f64>, Vec<f64>) {
+        let bands = self.data.survey.bands.len();
+        let m = self.data.absorption.len();
+        let state = &self.data.states[pair][band];
+        let pairs = m * (m + 1) / 2;
+        let shift: Vec<f64> = (0..m)
+            .map(|k| ((1.0 - values[k * bands + band]) / (1.0 - self.data.absorption[k][band])).ln())
+            .collect();
+        let response = self.assignment[pair];
+        let gain_db =
+            values[self.first_gain + response] + self.common_gain.map_or(0.0, |index| values[index]);
+        let mut ln_energy = Vec::with_capacity(count);
+        let mut slopes = Vec::with_capacity(count * m);
+        for bin in 0..count {
+            let mut sum = state.ln_energy[bin] + gain_db * LN_PER_DB;
+            let covariance = &state.hits_covariance[bin * pairs..(bin + 1) * pairs];
+            let mut moved = state.hits[bin * m..(bin + 1) * m].to_vec();
+            let mut place = 0;
+            for a in 0..m {
+                sum += state.hits[bin * m + a] * shift[a];
+                for b in a..m {
+                    let c = covariance[place];
+                    place += 1;
+                    sum += c * shift[a] * shift[b] * if a == b { 0.5 } else { 1.0 };
+                    moved[a] += c * shift[b];
+                    if a != b {
+                        moved[b] += c * shift[a];
+                    }
+                }
+            }
+            ln_energy.push(sum);
+            slopes.extend((0..m).map(|k| -moved[k] / (1.0 - values[k * bands + band])));
+        }
+        (ln_energy, slopes)
+    }
+
+    fn view(&self, pair: usize, band: usize) -> BandView<'_> {
+        BandView {
+            survey: self.data.survey,
+            pair,
+            response: self.assignment[pair],
+            band,
+            state: &self.data.states[pair][band],
+            direct_s: self.data.direct_s[pair],
+            reference: self.data.reference[band],
+        }
+    }
+
+    /// Bins that are compared, and their measured energies.
+    fn compared(&self, pair: usize, band: usize) -> Option<&[f64]> {
+        let energies = self.data.measured[self.assignment[pair]].energies[band].as_deref()?;
+        let count = self.data.ends[pair][band].min(energies.len());
+        (count > 0).then(|| &energies[..count])
+    }
+
+    /// Logarithm of the predicted energy in the bins of a pair and band, as many as are compared.
+    pub fn predicted(&self, values: &[f64], pair: usize, band: usize, count: usize) -> Vec<f64> {
+        let (mut ln_energy, _) = self.paths(values, pair, band, count);
+        self.apply(values, &self.view(pair, band), &mut ln_energy);
+        ln_energy
+    }
+
+    /// All compared bins of the given pairs.
+    pub fn residuals(&self, values: &[f64], pairs: impl Iterator<Item = usize>) -> Vec<BinResidual> {
+        let mut found = Vec::new();
+        for pair in pairs {
+            for band in 0..self.data.survey.bands.len() {
+                let Some(energies) = self.compared(pair, band) else { continue };
+                let predicted = self.predicted(values, pair, band, energies.len());
+                let silence = SILENCE * self.data.reference[band];
+                for (bin, (&e, &ln_predicted)) in energies.iter().zip(&predicted).enumerate() {
+                    found.push(BinResidual {
+                        pair,
+                        band,
+                        bin,
+                        ln_ratio: e.max(silence).ln() - ln_predicted,
+                        ln_predicted,
+                        variance: self.data.states[pair][band].variance[bin],
+                    });
+                }
+            }
+        }
+        found
+    }
+
+    /// Log-likelihood of one pair and band.
+    fn band_likelihood(
+        &self,
+        values: &[f64],
+        pair: usize,
+        band: usize,
+        slopes: Option<&mut Slopes>,
+    ) -> f64 {
+        let Some(energies) = self.compared(pair, band) else { return 0.0 };
+        let count = energies.len();
+        let bands = self.data.survey.bands.len();
+        let m = self.data.absorption.len();
+        let view = self.view(pair, band);
+        let (paths, path_slopes) = self.paths(values, pair, band, count);
+        let mut predicted = paths.clone();
+        self.apply(values, &view, &mut predicted);
+        let silence = SILENCE * self.data.reference[band];
+        let dispersion = self.data.dispersion[band];
+        let shape = |bin: usize| 1.0 / (self.data.states[pair][band].variance[bin] * dispersion);
+        let ln_ratio: Vec<f64> =
+            energies.iter().zip(&predicted).map(|(e, p)| e.max(silence).ln() - p).collect();
+        let value = ln_ratio
+            .iter()
+            .enumerate()
+            .map(|(bin, z)| shape(bin) * (z - z.min(30.0).exp() + 1.0))
+            .sum();
+        let Some(slopes) = slopes else { return value };
+
+        // Columns that matter in this band, and the change of the predicted logarithm with each.
+        let mut columns: Vec<usize> = (0..m).map(|k| k * bands + band).collect();
+        let through = self.through(values, &view, &paths);
+        let mut rows: Vec<Vec<f64>> =
+            (0..m).map(|k| (0..count).map(|bin| path_slopes[bin * m + k] * through[bin]).collect()).collect();
+        let gain: Vec<f64> = through.iter().map(|t| t * LN_PER_DB).collect();
+        if let Some(index) = self.common_gain {
+            columns.push(index);
+            rows.push(gain.clone());
+        }
+        columns.push(self.first_gain + self.assignment[pair]);
+        rows.push(gain);
+        for placed in &self.effects {
+            for (i, p) in placed.parameters.iter().enumerate() {
+                if p.band.is_none_or(|own| own == band) {
+                    columns.push(placed.first + i);
+                    rows.push(self.difference(values, placed.first + i, &view, &paths));
+                }
+            }
+        }
+        for bin in 0..count {
+            let weight = shape(bin);
+            let pull = weight * (ln_ratio[bin].min(30.0).exp() - 1.0);
+            for (i, &a) in columns.iter().enumerate() {
+                let slope = rows[i][bin];
+                if slope == 0.0 {
+                    continue;
+                }
+                slopes.gradient[a] += pull * slope;
+                for (j, &b) in columns[..=i].iter().enumerate() {
+                    let product = weight * slope * rows[j][bin];
+                    slopes.information[(a, b)] += product;
+                    if a != b {
+                        slopes.information[(b, a)] += product;
+                    }
+                }
+            }
+        }
+        value
+    }
+
+    /// How much of a change of the paths' energy comes through the effects.
+    fn through(&self, values: &[f64], view: &BandView<'_>, paths: &[f64]) -> Vec<f64> {
+        if self.effects.is_empty() {
+            return vec![1.0; paths.len()];
+        }
+        let at = |offset: f64| {
+            let mut moved: Vec<f64> = paths.iter().map(|p| p + offset).collect();
+            self.apply(values, view, &mut moved);
+            moved
+        };
+        at(STEP).iter().zip(at(-STEP)).map(|(up, down)| (up - down) / (2.0 * STEP)).collect()
+    }
+
+    /// Change of the predicted logarithm with a parameter of an effect.
+    fn difference(&self, values: &[f64], index: usize, view: &BandView<'_>, paths: &[f64]) -> Vec<f64> {
+        let prior = self.priors[index];
+        let step = STEP * prior.sd;
+        let at = |offset: f64| {
+            let mut moved = values.to_vec();
+            moved[index] = (moved[index] + offset).clamp(prior.low, prior.high);
+            let mut ln_energy = paths.to_vec();
+            self.apply(&moved, view, &mut ln_energy);
+            (moved[index], ln_energy)
+        };
+        let ((high, up), (low, down)) = (at(step), at(-step));
+        if high <= low {
+            return vec![0.0; paths.len()];
+        }
+        up.iter().zip(down).map(|(u, d)| (u - d) / (high - low)).collect()
+    }
+
+    /// Log-likelihood of each pair alone.
+    pub fn by_pair(&self, values: &[f64]) -> Vec<f64> {
+        (0..self.assignment.len())
+            .map(|pair| {
+                (0..self.data.survey.bands.len())
+                    .map(|band| self.band_likelihood(values, pair, band, None))
+                    .sum()
+            })
+            .collect()
+    }
+}
+
+impl Model for EnergyModel<'_> {
+    fn priors(&self) -> &[Prior] {
+        &self.priors
+    }
+
+    fn log_likelihood(&self, values: &[f64], mut slopes: Option<&mut Slopes>) -> f64 {
+        let mut sum = 0.0;
+        for pair in (0..self.assignment.len()).filter(|&p| self.used[p]) {
+            for band in 0..self.data.survey.bands.len() {
+                sum += self.band_likelihood(values, pair, band, slopes.as_deref_mut());
+            }
+        }
+        sum
+    }
+}
+
+/// The best of the fits from all starts of the last case.
+pub(crate) fn fit(
+    data: &EnergyData<'_>,
+    cases: &[&dyn Case],
+    used: &[bool],
+    before: Option<&[f64]>,
+    effect_starts: Option<&[f64]>,
+) -> Result<(crate::gauss_newton::Maximum, Vec<usize>), Error> {
+    let model = EnergyModel::new(data, cases, used);
+    let base = model.start(before);
+    let mut starts: Vec<Vec<f64>> = vec![base.clone()];
+    for (i, placed) in model.effects.iter().enumerate() {
+        let known = effect_starts.filter(|s| s.len() >= base.len());
+        let options = match known {
+            Some(known) => vec![known[placed.first..placed.first + placed.parameters.len()].to_vec()],
+            None => placed.case.starts(data.survey),
+        };
+        // All starts of the effect that has most, the first of the others.
+        let most = model.effects.iter().map(|p| p.case.starts(data.survey).len()).max().unwrap_or(1);
+        if options.len() == most && starts.len() == 1 {
+            starts = options
+                .iter()
+                .map(|o| {
+                    let mut x = starts[0].clone();
+                    x[placed.first..placed.first + o.len()].copy_from_slice(o);
+                    x
+                })
+                .collect();
+        } else if let Some(o) = options.first() {
+            for x in &mut starts {
+                x[placed.first..placed.first + o.len()].copy_from_slice(o);
+            }
+        }
+        let _ = i;
+    }
+    let mut best: Option<crate::gauss_newton::Maximum> = None;
+    for start in starts {
+        let found = crate::gauss_newton::maximise(&model, &start, "decays")?;
+        if best.as_ref().is_none_or(|b| found.log_evidence > b.log_evidence) {
+            best = Some(found);
+        }
+    }
+    let firsts = model.effects.iter().map(|p| p.first).collect();
+    best.map(|b| (b, firsts)).ok_or(Error::Singular { what: "decays" })
+}

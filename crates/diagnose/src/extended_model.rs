@@ -1,0 +1,94 @@
+//! The room with its named causes at work, as a file from which sound can be rendered.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// What a diagnosis changes in a room: an overlay over the room file. Absent parts leave the room as it is.
+///
+/// As TOML it is the `extended_model.toml` of the example `diagnose`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct ExtendedModel {
+    /// Nominal octave centres of everything given by octave, in Hz.
+    pub centres_hz: Vec<f64>,
+    /// Identifiers of the causes that are at work.
+    pub causes: Vec<String>,
+    /// Absorption by material and octave.
+    #[serde(default)]
+    pub absorption: BTreeMap<String, Vec<f64>>,
+    /// Scattering by material and octave.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub scattering: BTreeMap<String, Vec<f64>>,
+    /// Relative humidity in percent, for attenuation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relative_humidity_percent: Option<f64>,
+    /// Temperature in degrees Celsius, for the speed of sound.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature_c: Option<f64>,
+    /// Gain of loudspeaker and microphone by octave, in dB.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub gain_db: Vec<f64>,
+    /// First-order pattern of the sources: directed share by octave (0: omnidirectional, 0.5: cardioid), radiated power as without.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub directed_share: Vec<f64>,
+    /// Axis of each source.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub axis: BTreeMap<String, [f64; 3]>,
+    /// Noise by octave: energy per second relative to that of the direct sound at 1 m.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub noise_per_s: Vec<f64>,
+    /// The decay of a coupled volume.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coupled: Option<CoupledDecay>,
+    /// End of the response and length of its fade, in seconds from the first sample.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truncation: Option<[f64; 2]>,
+    /// Deviation of the sampling clock in parts per million.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clock_ppm: Option<f64>,
+    /// Scale of the room along each axis about the middle of its box, and shift in metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dimensions: Option<Dimensions>,
+    /// Where sources and receivers stand that are not where the room file says, by name, in metres.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub position_m: BTreeMap<String, [f64; 3]>,
+    /// Latency of all responses in seconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub latency_s: Option<f64>,
+    /// Responses (SOURCE-RECEIVER) whose sign is turned.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub inverted: Vec<String>,
+    /// Gain of single responses in dB.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub response_gain_db: BTreeMap<String, f64>,
+    /// Responses that were exchanged.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub exchanged: Vec<[String; 2]>,
+}
+
+/// The second decay of a coupled volume.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct CoupledDecay {
+    /// Energy per second at the beginning, by octave, relative to that of the direct sound at 1 m.
+    pub energy_per_s: Vec<f64>,
+    /// Decay time (60 dB) by octave, in seconds.
+    pub decay_time_s: Vec<f64>,
+    /// Change of level with the receiver's position, in dB/m along each axis, about `centre_m`.
+    pub gradient_db_per_m: [f64; 3],
+    /// Where the level is as stated.
+    pub centre_m: [f64; 3],
+}
+
+/// How the room differs from its mesh.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct Dimensions {
+    /// Factor along each axis.
+    pub scale: [f64; 3],
+    /// Shift along each axis in metres.
+    pub shift_m: [f64; 3],
+}

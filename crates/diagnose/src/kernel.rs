@@ -1,0 +1,114 @@
+//! What an octave filter does to a pulse: over which times it spreads the energy, and how alike it leaves two of them.
+
+use sabine_acoustics::{Error, FilterBank, OctaveBands};
+
+/// Ringing to either side that is kept, in units of one over the bandwidth: what is left out is below -50 dB.
+const REACH_BANDWIDTH_TIMES: f64 = 6.0;
+
+/// The pulse response of one octave filter of the measurement, squared.
+#[derive(Clone, Debug)]
+pub(crate) struct BandKernel {
+    /// Energy before each sample, the pulse being in the middle; ends at 1.
+    cumulative: Vec<f64>,
+    half: usize,
+    rate_hz: f64,
+    /// Squared samples of the filtered unit pulse, summed.
+    pub energy: f64,
+    /// Mean squared correlation of two pulses that lie in cells so far apart.
+    pub likeness: Vec<f64>,
+}
+
+impl BandKernel {
+    /// The kernels of all bands; `cell_s` is the width of the cells of [`BandKernel::likeness`].
+    pub fn all(bands: OctaveBands, rate_hz: u32, cell_s: f64) -> Result<Vec<Self>, Error> {
+        let (low, high) = bands.edges_hz(0);
+        let rate = f64::from(rate_hz);
+        let half = (REACH_BANDWIDTH_TIMES / (high - low) * rate).ceil() as usize;
+        let mut pulse = vec![0.0f32; 2 * half + 1];
+        pulse[half] = 1.0;
+        let filtered = FilterBank::new(bands, rate_hz)?.analyse(&pulse);
+        Ok(filtered.values().iter().map(|h| Self::new(h, rate, cell_s)).collect())
+    }
+
+    fn new(pulse: &[f32], rate_hz: f64, cell_s: f64) -> Self {
+        let h: Vec<f64> = pulse.iter().copied().map(f64::from).collect();
+        let energy: f64 = h.iter().map(|x| x * x).sum();
+        let mut sum = 0.0;
+        let mut cumulative = vec![0.0];
+        cumulative.extend(h.iter().map(|x| {
+            sum += x * x / energy;
+            sum
+        }));
+        let cell = (cell_s * rate_hz).max(1.0);
+        // Beyond the reach of the ringing nothing is alike.
+        let reach = h.len() / 2;
+        let squared: Vec<f64> = (0..reach)
+            .map(|lag| {
+                let product: f64 = h.iter().zip(&h[lag..]).map(|(a, b)| a * b).sum();
+                (product / energy).powi(2)
+            })
+            .collect();
+        let cells = (reach as f64 / cell).ceil() as usize + 2;
+        // Two times, each anywhere in its cell: their distance is triangular about that of the cells.
+        let likeness = (0..cells)
+            .map(|apart| {
+                let centre = apart as f64 * cell;
+                let from = (centre - cell).ceil() as i64;
+                (from..=(centre + cell) as i64)
+                    .map(|lag| {
+                        let r = squared.get(lag.unsigned_abs() as usize).copied().unwrap_or(0.0);
+                        r * (1.0 - (lag as f64 - centre).abs() / cell).max(0.0) / cell
+                    })
+                    .sum()
+            })
+            .collect();
+        Self { cumulative, half: h.len() / 2, rate_hz, energy, likeness }
+    }
+
+    /// Share of the energy of a pulse at time zero that comes before `time_s`.
+    pub fn before(&self, time_s: f64) -> f64 {
+        let at = time_s * self.rate_hz + self.half as f64 + 0.5;
+        if at <= 0.0 {
+            return 0.0;
+        }
+        let index = at as usize;
+        match self.cumulative.get(index + 1) {
+            Some(next) => {
+                let low = self.cumulative[index];
+                low + (next - low) * (at - index as f64)
+            }
+            None => 1.0,
+        }
+    }
+
+    /// How far the ringing reaches to either side, in seconds.
+    pub fn reach_s(&self) -> f64 {
+        self.half as f64 / self.rate_hz
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)] // a panic is how a test fails
+    use super::*;
+
+    #[test]
+    fn the_energy_of_a_pulse_lies_about_its_instant() {
+        let bands = OctaveBands::new(500.0, 1000.0).unwrap();
+        for kernel in BandKernel::all(bands, 16000, 1e-3).unwrap() {
+            assert!((kernel.before(0.0) - 0.5).abs() < 1e-6);
+            assert!(kernel.before(-kernel.reach_s()) < 1e-4 && kernel.before(kernel.reach_s()) > 1.0 - 1e-4);
+            assert!(kernel.before(0.002) > 0.8);
+        }
+    }
+
+    #[test]
+    fn likeness_adds_up_to_one_over_twice_the_bandwidth() {
+        // Parseval: the squared autocorrelation of a flat band of width B integrates to 1 / (2 B).
+        let bands = OctaveBands::new(1000.0, 1000.0).unwrap();
+        let kernel = &BandKernel::all(bands, 48000, 1e-3).unwrap()[0];
+        let integral: f64 = 1e-3 * (kernel.likeness[0] + 2.0 * kernel.likeness[1..].iter().sum::<f64>());
+        let (low, high) = bands.edges_hz(0);
+        assert!((integral * 2.0 * (high - low) - 1.0).abs() < 0.25, "{integral}");
+    }
+}

@@ -1,0 +1,348 @@
+//! Traced paths between one source and one receiver, and the energies that they predict.
+
+use crate::bins::Bins;
+use crate::kernel::BandKernel;
+use rayon::prelude::*;
+use sabine_acoustics::{Air, Conditions, Error, Material, OctaveBands, PathSet, PerBand};
+
+/// Width of the cells in which sampled paths are gathered, in seconds.
+pub(crate) const CELL_S: f64 = 1e-3;
+/// Extra scattering at which energies are tabulated.
+pub(crate) const SCATTERING_GRID: [f64; 8] = [-1.0, -0.5, 0.0, 0.1, 0.25, 0.45, 0.7, 0.95];
+/// Place of none in the grid.
+const NO_EXTRA: usize = 2;
+/// What the model itself may be off by, as a share of a bin's energy: a single early pulse is never predicted better.
+const MODEL_SD: f64 = 0.07;
+/// Energy of a bin without paths, as a share of the strongest: it counts as nothing.
+const NOTHING: f64 = 1e-12;
+
+/// A path that was found exactly.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Arrival {
+    pub length_m: f64,
+    pub departure: [f64; 3],
+    pub arrival: [f64; 3],
+    /// Energy in the mean over the bands.
+    pub energy: f64,
+}
+
+/// Paths of one pair with what does not change from fit to fit.
+pub(crate) struct TracedPair {
+    paths: PathSet,
+    pub source: usize,
+    pub receiver: usize,
+    pub air: Air,
+    pub speed_m_s: f64,
+    /// Time of flight of the direct sound, or of the shortest path where that is blocked.
+    pub direct_s: f64,
+    /// Hits of each path on each material.
+    hits: Vec<f32>,
+    departures: Vec<[f32; 3]>,
+    /// Time after the direct sound.
+    times_s: Vec<f32>,
+}
+
+/// Predicted energy of one band in time bins, at the materials of the expansion, and how it changes.
+#[derive(Clone, Debug)]
+pub(crate) struct BandState {
+    pub bins: Bins,
+    pub ln_energy: Vec<f64>,
+    /// Energy-weighted mean number of hits, `[bin * materials + material]`.
+    pub hits: Vec<f64>,
+    /// Their covariance, upper triangle row by row.
+    pub hits_covariance: Vec<f64>,
+    /// Energy-weighted mean time after the direct sound.
+    pub time_s: Vec<f64>,
+    pub departure: Vec<[f64; 3]>,
+    pub departure_products: Vec<[f64; 6]>,
+    /// Expected variance of a measured bin about the prediction, as a share of its energy squared.
+    pub variance: Vec<f64>,
+    /// Logarithm of the change of energy, `[grid][bin]`; empty until tabulated.
+    scattering: Vec<Vec<f64>>,
+}
+
+impl BandState {
+    pub fn scattering_change(&self, bin: usize, extra: f64) -> f64 {
+        if self.scattering.is_empty() {
+            return 0.0;
+        }
+        let x = extra.clamp(SCATTERING_GRID[0], SCATTERING_GRID[SCATTERING_GRID.len() - 1]);
+        let upper = SCATTERING_GRID.iter().position(|&g| g >= x).unwrap_or(1).max(1);
+        let (low, high) = (SCATTERING_GRID[upper - 1], SCATTERING_GRID[upper]);
+        let share = (x - low) / (high - low);
+        self.scattering[upper - 1][bin] * (1.0 - share) + self.scattering[upper][bin] * share
+    }
+}
+
+impl TracedPair {
+    pub fn new(paths: PathSet, ends: [usize; 2], air: Air) -> Self {
+        let speed_m_s = air.speed_of_sound_m_s();
+        let shortest = paths.lengths_m().iter().copied().fold(f32::INFINITY, f32::min);
+        let direct = (0..paths.len()).find(|&i| paths.is_direct(i)).map(|i| paths.lengths_m()[i]);
+        let direct_s = f64::from(direct.unwrap_or(shortest)) / speed_m_s;
+        let materials = paths.materials();
+        let counts = paths.hit_counts();
+        let mut hits = Vec::with_capacity(paths.len() * materials);
+        for i in 0..paths.len() {
+            let row = |chain: u32| &counts[chain as usize * materials..][..materials];
+            let (out, back) = (row(paths.chains()[i]), row(paths.tails()[i]));
+            hits.extend(out.iter().zip(back).map(|(a, b)| f32::from(a + b)));
+        }
+        let departures = (0..paths.len()).map(|i| paths.departure(i).map(|x| x as f32)).collect();
+        let times_s =
+            paths.lengths_m().iter().map(|l| (f64::from(*l) / speed_m_s - direct_s) as f32).collect();
+        let [source, receiver] = ends;
+        Self { paths, source, receiver, air, speed_m_s, direct_s, hits, departures, times_s }
+    }
+
+    /// The exact paths, the shortest first.
+    pub fn arrivals(&self, materials: &[Material], within_s: f64) -> Result<Vec<Arrival>, Error> {
+        let energies = self.paths.energies(materials, &self.air)?;
+        let mut found: Vec<Arrival> = (0..self.paths.len())
+            .filter(|&i| self.paths.is_exact(i) && f64::from(self.times_s[i]) <= within_s)
+            .map(|i| Arrival {
+                length_m: f64::from(self.paths.lengths_m()[i]),
+                departure: self.paths.departure(i),
+                arrival: self.paths.arrival(i),
+                energy: energies.iter().map(|e| f64::from(e[i])).sum::<f64>() / energies.len() as f64,
+            })
+            .collect();
+        found.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
+        Ok(found)
+    }
+
+    pub fn has_direct(&self) -> bool {
+        (0..self.paths.len()).any(|i| self.paths.is_direct(i))
+    }
+
+    /// Predicted energies in all bands for `duration_s` after the direct sound.
+    pub fn expand(
+        &self,
+        materials: &[Material],
+        kernels: &[BandKernel],
+        duration_s: f64,
+        scattering: bool,
+    ) -> Result<Vec<BandState>, Error> {
+        let bands = materials[0].bands();
+        let energies = self.paths.energies_under(&Conditions::new(materials, &self.air))?;
+        let mut states: Vec<BandState> = energies
+            .par_iter()
+            .enumerate()
+            .map(|(band, e)| self.band(e, Bins::new(bands, band), &kernels[band], duration_s))
+            .collect();
+        if scattering {
+            let mut table: Vec<Vec<Vec<f64>>> = vec![Vec::new(); bands.len()];
+            for (place, &extra) in SCATTERING_GRID.iter().enumerate() {
+                let changed: Vec<Material> =
+                    materials.iter().map(|m| scattering_more(m, extra)).collect::<Result<_, _>>()?;
+                let energies = if place == NO_EXTRA {
+                    None
+                } else {
+                    Some(self.paths.energies_under(&Conditions::new(&changed, &self.air))?)
+                };
+                for (band, table) in table.iter_mut().enumerate() {
+                    let state = &states[band];
+                    table.push(match &energies {
+                        None => vec![0.0; state.ln_energy.len()],
+                        Some(e) => {
+                            let sums = self.sums(&e[band], state.bins, &kernels[band], duration_s);
+                            let floor = NOTHING * sums.iter().copied().fold(0.0, f64::max);
+                            sums.iter().zip(&state.ln_energy).map(|(s, l)| s.max(floor).ln() - l).collect()
+                        }
+                    });
+                }
+            }
+            for (state, table) in states.iter_mut().zip(table) {
+                state.scattering = table;
+            }
+        }
+        Ok(states)
+    }
+
+    /// The bins that a path's energy falls into, with its share of each.
+    fn shares(
+        time_s: f64,
+        bins: Bins,
+        kernel: &BandKernel,
+        count: usize,
+        mut give: impl FnMut(usize, f64),
+    ) {
+        let reach = kernel.reach_s().min(2.0 * bins.width_s);
+        let first = bins.count(time_s - reach).min(count);
+        let mut before = kernel.before(bins.edge_s(first) - time_s);
+        for bin in first..count {
+            let edge = bins.edge_s(bin + 1) - time_s;
+            let after = if edge >= reach { 1.0 } else { kernel.before(edge) };
+            if after > before {
+                give(bin, after - before);
+            }
+            before = after;
+            if edge >= reach {
+                break;
+            }
+        }
+    }
+
+    /// Energy of each bin alone.
+    fn sums(&self, energies: &[f32], bins: Bins, kernel: &BandKernel, duration_s: f64) -> Vec<f64> {
+        let count = bins.count(duration_s);
+        let cells = (duration_s / CELL_S).ceil() as usize + 1;
+        let mut cell = vec![0.0f64; cells];
+        let mut sums = vec![0.0; count];
+        for (i, &e) in energies.iter().enumerate() {
+            let (time_s, e) = (f64::from(self.times_s[i]), f64::from(e));
+            if self.paths.is_exact(i) {
+                Self::shares(time_s, bins, kernel, count, |bin, share| sums[bin] += share * e);
+            } else if let Some(c) = cell.get_mut((time_s.max(0.0) / CELL_S) as usize) {
+                *c += e;
+            }
+        }
+        for (c, e) in cell.into_iter().enumerate().filter(|(_, e)| *e > 0.0) {
+            let time_s = (c as f64 + 0.5) * CELL_S;
+            Self::shares(time_s, bins, kernel, count, |bin, share| sums[bin] += share * e);
+        }
+        sums
+    }
+
+    fn band(&self, energies: &[f32], bins: Bins, kernel: &BandKernel, duration_s: f64) -> BandState {
+        let m = self.paths.materials();
+        let pairs = m * (m + 1) / 2;
+        // Columns: energy, time, departure, its products, hits, products of hits.
+        let columns = 11 + m + pairs;
+        let count = bins.count(duration_s);
+        let cells = (duration_s / CELL_S).ceil() as usize + 1;
+        let batches = usize::from(PathSet::BATCHES);
+        let mut gathered = vec![0.0f64; cells * columns];
+        let mut by_batch = vec![0.0f32; cells * batches];
+        let mut sums = vec![0.0f64; count * columns];
+        // For the spread: energy in cells, exact paths included, and squares of the exact ones in each bin.
+        let mut all_cells = vec![0.0f64; cells];
+        let mut squares = vec![0.0f64; count];
+        let mut row = vec![0.0f64; columns];
+        for (i, &e) in energies.iter().enumerate() {
+            let time_s = f64::from(self.times_s[i]);
+            let cell = (time_s.max(0.0) / CELL_S) as usize;
+            if cell >= cells || e == 0.0 {
+                continue;
+            }
+            let e = f64::from(e);
+            let exact = self.paths.is_exact(i);
+            let target = if exact {
+                row.fill(0.0);
+                &mut row[..]
+            } else {
+                &mut gathered[cell * columns..(cell + 1) * columns]
+            };
+            let [x, y, z] = self.departures[i].map(f64::from);
+            target[0] += e;
+            target[1] += e * time_s;
+            for (k, v) in [x, y, z, x * x, y * y, z * z, x * y, x * z, y * z].into_iter().enumerate() {
+                target[2 + k] += e * v;
+            }
+            let hits = &self.hits[i * m..(i + 1) * m];
+            let mut product = 11 + m;
+            for (a, &n) in hits.iter().enumerate() {
+                let en = e * f64::from(n);
+                target[11 + a] += en;
+                for &o in &hits[a..] {
+                    target[product] += en * f64::from(o);
+                    product += 1;
+                }
+            }
+            all_cells[cell] += e;
+            if exact {
+                Self::shares(time_s, bins, kernel, count, |bin, share| {
+                    squares[bin] += (share * e).powi(2);
+                    let sums = &mut sums[bin * columns..(bin + 1) * columns];
+                    sums.iter_mut().zip(&row).for_each(|(s, r)| *s += share * r);
+                });
+            } else if let Some(batch) = self.paths.batch(i) {
+                by_batch[cell * batches + usize::from(batch)] += e as f32;
+            }
+        }
+        let mut batch_sums = vec![0.0f64; count * batches];
+        // Energy of each cell in each bin, for the spread.
+        let mut weighted: Vec<Vec<(usize, f64)>> = vec![Vec::new(); count];
+        for cell in 0..cells {
+            if all_cells[cell] == 0.0 {
+                continue;
+            }
+            let time_s = (cell as f64 + 0.5) * CELL_S;
+            let own = &gathered[cell * columns..(cell + 1) * columns];
+            let parts = &by_batch[cell * batches..(cell + 1) * batches];
+            Self::shares(time_s, bins, kernel, count, |bin, share| {
+                weighted[bin].push((cell, share * all_cells[cell]));
+                if own[0] > 0.0 {
+                    let sums = &mut sums[bin * columns..(bin + 1) * columns];
+                    sums.iter_mut().zip(own).for_each(|(s, r)| *s += share * r);
+                    let sums = &mut batch_sums[bin * batches..(bin + 1) * batches];
+                    sums.iter_mut().zip(parts).for_each(|(s, r)| *s += share * f64::from(*r));
+                }
+            });
+        }
+        let floor = NOTHING * (0..count).map(|k| sums[k * columns]).fold(0.0, f64::max).max(1e-30);
+        let mut state = BandState {
+            bins,
+            ln_energy: Vec::with_capacity(count),
+            hits: Vec::with_capacity(count * m),
+            hits_covariance: Vec::with_capacity(count * pairs),
+            time_s: Vec::with_capacity(count),
+            departure: Vec::with_capacity(count),
+            departure_products: Vec::with_capacity(count),
+            variance: Vec::with_capacity(count),
+            scattering: Vec::new(),
+        };
+        for bin in 0..count {
+            let s = &sums[bin * columns..(bin + 1) * columns];
+            let e = s[0].max(floor);
+            state.ln_energy.push(e.ln());
+            state.time_s.push(if s[0] > floor { s[1] / e } else { bins.centre_s(bin) });
+            state.departure.push(std::array::from_fn(|k| s[2 + k] / e));
+            state.departure_products.push(std::array::from_fn(|k| s[5 + k] / e));
+            let mean: Vec<f64> = s[11..11 + m].iter().map(|h| h / e).collect();
+            let mut product = 11 + m;
+            for a in 0..m {
+                for b in a..m {
+                    state.hits_covariance.push(s[product] / e - mean[a] * mean[b]);
+                    product += 1;
+                }
+            }
+            state.hits.extend(mean);
+            let interference = interference(&weighted[bin], kernel) - 2.0 * squares[bin];
+            let parts = &batch_sums[bin * batches..(bin + 1) * batches];
+            let mean = parts.iter().sum::<f64>() / batches as f64;
+            let scatter: f64 = parts.iter().map(|p| (p - mean).powi(2)).sum();
+            let monte_carlo = scatter * batches as f64 / (batches as f64 - 1.0);
+            let variance = (interference.max(0.0) + monte_carlo) / (e * e) + MODEL_SD * MODEL_SD;
+            // Nothing scatters more than the square of one Gaussian sample.
+            state.variance.push(variance.min(2.0));
+        }
+        state
+    }
+}
+
+/// Variance of the energy in a bin if all pulses had random signs, twice the sum of w_i w_j r_ij^2, those of single paths
+/// with themselves included.
+fn interference(cells: &[(usize, f64)], kernel: &BandKernel) -> f64 {
+    let mut sum = 0.0;
+    for (i, &(cell, energy)) in cells.iter().enumerate() {
+        sum += energy * energy * kernel.likeness[0];
+        for &(other, more) in &cells[i + 1..] {
+            match kernel.likeness.get(other - cell) {
+                Some(likeness) => sum += 2.0 * energy * more * likeness,
+                None => break,
+            }
+        }
+    }
+    2.0 * sum
+}
+
+/// A material that scatters more (of what it reflects specularly) or less (of what it scatters).
+pub(crate) fn scattering_more(material: &Material, extra: f64) -> Result<Material, Error> {
+    let bands: OctaveBands = material.bands();
+    let changed = PerBand::from_fn(bands, |b| {
+        let s = material.scattering().values()[b];
+        (if extra >= 0.0 { s + (1.0 - s) * extra } else { s * (1.0 + extra) }).clamp(0.0, 1.0)
+    });
+    Material::new(material.absorption().clone(), changed)
+}

@@ -1,0 +1,133 @@
+//! What an effect is shown of a prediction.
+
+use crate::traced_pair::BandState;
+use crate::{Survey, SurveyedResponse};
+
+/// One band of the predicted energy of one source-receiver pair.
+#[derive(Clone, Copy)]
+pub struct BandView<'a> {
+    pub(crate) survey: &'a Survey,
+    pub(crate) pair: usize,
+    pub(crate) response: usize,
+    pub(crate) band: usize,
+    pub(crate) state: &'a BandState,
+    pub(crate) direct_s: f64,
+    pub(crate) reference: f64,
+}
+
+impl BandView<'_> {
+    /// The survey.
+    pub fn survey(&self) -> &Survey {
+        self.survey
+    }
+
+    /// Index of the band.
+    pub fn band(&self) -> usize {
+        self.band
+    }
+
+    /// The pair that is predicted; which file holds it is [`BandView::recorded`].
+    pub fn pair(&self) -> &SurveyedResponse {
+        &self.survey.responses[self.pair]
+    }
+
+    /// The response that it is compared with: another one than the pair's where two were exchanged.
+    pub fn recorded(&self) -> &SurveyedResponse {
+        &self.survey.responses[self.response]
+    }
+
+    /// Number of time bins.
+    pub fn len(&self) -> usize {
+        self.state.ln_energy.len()
+    }
+
+    /// Whether there is no bin.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Mean arrival of the energy in a bin, in seconds after the emission.
+    pub fn time_s(&self, bin: usize) -> f64 {
+        self.direct_s + self.state.time_s[bin]
+    }
+
+    /// The same in seconds after the direct sound.
+    pub fn after_direct_s(&self, bin: usize) -> f64 {
+        self.state.time_s[bin]
+    }
+
+    /// Width of the bins in seconds.
+    pub fn bin_s(&self) -> f64 {
+        self.state.bins.width_s
+    }
+
+    /// Middle of a bin, in seconds from the first sample of the file.
+    pub fn file_time_s(&self, bin: usize) -> f64 {
+        self.recorded().direct_s + self.state.bins.centre_s(bin)
+    }
+
+    /// Energy of a typical early bin of this band, the mean over all pairs: what levels of added sound refer to.
+    pub fn reference_energy(&self) -> f64 {
+        self.reference
+    }
+
+    /// Energy-weighted mean of the unit vectors in which the paths of a bin leave the source, and of their products
+    /// xx, yy, zz, xy, xz, yz.
+    pub fn departures(&self, bin: usize) -> ([f64; 3], [f64; 6]) {
+        (self.state.departure[bin], self.state.departure_products[bin])
+    }
+
+    /// Natural logarithm of the change of a bin's energy if the surfaces scattered more by `extra` (0 to 0.9, share of what
+    /// they now reflect specularly) or less (-1 to 0, share of what they now scatter).
+    pub fn scattering_change(&self, bin: usize, extra: f64) -> f64 {
+        self.state.scattering_change(bin, extra)
+    }
+}
+
+/// One predicted arrival: the direct sound or a specular reflection.
+#[derive(Clone, Copy)]
+pub struct ArrivalView<'a> {
+    pub(crate) survey: &'a Survey,
+    pub(crate) pair: usize,
+    pub(crate) length_m: f64,
+    pub(crate) speed_m_s: f64,
+    pub(crate) departure: [f64; 3],
+    pub(crate) arrival: [f64; 3],
+}
+
+impl ArrivalView<'_> {
+    /// The survey.
+    pub fn survey(&self) -> &Survey {
+        self.survey
+    }
+
+    /// Its source-receiver pair.
+    pub fn pair(&self) -> &SurveyedResponse {
+        &self.survey.responses[self.pair]
+    }
+
+    /// Length of the path in metres.
+    pub fn length_m(&self) -> f64 {
+        self.length_m
+    }
+
+    /// Time of flight in seconds, at the stated temperature.
+    pub fn time_s(&self) -> f64 {
+        self.length_m / self.speed_m_s
+    }
+
+    /// Speed of sound at the stated temperature, in m/s.
+    pub fn speed_m_s(&self) -> f64 {
+        self.speed_m_s
+    }
+
+    /// Unit vector in which the path leaves the source.
+    pub fn departure(&self) -> [f64; 3] {
+        self.departure
+    }
+
+    /// Unit vector from the receiver towards where the path comes from.
+    pub fn arrival(&self) -> [f64; 3] {
+        self.arrival
+    }
+}
