@@ -63,15 +63,26 @@ fn gain(bands: OctaveBands, band: usize, frequency_hz: f64) -> f64 {
     }
 }
 
+/// Half the length of a pulse, in samples.
+const HALF: usize = 32;
+
+/// A pulse of amplitude 1 at any instant: the sample at which it begins (perhaps before the first), and a windowed sinc.
+pub(crate) fn pulse(at: f64) -> (i64, [f64; 2 * HALF]) {
+    let first = at.floor() as i64 - HALF as i64 + 1;
+    let value = |i: usize| {
+        let x = (first + i as i64) as f64 - at;
+        let sinc = if x.abs() < 1e-9 { 1.0 } else { (PI * x).sin() / (PI * x) };
+        sinc * (FRAC_PI_2 * x / HALF as f64).cos().powi(2)
+    };
+    (first, std::array::from_fn(value))
+}
+
 /// Adds a pulse of an amplitude at any instant, by a windowed sinc 64 samples long. What falls outside is left out.
 pub(crate) fn add_pulse(samples: &mut [f64], at: f64, amplitude: f64) {
-    const HALF: i64 = 32;
-    let centre = at.floor() as i64;
-    for i in centre - HALF + 1..=centre + HALF {
-        let Some(sample) = usize::try_from(i).ok().and_then(|i| samples.get_mut(i)) else { continue };
-        let x = i as f64 - at;
-        let sinc = if x.abs() < 1e-9 { 1.0 } else { (PI * x).sin() / (PI * x) };
-        let window = (FRAC_PI_2 * x / HALF as f64).cos().powi(2);
-        *sample += amplitude * sinc * window;
+    let (first, values) = pulse(at);
+    for (i, value) in (first..).zip(values) {
+        if let Some(sample) = usize::try_from(i).ok().and_then(|i| samples.get_mut(i)) {
+            *sample += amplitude * value;
+        }
     }
 }

@@ -7,6 +7,7 @@
 //! - [`BruteForceRays`]: every ray against every triangle.
 //! - [`Phonons`]: particles in any closed mesh, as energy with standard errors and as pressure: the truth behind the
 //!   recording in `fixtures/`.
+//! - [`Laboratory`]: random rooms, measured with any of the effects of [`Hidden`] at work.
 //! - [`assert_close`], [`assert_all_close`], [`assert_within_standard_errors`], [`read_golden`]: tolerances that say what they allow.
 //!
 //! What it does **not** do: run fast, read files of users, or follow diffraction.
@@ -33,12 +34,14 @@
 mod brute_force;
 mod filter;
 mod geometry;
+mod laboratory;
 mod own_air;
 mod phonons;
 mod shoebox;
 mod tolerance;
 
 pub use brute_force::BruteForceRays;
+pub use laboratory::{End, Fault, Gap, Hidden, LabConfig, Laboratory, TrueMaterial, TrueSource, Truth};
 pub use phonons::{PhononConfig, PhononEnergy, Phonons};
 pub use shoebox::{Image, ShoeboxImages};
 pub use tolerance::{assert_all_close, assert_close, assert_within_standard_errors, read_golden};

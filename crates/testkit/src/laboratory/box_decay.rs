@@ -1,0 +1,78 @@
+//! The decay in a box of mirrors, averaged over directions.
+
+use super::truth::{Medium, Truth};
+use std::f64::consts::TAU;
+
+/// Time step in seconds.
+const STEP_S: f64 = 1e-3;
+/// Directions in an octant.
+const DIRECTIONS: usize = 512;
+
+/// Mean share of energy that the walls have left to images of an age, by band.
+///
+/// A path with direction cosines n meets the walls of axis a once every L_a / (c |n_a|), the two in turn. What is left after a time
+/// is the mean over the sphere of exp(-c t sum_a |n_a| k_a / L_a), k_a = -ln sqrt(R R'). It is smooth where the images
+/// themselves are not.
+pub(crate) struct BoxDecay {
+    bands: usize,
+    /// `[step][band]`.
+    left: Vec<f64>,
+}
+
+impl BoxDecay {
+    pub(crate) fn new(truth: &Truth, medium: &Medium, duration_s: f64) -> Self {
+        let mirrored = truth.log_mirrored();
+        let bands = mirrored.len();
+        let steps = (duration_s / STEP_S).ceil() as usize + 2;
+        let mut left = vec![0.0; steps * bands];
+        for d in 0..DIRECTIONS {
+            // A spiral of equal areas; the octant is a quarter of the upper half.
+            let z = (d as f64 + 0.5) / DIRECTIONS as f64;
+            let azimuth = 0.25 * TAU * ((d as f64 * 0.618_033_988_749_894_9) % 1.0);
+            let flat = (1.0 - z * z).sqrt();
+            let n = [flat * azimuth.cos(), flat * azimuth.sin(), z];
+            for (band, logs) in mirrored.iter().enumerate() {
+                let rate: f64 =
+                    (0..3).map(|a| 0.5 * n[a] / truth.size_m[a] * (logs[2 * a] + logs[2 * a + 1])).sum();
+                let factor = (rate * medium.speed_m_s * STEP_S).exp();
+                let mut value = 1.0 / DIRECTIONS as f64;
+                for step in 0..steps {
+                    left[step * bands + band] += value;
+                    value *= factor;
+                }
+            }
+        }
+        Self { bands, left }
+    }
+
+    /// What the walls have left in each band after a time.
+    pub(crate) fn at(&self, time_s: f64) -> &[f64] {
+        let last = self.left.len() / self.bands - 1;
+        let step = ((time_s / STEP_S) as usize).min(last);
+        &self.left[step * self.bands..(step + 1) * self.bands]
+    }
+
+    /// When what is still to come has fallen by a level in every band, the air included; at most the duration covered.
+    pub(crate) fn fallen_s(&self, medium: &Medium, by_db: f64) -> f64 {
+        let steps = self.left.len() / self.bands;
+        let mut latest = 0;
+        for band in 0..self.bands {
+            let energy: Vec<f64> = (0..steps)
+                .map(|s| {
+                    let length_m = s as f64 * STEP_S * medium.speed_m_s;
+                    self.left[s * self.bands + band] * (-medium.exponents_per_m[band] * length_m).exp()
+                })
+                .collect();
+            let limit = energy.iter().sum::<f64>() * 10f64.powf(-0.1 * by_db);
+            let mut rest = 0.0;
+            for (step, e) in energy.iter().enumerate().rev() {
+                rest += e;
+                if rest > limit {
+                    latest = latest.max(step);
+                    break;
+                }
+            }
+        }
+        latest as f64 * STEP_S
+    }
+}

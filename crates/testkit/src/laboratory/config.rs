@@ -1,0 +1,74 @@
+//! What a laboratory is asked for.
+
+use sabine_acoustics::{Error, Levels, OctaveBands, TimeZero};
+
+/// The room to draw and how it is measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LabConfig {
+    /// Seed of everything random, below 2^63.
+    pub seed: u64,
+    /// Number of sources, 1 to 8.
+    pub sources: usize,
+    /// Number of receivers, 1 to 32.
+    pub receivers: usize,
+    /// Sample rate of the responses in Hz; the highest octave must lie below half of it.
+    pub sample_rate_hz: u32,
+    /// Octaves of the material tables and of the responses.
+    pub bands: OctaveBands,
+    /// What is declared about the first sample. Unless it is the emission, latencies of 1 to 20 ms are at work.
+    pub time_zero: TimeZero,
+    /// What is declared about levels. Unless they are absolute, gains of -10 to 10 dB are at work.
+    pub levels: Levels,
+    /// Whether the sources' axes are declared.
+    pub orientation: bool,
+}
+
+impl Default for LabConfig {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            sources: 1,
+            receivers: 12,
+            sample_rate_hz: 48_000,
+            bands: OctaveBands::T60,
+            time_zero: TimeZero::Emission,
+            levels: Levels::Common,
+            orientation: true,
+        }
+    }
+}
+
+impl LabConfig {
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let rate = f64::from(self.sample_rate_hz);
+        let highest = self.bands.edges_hz(self.bands.len() - 1).1;
+        let checks = [
+            ("seed", self.seed as f64, 0.0, i64::MAX as f64, "below 2^63"),
+            ("sources", self.sources as f64, 1.0, 8.0, "between 1 and 8"),
+            ("receivers", self.receivers as f64, 1.0, 32.0, "between 1 and 32"),
+            (
+                "sample rate (Hz)",
+                rate,
+                2.0 * highest,
+                192e3,
+                "at least twice the highest band edge, at most 192 kHz",
+            ),
+        ];
+        for (field, value, low, high, range) in checks {
+            check_range(field, value, low, high, range)?;
+        }
+        Ok(())
+    }
+}
+
+/// Checks that a number is finite and within `low..=high`.
+pub(crate) fn check_range(
+    field: &'static str,
+    value: f64,
+    low: f64,
+    high: f64,
+    range: &'static str,
+) -> Result<(), Error> {
+    // Written so that NaN fails.
+    if value >= low && value <= high { Ok(()) } else { Err(Error::OutOfRange { field, value, range }) }
+}

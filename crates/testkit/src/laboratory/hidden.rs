@@ -1,0 +1,283 @@
+//! The effects that a laboratory can hide.
+
+use super::truth::Truth;
+use sabine_acoustics::Error;
+use serde::{Deserialize, Serialize};
+
+/// A physical effect that is at work in the responses and that the declared room does not tell of. Lists per band begin with the
+/// lowest octave.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "effect", rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Hidden {
+    /// Loudspeaker and microphone are not flat.
+    TransducerResponse {
+        /// Gain of each octave in dB, -40 to 40.
+        gains_db: Vec<f64>,
+    },
+    /// The air is drier or damper than declared.
+    AirAbsorption {
+        /// True relative humidity, 0 to 100 %.
+        relative_humidity_percent: f64,
+    },
+    /// Sources radiate q + (1 - q) cos(angle to the axis), normalised to constant radiated power (mean square over the sphere 1).
+    SourceDirectivity {
+        /// Omnidirectional share q of each octave, 0 to 1.
+        omni_share: Vec<f64>,
+        /// The axis, or `None` for each source's own.
+        axis: Option<[f64; 3]>,
+    },
+    /// All surfaces scatter.
+    Scattering {
+        /// Scattering coefficient of each octave, 0 to 1.
+        scattering: Vec<f64>,
+    },
+    /// A material is not what its table says.
+    SurfaceAbsorption {
+        /// Index of the material.
+        material: usize,
+        /// True absorption of each octave, 0 to 0.99.
+        absorption: Vec<f64>,
+    },
+    /// Stationary noise in the room, the same level everywhere.
+    BackgroundNoise {
+        /// Mean power of each octave's noise relative to the octave's mean power in its strongest 20 ms (median of the
+        /// responses), in dB, at most 0.
+        levels_db: Vec<f64>,
+    },
+    /// A second room behind an aperture: a late decay of its own.
+    CoupledVolume {
+        /// Level of the late field far from the aperture, carried back to the direct sound, relative to the diffuse field of the room's
+        /// volume at the emission (energy 4 pi c / V per second), in dB, at most 0.
+        level_db: f64,
+        /// Decay time of each octave in seconds, 0.05 to 10.
+        decay_s: Vec<f64>,
+        /// Centre of the aperture in metres.
+        aperture_m: [f64; 3],
+        /// Distance from the aperture at which its direct radiation equals the late field, in metres: energy falls as
+        /// 1 + (critical / distance)^2.
+        critical_distance_m: f64,
+        /// Time constant of the build-up in seconds, 0.0001 to 1.
+        rise_s: f64,
+    },
+    /// Recordings end early.
+    Truncation {
+        /// From here on there is digital silence, in seconds from the first sample.
+        end_s: f64,
+        /// Duration of the raised-cosine fade before it, in seconds.
+        fade_s: f64,
+    },
+    /// The air is warmer or colder than declared: arrival times, and what temperature does to attenuation.
+    SoundSpeed {
+        /// True temperature less the declared one, in K.
+        temperature_offset_k: f64,
+    },
+    /// The recorder's clock is off.
+    SamplingClock {
+        /// Samples taken too many, in parts per million, -20000 to 20000.
+        ppm: f64,
+    },
+    /// The room is larger or smaller than its mesh; the corner at the origin stays.
+    RoomDimensions {
+        /// True over declared length of each axis, 0.8 to 1.25.
+        scale: [f64; 3],
+    },
+    /// One place is not where it is said to be.
+    PositionError {
+        /// Whether a source or a receiver.
+        end: End,
+        /// Its index.
+        index: usize,
+        /// True position less the declared one, in metres.
+        offset_m: [f64; 3],
+    },
+    /// A latency that the declaration denies (or does not know).
+    TimeZero {
+        /// Latency of all responses in seconds, -0.1 to 1.
+        latency_s: f64,
+    },
+    /// Something is wrong with single recordings.
+    ChannelFault {
+        /// What.
+        fault: Fault,
+    },
+    /// Outside the catalogue: the gain swells and sinks while each response is recorded, as depth sin(2 pi t / period + phase).
+    GainDrift {
+        /// Greatest deviation in dB.
+        depth_db: f64,
+        /// Period in seconds.
+        period_s: f64,
+        /// Phase at the first sample, in radians.
+        phase_rad: f64,
+    },
+    /// Outside the catalogue: moments without sound.
+    Dropouts {
+        /// The moments.
+        gaps: Vec<Gap>,
+    },
+    /// Outside the catalogue: a sweep that is none of the measurement's, in every response.
+    ForeignChirp {
+        /// Its beginning in seconds from the first sample.
+        start_s: f64,
+        /// Its length in seconds.
+        length_s: f64,
+        /// Frequency at its beginning in Hz.
+        from_hz: f64,
+        /// Frequency at its end in Hz; it moves exponentially.
+        to_hz: f64,
+        /// Its energy relative to that of the response, between these frequencies and while it lasts, in dB.
+        level_db: f64,
+    },
+}
+
+/// One end of a path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum End {
+    /// Where sound comes from.
+    Source,
+    /// Where it is heard.
+    Receiver,
+}
+
+/// What can be wrong with single recordings; responses are counted source by source.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Fault {
+    /// Turned over.
+    Polarity {
+        /// Index of the response.
+        response: usize,
+    },
+    /// Too loud or too soft.
+    Gain {
+        /// Index of the response.
+        response: usize,
+        /// By how much, in dB.
+        gain_db: f64,
+    },
+    /// Exchanged.
+    Swap {
+        /// Index of one response.
+        a: usize,
+        /// Index of the other.
+        b: usize,
+    },
+}
+
+/// A moment without sound.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Gap {
+    /// Index of the response.
+    pub response: usize,
+    /// Beginning in seconds from the first sample.
+    pub start_s: f64,
+    /// Length in seconds.
+    pub length_s: f64,
+}
+
+impl Hidden {
+    /// Identifiers of the catalogue's effects.
+    pub const CATALOGUE: [&'static str; 14] = [
+        "transducer_response",
+        "air_absorption",
+        "source_directivity",
+        "scattering",
+        "surface_absorption",
+        "background_noise",
+        "coupled_volume",
+        "truncation",
+        "sound_speed",
+        "sampling_clock",
+        "room_dimensions",
+        "position_error",
+        "time_zero",
+        "channel_fault",
+    ];
+    /// Names of the effects that no catalogue holds.
+    pub const OUTSIDE: [&'static str; 3] = ["gain_drift", "dropouts", "foreign_chirp"];
+
+    /// Identifier in the catalogue, or `outside`.
+    pub fn id(&self) -> &'static str {
+        let name = self.name();
+        if Self::OUTSIDE.contains(&name) { "outside" } else { name }
+    }
+
+    /// Name of the effect, whether a catalogue holds it or not.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::TransducerResponse { .. } => "transducer_response",
+            Self::AirAbsorption { .. } => "air_absorption",
+            Self::SourceDirectivity { .. } => "source_directivity",
+            Self::Scattering { .. } => "scattering",
+            Self::SurfaceAbsorption { .. } => "surface_absorption",
+            Self::BackgroundNoise { .. } => "background_noise",
+            Self::CoupledVolume { .. } => "coupled_volume",
+            Self::Truncation { .. } => "truncation",
+            Self::SoundSpeed { .. } => "sound_speed",
+            Self::SamplingClock { .. } => "sampling_clock",
+            Self::RoomDimensions { .. } => "room_dimensions",
+            Self::PositionError { .. } => "position_error",
+            Self::TimeZero { .. } => "time_zero",
+            Self::ChannelFault { .. } => "channel_fault",
+            Self::GainDrift { .. } => "gain_drift",
+            Self::Dropouts { .. } => "dropouts",
+            Self::ForeignChirp { .. } => "foreign_chirp",
+        }
+    }
+
+    /// Changes the truth. What acts on samples only is looked up there by the stages that follow.
+    pub(crate) fn apply(&self, truth: &mut Truth) -> Result<(), Error> {
+        truth.check(self)?;
+        match self {
+            Self::TransducerResponse { gains_db } => {
+                truth.source_gains_db.iter_mut().zip(gains_db).for_each(|(g, more)| *g += more);
+            }
+            Self::AirAbsorption { relative_humidity_percent } => {
+                truth.relative_humidity_percent = *relative_humidity_percent;
+            }
+            Self::SourceDirectivity { omni_share, axis } => {
+                for source in &mut truth.sources {
+                    source.omni_share.clone_from(omni_share);
+                    source.axis = axis.unwrap_or(source.axis);
+                }
+            }
+            Self::Scattering { scattering } => {
+                truth.materials.iter_mut().for_each(|m| m.scattering.clone_from(scattering));
+            }
+            Self::SurfaceAbsorption { material, absorption } => {
+                truth.materials[*material].absorption.clone_from(absorption);
+            }
+            Self::SoundSpeed { temperature_offset_k } => truth.temperature_c += temperature_offset_k,
+            Self::SamplingClock { ppm } => truth.clock_ppm += ppm,
+            Self::RoomDimensions { scale } => {
+                truth.size_m.iter_mut().zip(scale).for_each(|(l, s)| *l *= s);
+            }
+            Self::PositionError { end, index, offset_m } => {
+                let position = match end {
+                    End::Source => &mut truth.sources[*index].position_m,
+                    End::Receiver => &mut truth.receivers_m[*index],
+                };
+                position.iter_mut().zip(offset_m).for_each(|(c, o)| *c += o);
+            }
+            Self::TimeZero { latency_s } => {
+                truth.latencies_s.iter_mut().for_each(|l| *l += latency_s);
+            }
+            Self::ChannelFault { fault: Fault::Polarity { response } } => {
+                truth.inverted[*response] = !truth.inverted[*response];
+            }
+            Self::ChannelFault { fault: Fault::Gain { response, gain_db } } => {
+                truth.gains_db[*response] += gain_db;
+            }
+            Self::ChannelFault { fault: Fault::Swap { .. } }
+            | Self::BackgroundNoise { .. }
+            | Self::CoupledVolume { .. }
+            | Self::Truncation { .. }
+            | Self::GainDrift { .. }
+            | Self::Dropouts { .. }
+            | Self::ForeignChirp { .. } => {}
+        }
+        truth.effects.push(self.clone());
+        Ok(())
+    }
+}

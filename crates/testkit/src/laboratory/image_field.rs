@@ -1,0 +1,156 @@
+//! What mirrors send: image sources, each with a sign of its own.
+
+use super::box_decay::BoxDecay;
+use super::stream::{Purpose, key, mix, unit};
+use super::truth::{Medium, Truth};
+use crate::filter::pulse;
+use std::f64::consts::PI;
+
+/// At least this many pulses stand for the images of one sample's duration, where there are more.
+const PULSES_PER_SAMPLE: f64 = 4.0;
+/// Images arrive at their exact instants until there are this many in a sample's duration; then each goes to the nearest sample.
+const EXACT_PER_SAMPLE: f64 = 2.0;
+/// Images whose octaves have all fallen by this much are left out, in dB.
+const LEAST_DB: f64 = 85.0;
+
+/// Where the pulses of one response go: a column of samples for each band.
+pub(crate) struct Columns {
+    pub samples: Vec<Vec<f64>>,
+    /// Samples in a second of true time.
+    pub rate_hz: f64,
+    /// True time at the first sample.
+    pub start_s: f64,
+}
+
+impl Columns {
+    pub(crate) fn position(&self, time_s: f64) -> f64 {
+        (time_s - self.start_s) * self.rate_hz
+    }
+
+    fn add_exactly(&mut self, time_s: f64, amplitudes: &[f64]) {
+        let (first, values) = pulse(self.position(time_s));
+        for (column, amplitude) in self.samples.iter_mut().zip(amplitudes) {
+            for (i, value) in (first..).zip(values) {
+                if let Some(sample) = usize::try_from(i).ok().and_then(|i| column.get_mut(i)) {
+                    *sample += amplitude * value;
+                }
+            }
+        }
+    }
+
+    fn add_nearby(&mut self, time_s: f64, amplitudes: &[f64]) {
+        let at = self.position(time_s).round();
+        if at < 0.0 || at >= self.samples[0].len() as f64 {
+            return;
+        }
+        for (column, amplitude) in self.samples.iter_mut().zip(amplitudes) {
+            column[at as usize] += amplitude;
+        }
+    }
+}
+
+/// Adds all image sources of a pair.
+///
+/// Where images are denser than any filter can tell, only some are kept, with a probability that follows their energy, and weigh so
+/// much more: energies stay right in the mean, and no pulse carries more than a quarter of what a sample is due.
+pub(crate) fn add_images(
+    truth: &Truth,
+    medium: &Medium,
+    decay: &BoxDecay,
+    pair: (usize, usize),
+    columns: &mut Columns,
+) {
+    let (source, receiver) = (&truth.sources[pair.0], truth.receivers_m[pair.1]);
+    let bands = truth.bands_hz.len();
+    let seed = key(truth.seed, Purpose::Signs, pair.0 * truth.receivers_m.len() + pair.1);
+    let end_s = columns.start_s + columns.samples[0].len() as f64 / columns.rate_hz;
+    let longest_m = end_s.min(decay.fallen_s(medium, LEAST_DB)) * medium.speed_m_s;
+    let axes = [0, 1, 2].map(|a| Axis::new(truth, a, source.position_m[a], receiver[a], longest_m));
+    let gains: Vec<f64> = truth.source_gains_db.iter().map(|db| 10f64.powf(db / 20.0)).collect();
+    let volume_m3 = truth.volume_m3();
+    // Images in a second at an age t: 4 pi c^3 t^2 / V.
+    let exact_s =
+        (EXACT_PER_SAMPLE * columns.rate_hz * volume_m3 / (4.0 * PI * medium.speed_m_s.powi(3))).sqrt();
+    let share = PULSES_PER_SAMPLE * columns.rate_hz * volume_m3 / (4.0 * PI * medium.speed_m_s);
+    let mut row = vec![0.0; bands];
+    let mut amplitudes = vec![0.0; bands];
+    for x in &axes[0].images {
+        let row_x = mix(seed ^ x.index as u64);
+        for y in &axes[1].images {
+            let flat = x.offset_m * x.offset_m + y.offset_m * y.offset_m;
+            if flat > longest_m * longest_m {
+                continue;
+            }
+            let row_seed = mix(row_x ^ y.index as u64);
+            (0..bands).for_each(|b| row[b] = x.walls[b] * y.walls[b]);
+            for z in &axes[2].images {
+                let square = flat + z.offset_m * z.offset_m;
+                if square > longest_m * longest_m {
+                    continue;
+                }
+                let length_m = square.sqrt();
+                let time_s = length_m / medium.speed_m_s;
+                let hash = mix(row_seed ^ z.index as u64);
+                let left = decay.at(time_s);
+                let strongest = (0..bands).map(|b| row[b] * z.walls[b] / left[b]).fold(0.0, f64::max);
+                let kept = (share * strongest / square).min(1.0);
+                if unit(hash) >= kept {
+                    continue;
+                }
+                let direct = x.index == 0 && y.index == 0 && z.index == 0;
+                // Bits that `unit` does not look at.
+                let sign = if direct || hash & 1 == 0 { 1.0 } else { -1.0 };
+                let along = x.departure * source.axis[0]
+                    + y.departure * source.axis[1]
+                    + z.departure * source.axis[2];
+                let cosine = along / length_m;
+                let scale = sign / length_m / kept.sqrt();
+                for b in 0..bands {
+                    let energy = row[b] * z.walls[b] * (-medium.exponents_per_m[b] * length_m).exp();
+                    amplitudes[b] = scale * energy.sqrt() * gains[b] * source.gain(b, cosine);
+                }
+                if time_s < exact_s || kept == 1.0 {
+                    columns.add_exactly(time_s, &amplitudes);
+                } else {
+                    columns.add_nearby(time_s, &amplitudes);
+                }
+            }
+        }
+    }
+}
+
+/// The images of a source along one axis.
+struct Axis {
+    images: Vec<AxisImage>,
+}
+
+struct AxisImage {
+    index: i64,
+    /// From the receiver to the image.
+    offset_m: f64,
+    /// Where the path leaves, times its length.
+    departure: f64,
+    /// Energy that the two walls leave, by band.
+    walls: Vec<f64>,
+}
+
+impl Axis {
+    fn new(truth: &Truth, axis: usize, source: f64, receiver: f64, longest_m: f64) -> Self {
+        let side = truth.size_m[axis];
+        let reach = (longest_m / side).ceil() as i64 + 1;
+        let mirrored = truth.log_mirrored();
+        let image = |index: i64| {
+            let turned = index % 2 != 0;
+            let offset_m = index as f64 * side + if turned { side - source } else { source } - receiver;
+            // Beyond the upper wall an odd image has met that wall once more, and beyond the lower wall the lower.
+            let (more, fewer) = (index.unsigned_abs().div_ceil(2) as f64, (index.unsigned_abs() / 2) as f64);
+            let (low, high) = if index > 0 { (fewer, more) } else { (more, fewer) };
+            let walls = mirrored
+                .iter()
+                .map(|logs| (low * logs[2 * axis] + high * logs[2 * axis + 1]).exp())
+                .collect();
+            AxisImage { index, offset_m, departure: if turned { offset_m } else { -offset_m }, walls }
+        };
+        Self { images: (-reach..=reach).map(image).collect() }
+    }
+}

@@ -1,0 +1,278 @@
+//! The room as it really is.
+
+use super::config::check_range;
+use super::hidden::{End, Fault, Hidden};
+use crate::own_air::{energy_exponent_per_m, speed_of_sound_m_s};
+use sabine_acoustics::{Air, Error, OctaveBands, write_atomically};
+use serde::{Deserialize, Serialize};
+use std::io::Write;
+use std::path::Path;
+
+/// All that decides the responses. Lists per band begin with the lowest octave; responses are counted source by source.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Truth {
+    /// Seed of the laboratory.
+    pub seed: u64,
+    /// Nominal centres of the octaves in Hz.
+    pub bands_hz: Vec<f64>,
+    /// Length, width and height in metres, one corner at the origin.
+    pub size_m: [f64; 3],
+    /// Material of each face: x = 0, x = length, y = 0, y = width, floor, ceiling.
+    pub faces: [usize; 6],
+    /// Temperature in degrees Celsius.
+    pub temperature_c: f64,
+    /// Relative humidity in percent.
+    pub relative_humidity_percent: f64,
+    /// Pressure in kPa.
+    pub pressure_kpa: f64,
+    /// Receivers in metres.
+    pub receivers_m: Vec<[f64; 3]>,
+    /// Gain of each octave in dB, whatever the path.
+    pub source_gains_db: Vec<f64>,
+    /// Samples taken too many, in parts per million.
+    pub clock_ppm: f64,
+    /// Length of the responses in seconds.
+    pub duration_s: f64,
+    /// Latency of each response in seconds.
+    pub latencies_s: Vec<f64>,
+    /// Gain of each response in dB.
+    pub gains_db: Vec<f64>,
+    /// Whether each response is turned over.
+    pub inverted: Vec<bool>,
+    /// Materials, in the order of the scene.
+    pub materials: Vec<TrueMaterial>,
+    /// Sources.
+    pub sources: Vec<TrueSource>,
+    /// The hidden effects, in the order in which they were asked for.
+    pub effects: Vec<Hidden>,
+}
+
+/// A surface as it really is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrueMaterial {
+    /// Name in the mesh.
+    pub name: String,
+    /// Absorption of each octave.
+    pub absorption: Vec<f64>,
+    /// Scattering of each octave.
+    pub scattering: Vec<f64>,
+}
+
+/// A source as it really is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrueSource {
+    /// Position in metres.
+    pub position_m: [f64; 3],
+    /// Unit vector along the axis.
+    pub axis: [f64; 3],
+    /// Omnidirectional share of each octave.
+    pub omni_share: Vec<f64>,
+}
+
+impl TrueSource {
+    /// Gain of the pressure in a band, by the cosine of the angle to the axis; its mean square over the sphere is 1.
+    pub(crate) fn gain(&self, band: usize, cosine: f64) -> f64 {
+        let q = self.omni_share[band];
+        (q + (1.0 - q) * cosine) / (q * q + (1.0 - q).powi(2) / 3.0).sqrt()
+    }
+}
+
+impl Truth {
+    /// Reads what [`Laboratory::write`](crate::Laboratory::write) wrote.
+    ///
+    /// # Errors
+    /// [`Error::Io`] and [`Error::Toml`].
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
+        let path = path.as_ref();
+        let text =
+            std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
+        toml::from_str(&text)
+            .map_err(|source| Error::Toml { path: path.to_owned(), source: Box::new(source) })
+    }
+
+    pub(crate) fn write(&self, path: &Path) -> Result<(), Error> {
+        let text = toml::to_string(self).map_err(|error| Error::implementation("the truth's file", error))?;
+        write_atomically(path, |file| file.write_all(text.as_bytes()))
+    }
+
+    /// The bands.
+    ///
+    /// # Errors
+    /// As [`OctaveBands::from_centres_hz`].
+    pub fn bands(&self) -> Result<OctaveBands, Error> {
+        OctaveBands::from_centres_hz(&self.bands_hz)
+    }
+
+    /// The air.
+    ///
+    /// # Errors
+    /// As [`Air::new`].
+    pub fn air(&self) -> Result<Air, Error> {
+        Air::new(self.temperature_c, self.relative_humidity_percent, self.pressure_kpa)
+    }
+
+    /// Number of responses.
+    pub fn responses(&self) -> usize {
+        self.sources.len() * self.receivers_m.len()
+    }
+
+    /// Volume in cubic metres.
+    pub fn volume_m3(&self) -> f64 {
+        self.size_m.iter().product()
+    }
+
+    pub(crate) fn medium(&self) -> Result<Medium, Error> {
+        let (bands, air) = (self.bands()?, self.air()?);
+        let exponents_per_m =
+            (0..bands.len()).map(|b| energy_exponent_per_m(&air, bands.exact_hz(b))).collect();
+        Ok(Medium { speed_m_s: speed_of_sound_m_s(&air), exponents_per_m })
+    }
+
+    /// Logarithm of the energy that each face reflects like a mirror, `[band][face]`.
+    pub(crate) fn log_mirrored(&self) -> Vec<[f64; 6]> {
+        let face = |band: usize, face: usize| {
+            let material = &self.materials[self.faces[face]];
+            (1.0 - material.absorption[band]).ln() + (1.0 - material.scattering[band]).max(1e-12).ln()
+        };
+        (0..self.bands_hz.len()).map(|b| std::array::from_fn(|f| face(b, f))).collect()
+    }
+
+    /// Refuses an effect that does not fit the room.
+    pub(crate) fn check(&self, effect: &Hidden) -> Result<(), Error> {
+        let bands = self.bands_hz.len();
+        let per_band = |values: &[f64]| {
+            let (expected, found) = (bands, values.len());
+            if expected == found { Ok(()) } else { Err(Error::BandCount { expected, found }) }
+        };
+        let each = |field, values: &[f64], low, high, range| {
+            per_band(values)?;
+            values.iter().try_for_each(|&v| check_range(field, v, low, high, range))
+        };
+        let exists = |what, index: usize, count: usize| {
+            if index < count { Ok(()) } else { Err(Error::Index { what, index, count }) }
+        };
+        let responses = self.responses();
+        match effect {
+            Hidden::TransducerResponse { gains_db } => {
+                each("gain (dB)", gains_db, -40.0, 40.0, "between -40 and 40 dB")
+            }
+            Hidden::AirAbsorption { relative_humidity_percent } => check_range(
+                "relative humidity (%)",
+                *relative_humidity_percent,
+                0.0,
+                100.0,
+                "between 0 and 100 %",
+            ),
+            Hidden::SourceDirectivity { omni_share, axis } => {
+                each("omnidirectional share", omni_share, 0.0, 1.0, "between 0 and 1")?;
+                let square = axis.map_or(1.0, |a| a.iter().map(|c| c * c).sum());
+                check_range("squared length of the axis", square, 0.999_999, 1.000_001, "1")
+            }
+            Hidden::Scattering { scattering } => each("scattering", scattering, 0.0, 1.0, "between 0 and 1"),
+            Hidden::SurfaceAbsorption { material, absorption } => {
+                exists("material", *material, self.materials.len())?;
+                each("absorption", absorption, 0.0, 0.99, "between 0 and 0.99")
+            }
+            Hidden::BackgroundNoise { levels_db } => {
+                each("noise level (dB)", levels_db, -300.0, 0.0, "between -300 and 0 dB")
+            }
+            Hidden::CoupledVolume { level_db, decay_s, critical_distance_m, rise_s, aperture_m } => {
+                check_range(
+                    "level of the coupled volume (dB)",
+                    *level_db,
+                    -300.0,
+                    0.0,
+                    "between -300 and 0 dB",
+                )?;
+                each("decay time of the coupled volume (s)", decay_s, 0.05, 10.0, "between 0.05 and 10 s")?;
+                check_range(
+                    "critical distance (m)",
+                    *critical_distance_m,
+                    0.0,
+                    100.0,
+                    "between 0 and 100 m",
+                )?;
+                check_range("build-up (s)", *rise_s, 1e-4, 1.0, "between 0.0001 and 1 s")?;
+                aperture_m.iter().try_for_each(|&c| {
+                    check_range("position of the aperture (m)", c, -1.0, 100.0, "near the room")
+                })
+            }
+            Hidden::Truncation { end_s, fade_s } => {
+                check_range("end (s)", *end_s, 0.0, 100.0, "between 0 and 100 s")?;
+                check_range("fade (s)", *fade_s, 0.0, *end_s, "between 0 and the end")
+            }
+            // The air says for itself what temperatures it takes.
+            Hidden::SoundSpeed { temperature_offset_k } => Air::new(
+                self.temperature_c + temperature_offset_k,
+                self.relative_humidity_percent,
+                self.pressure_kpa,
+            )
+            .map(|_| ()),
+            Hidden::SamplingClock { ppm } => {
+                check_range("clock error (ppm)", *ppm, -2e4, 2e4, "between -20000 and 20000 ppm")
+            }
+            Hidden::RoomDimensions { scale } => scale
+                .iter()
+                .try_for_each(|&s| check_range("scale of the room", s, 0.8, 1.25, "between 0.8 and 1.25")),
+            Hidden::PositionError { end, index, offset_m } => {
+                match end {
+                    End::Source => exists("source", *index, self.sources.len()),
+                    End::Receiver => exists("receiver", *index, self.receivers_m.len()),
+                }?;
+                offset_m.iter().try_for_each(|&o| check_range("offset (m)", o, -10.0, 10.0, "within 10 m"))
+            }
+            Hidden::TimeZero { latency_s } => {
+                check_range("latency (s)", *latency_s, -0.1, 1.0, "between -0.1 and 1 s")
+            }
+            Hidden::ChannelFault { fault } => match *fault {
+                Fault::Polarity { response } => exists("response", response, responses),
+                Fault::Gain { response, gain_db } => {
+                    exists("response", response, responses)?;
+                    check_range("gain (dB)", gain_db, -60.0, 60.0, "between -60 and 60 dB")
+                }
+                Fault::Swap { a, b } => {
+                    exists("response", a, responses).and_then(|()| exists("response", b, responses))
+                }
+            },
+            Hidden::GainDrift { depth_db, period_s, phase_rad } => {
+                check_range("depth (dB)", *depth_db, -40.0, 40.0, "between -40 and 40 dB")?;
+                check_range("period (s)", *period_s, 1e-3, 100.0, "between 0.001 and 100 s")?;
+                check_range("phase (rad)", *phase_rad, -100.0, 100.0, "between -100 and 100")
+            }
+            Hidden::Dropouts { gaps } => gaps.iter().try_for_each(|gap| {
+                exists("response", gap.response, responses)?;
+                check_range("beginning of a gap (s)", gap.start_s, 0.0, 100.0, "between 0 and 100 s")?;
+                check_range("length of a gap (s)", gap.length_s, 0.0, 10.0, "between 0 and 10 s")
+            }),
+            Hidden::ForeignChirp { start_s, length_s, from_hz, to_hz, level_db } => {
+                check_range("beginning (s)", *start_s, 0.0, 100.0, "between 0 and 100 s")?;
+                check_range("length (s)", *length_s, 1e-3, 10.0, "between 0.001 and 10 s")?;
+                for frequency_hz in [from_hz, to_hz] {
+                    check_range("frequency (Hz)", *frequency_hz, 10.0, 96e3, "between 10 Hz and 96 kHz")?;
+                }
+                check_range("level (dB)", *level_db, -300.0, 60.0, "between -300 and 60 dB")
+            }
+        }
+    }
+
+    /// Whatever effects moved, places stay within the room: a position is worth little inside a wall.
+    pub(crate) fn keep_inside(&mut self) {
+        const MARGIN_M: f64 = 0.05;
+        let places = self.sources.iter_mut().map(|s| &mut s.position_m).chain(&mut self.receivers_m);
+        for place in places {
+            for (c, side) in place.iter_mut().zip(self.size_m) {
+                *c = c.clamp(MARGIN_M, side - MARGIN_M);
+            }
+        }
+    }
+}
+
+/// What the air does.
+pub(crate) struct Medium {
+    pub speed_m_s: f64,
+    /// Energy attenuation of each octave in 1/m.
+    pub exponents_per_m: Vec<f64>,
+}
