@@ -7,6 +7,10 @@ use std::f64::consts::TAU;
 const STEP_S: f64 = 1e-3;
 /// Directions in an octant.
 const DIRECTIONS: usize = 512;
+/// Bands at most, so that they fit an array.
+pub(crate) const LANES: usize = 10;
+/// A band that has fallen by this much has no say, in dB.
+const SILENT_DB: f64 = 85.0;
 
 /// Mean share of energy that the walls have left to images of an age, by band.
 ///
@@ -45,11 +49,19 @@ impl BoxDecay {
         Self { bands, left }
     }
 
-    /// What the walls have left in each band after a time.
-    pub(crate) fn at(&self, time_s: f64) -> &[f64] {
-        let last = self.left.len() / self.bands - 1;
-        let step = ((time_s / STEP_S) as usize).min(last);
-        &self.left[step * self.bands..(step + 1) * self.bands]
+    /// One over what the walls have left in each band, step by step; 0 where nothing is heard any more.
+    pub(crate) fn weights(&self, medium: &Medium) -> Weights {
+        let silent = 10f64.powf(-0.1 * SILENT_DB);
+        let step = |(step, left): (usize, &[f64])| {
+            let mut weights = [0.0; LANES];
+            let length_m = step as f64 * STEP_S * medium.speed_m_s;
+            for (band, weight) in weights.iter_mut().enumerate().take(self.bands) {
+                let heard = left[band] * (-medium.exponents_per_m[band] * length_m).exp() > silent;
+                *weight = if heard { 1.0 / left[band] } else { 0.0 };
+            }
+            weights
+        };
+        Weights { steps: self.left.chunks(self.bands).enumerate().map(step).collect() }
     }
 
     /// When what is still to come has fallen by a level in every band, the air included; at most the duration covered.
@@ -74,5 +86,16 @@ impl BoxDecay {
             }
         }
         latest as f64 * STEP_S
+    }
+}
+
+/// What a share of energy is worth, against the mean of its age.
+pub(crate) struct Weights {
+    steps: Vec<[f64; LANES]>,
+}
+
+impl Weights {
+    pub(crate) fn at(&self, time_s: f64) -> &[f64; LANES] {
+        &self.steps[((time_s / STEP_S) as usize).min(self.steps.len() - 1)]
     }
 }
