@@ -74,7 +74,7 @@ pub(crate) fn pulse(at: f64) -> (i64, [f64; 2 * HALF]) {
     let mut sine = (PI * start).sin() / PI;
     let (mut im, mut re) = (PI * start / HALF as f64).sin_cos();
     let (step_im, step_re) = (PI / HALF as f64).sin_cos();
-    let mut value = |i: usize| {
+    let value = |i: usize| {
         let x = start + i as f64;
         let sinc = if x.abs() < 1e-9 { 1.0 } else { sine / x };
         let window = 0.5 + 0.5 * re;
@@ -82,7 +82,7 @@ pub(crate) fn pulse(at: f64) -> (i64, [f64; 2 * HALF]) {
         (re, im) = (re * step_re - im * step_im, re * step_im + im * step_re);
         sinc * window
     };
-    (first, std::array::from_fn(|i| value(i)))
+    (first, std::array::from_fn(value))
 }
 
 /// Adds a pulse of an amplitude at any instant, by a windowed sinc 64 samples long. What falls outside is left out.
