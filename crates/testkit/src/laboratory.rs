@@ -246,7 +246,9 @@ impl Laboratory {
         truth_file: Option<&Path>,
     ) -> Result<MeasuredRoom, Error> {
         let truth = self.truth(effects)?;
-        if let Some(path) = truth_file.filter(|path| path.starts_with(folder)) {
+        // Two ways to say where something is must not hide that it is the same place.
+        let full = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        if let Some(path) = truth_file.filter(|path| full(path).starts_with(full(folder))) {
             let source =
                 io::Error::new(io::ErrorKind::InvalidInput, "the truth must not lie within the room");
             return Err(Error::Io { path: path.to_owned(), source });
@@ -290,11 +292,6 @@ impl Laboratory {
 
     pub(crate) fn null(&self) -> &Truth {
         &self.truth
-    }
-
-    /// About the decay time of the slowest octave: the time in which the box falls by 60 dB.
-    pub(crate) fn decay_s(&self) -> f64 {
-        (self.truth.duration_s - random_room::MARGIN_S) * 60.0 / random_room::FALL_DB
     }
 }
 

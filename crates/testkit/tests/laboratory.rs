@@ -170,6 +170,31 @@ fn arrivals_are_those_of_the_true_room() {
 }
 
 #[test]
+fn levels_and_time_zero_are_as_unknown_as_declared() {
+    let spread = |values: &[f64]| {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
+    };
+    let truth = |time_zero, levels| {
+        let config = LabConfig { seed: 22, time_zero, levels, ..LabConfig::default() };
+        Laboratory::new(config).unwrap().truth(&[]).unwrap()
+    };
+    let absolute = truth(TimeZero::Emission, Levels::Absolute);
+    assert!(absolute.latencies_s.iter().all(|&l| l == 0.0));
+    assert!(absolute.gains_db.iter().all(|g| g.abs() < 1.5) && spread(&absolute.gains_db) > 0.1);
+    let common = truth(TimeZero::Common, Levels::Common);
+    assert!(spread(&common.latencies_s) == 0.0 && common.latencies_s[0] >= 1e-3);
+    let shift_db = common.gains_db[0] - absolute.gains_db[0];
+    assert!((0.01..=10.0).contains(&shift_db.abs()));
+    for (a, b) in common.gains_db.iter().zip(&absolute.gains_db) {
+        assert_close("gain (dB)", a - b, shift_db, 1e-12, 0.0);
+    }
+    let own = truth(TimeZero::PerResponse, Levels::PerResponse);
+    assert!(spread(&own.latencies_s) > 2e-3 && own.latencies_s.iter().all(|l| (1e-3..=0.02).contains(l)));
+    assert!(spread(&own.gains_db) > 3.0 && own.gains_db.iter().all(|g| g.abs() < 11.5));
+}
+
+#[test]
 fn jitter_of_places_is_a_few_millimetres() {
     let lab = one_octave(6, 12, 24_000);
     let truth = lab.truth(&[]).unwrap();

@@ -64,28 +64,28 @@ impl BoxDecay {
         Weights { steps: self.left.chunks(self.bands).enumerate().map(step).collect() }
     }
 
-    /// When what is still to come has fallen by a level in every band, the air included; at most the duration covered.
-    pub(crate) fn fallen_s(&self, medium: &Medium, by_db: f64) -> f64 {
+    /// When what is still to come has fallen by a level, in each band, the air included; at most the duration covered.
+    pub(crate) fn fallen_s(&self, medium: &Medium, by_db: f64) -> Vec<f64> {
         let steps = self.left.len() / self.bands;
-        let mut latest = 0;
-        for band in 0..self.bands {
-            let energy: Vec<f64> = (0..steps)
-                .map(|s| {
-                    let length_m = s as f64 * STEP_S * medium.speed_m_s;
-                    self.left[s * self.bands + band] * (-medium.exponents_per_m[band] * length_m).exp()
-                })
-                .collect();
-            let limit = energy.iter().sum::<f64>() * 10f64.powf(-0.1 * by_db);
+        let fallen = |band: usize| {
+            let energy = |step: usize| {
+                let length_m = step as f64 * STEP_S * medium.speed_m_s;
+                self.left[step * self.bands + band] * (-medium.exponents_per_m[band] * length_m).exp()
+            };
+            let limit = (0..steps).map(energy).sum::<f64>() * 10f64.powf(-0.1 * by_db);
             let mut rest = 0.0;
-            for (step, e) in energy.iter().enumerate().rev() {
-                rest += e;
-                if rest > limit {
-                    latest = latest.max(step);
-                    break;
-                }
-            }
-        }
-        latest as f64 * STEP_S
+            let latest = (0..steps).rev().find(|&step| {
+                rest += energy(step);
+                rest > limit
+            });
+            latest.unwrap_or(0) as f64 * STEP_S
+        };
+        (0..self.bands).map(fallen).collect()
+    }
+
+    /// When all bands have.
+    pub(crate) fn all_fallen_s(&self, medium: &Medium, by_db: f64) -> f64 {
+        self.fallen_s(medium, by_db).into_iter().fold(0.0, f64::max)
     }
 }
 

@@ -64,7 +64,7 @@ pub(crate) fn add_images(
     let bands = truth.bands_hz.len();
     let seed = key(truth.seed, Purpose::Signs, pair.0 * truth.receivers_m.len() + pair.1);
     let end_s = columns.start_s + columns.samples[0].len() as f64 / columns.rate_hz;
-    let longest_m = end_s.min(decay.fallen_s(medium, LEAST_DB)) * medium.speed_m_s;
+    let longest_m = end_s.min(decay.all_fallen_s(medium, LEAST_DB)) * medium.speed_m_s;
     let axes = [0, 1, 2].map(|a| Axis::new(truth, a, source.position_m[a], receiver[a], longest_m));
     let gains: Vec<f64> = truth.source_gains_db.iter().map(|db| 10f64.powf(db / 20.0)).collect();
     let volume_m3 = truth.volume_m3();

@@ -25,7 +25,7 @@ const LONGEST_S: f64 = 1.35;
 /// Longest response to a box alone, in seconds.
 const AT_MOST_S: f64 = 2.0;
 /// How far responses fall before they end, in dB.
-pub(crate) const FALL_DB: f64 = 65.0;
+const FALL_DB: f64 = 65.0;
 /// Margin after that, in seconds.
 pub(crate) const MARGIN_S: f64 = 0.06;
 /// Standard deviation of a microphone's gain in dB, and of a receiver's place along each axis in metres.
@@ -126,7 +126,7 @@ pub(crate) fn fallen_s(truth: &Truth) -> Result<f64, Error> {
     let mut mirrors = truth.clone();
     mirrors.materials.iter_mut().flat_map(|m| &mut m.scattering).for_each(|s| *s = 0.0);
     let medium = truth.medium()?;
-    Ok(BoxDecay::new(&mirrors, &medium, AT_MOST_S).fallen_s(&medium, FALL_DB))
+    Ok(BoxDecay::new(&mirrors, &medium, AT_MOST_S).all_fallen_s(&medium, FALL_DB))
 }
 
 /// Places as they are, channels and time zero.
