@@ -31,6 +31,7 @@ pub fn middle_of_octave(samples: &[f64], sample_rate_hz: u32, bands: OctaveBands
     output
 }
 
+#[allow(dead_code)] // not every test that filters asks how widely
 /// Integrals of the gain's second and fourth power over frequency, in Hz.
 pub fn widths_hz(bands: OctaveBands, band: usize) -> (f64, f64) {
     let (low, high) = bands.edges_hz(band);
