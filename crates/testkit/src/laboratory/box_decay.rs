@@ -99,3 +99,40 @@ impl Weights {
         &self.steps[((time_s / STEP_S) as usize).min(self.steps.len() - 1)]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::{LabConfig, Laboratory, ShoeboxImages};
+    use sabine_acoustics::{OctaveBands, Receiver, Source};
+
+    /// Images between two ages, counted one by one.
+    #[test]
+    fn walls_leave_to_images_what_the_mean_over_directions_says() {
+        let bands = OctaveBands::new(1000.0, 1000.0).unwrap();
+        let config = LabConfig { seed: 3, receivers: 1, sample_rate_hz: 8000, bands, ..LabConfig::default() };
+        let lab = Laboratory::new(config).unwrap();
+        let (truth, scene) = (lab.truth(&[]).unwrap(), lab.true_scene(&[]).unwrap());
+        let medium = truth.medium().unwrap();
+        let decay = super::BoxDecay::new(&truth, &medium, 0.5);
+        let source = Source::omni("s", truth.sources[0].position_m).unwrap();
+        let receiver = Receiver::omni("r", truth.receivers_m[0]).unwrap();
+        let air = truth.air().unwrap();
+        let images = ShoeboxImages::new(0.31).unwrap().images(&scene, &source, &receiver, &air).unwrap();
+        for from_s in [0.1, 0.2, 0.3] {
+            let to_s = from_s + 0.01;
+            let shell: Vec<f64> = images
+                .iter()
+                .filter(|i| (from_s..to_s).contains(&(i.length_m / medium.speed_m_s)))
+                .map(|i| {
+                    let left =
+                        |(&n, m): (&u32, usize)| (1.0 - truth.materials[m].absorption[0]).powi(n as i32);
+                    i.hits.iter().zip(truth.faces).map(left).product()
+                })
+                .collect();
+            let mean = shell.iter().sum::<f64>() / shell.len() as f64;
+            let expected = decay.left[((from_s + 0.005) / super::STEP_S) as usize];
+            assert!(shell.len() > 1000, "{} images", shell.len());
+            assert!((mean / expected - 1.0).abs() < 0.08, "{from_s} s: {mean} for {expected}");
+        }
+    }
+}
