@@ -26,6 +26,11 @@ fn main() {
             println!("  top {:?}", d.candidates.iter().take(5).map(|c| format!("{} {:.1}/{:.1?}", c.effect, c.nats, c.nats_beside_causes)).collect::<Vec<_>>());
             println!("  disp {:.2?} held {:?}", d.lack_of_fit.dispersion, d.held_out.as_ref().map(|h| (h.db_rmse, h.t20_jnd, h.c50_jnd, h.nats_per_bin)));
             println!("  iso {:?}", d.isolability.iter().take(3).map(|i| format!("{:?} {:.2}", i.effects, i.cosine)).collect::<Vec<_>>());
+            if std::env::var("ODD").is_ok() {
+                let mut r: Vec<_> = d.residuals.iter().filter(|r| r.response.is_some()).collect();
+                r.sort_by(|a, b| (b.after_db / b.expected_sd_db).abs().total_cmp(&(a.after_db / a.expected_sd_db).abs()));
+                for r in r.iter().take(25) { println!("   {:?} {} {:.3}s {:+.2} dB sd {:.2}", r.response, r.band_hz, r.time_s, r.after_db, r.expected_sd_db); }
+            }
             println!("  {:?}", d.seconds);
         }
         Err(e) => println!("{e}"),

@@ -36,7 +36,7 @@ pub struct DiagnoseConfig {
 impl Default for DiagnoseConfig {
     fn default() -> Self {
         Self {
-            rays: 4000,
+            rays: 3000,
             seed: 0,
             image_order: 3,
             range_db: 40.0,
@@ -45,7 +45,7 @@ impl Default for DiagnoseConfig {
             naming_nats: 3.0,
             significance: 0.01,
             most_causes: 3,
-            simulations: 24,
+            simulations: 16,
             allow_leaks: false,
         }
     }

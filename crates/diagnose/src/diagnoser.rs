@@ -20,7 +20,7 @@ use std::time::Instant;
 /// Half the width of a 90 % interval in standard deviations.
 const HALF_90: f64 = 1.645;
 /// Groups of receivers that are left out in turn, at most.
-const FOLDS: usize = 6;
+const FOLDS: usize = 4;
 /// Draws of the bootstrap over positions.
 const BOOTSTRAP: usize = 2000;
 /// Evidence by which the unnamed discrepancy must beat all named causes to unseat them, in nats.

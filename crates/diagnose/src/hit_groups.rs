@@ -2,7 +2,7 @@
 //! any absorption is a sum over a few groups.
 
 /// Groups in a slice of time, at most.
-pub(crate) const MOST: usize = 20;
+pub(crate) const MOST: usize = 12;
 /// Length of a slice, in seconds.
 const SLICE_S: f32 = 0.01;
 /// A group whose hits scatter by less than this has no need to be split: a change of ln(1 - absorption) by 0.2 changes its

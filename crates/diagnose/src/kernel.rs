@@ -19,6 +19,8 @@ pub(crate) struct BandKernel {
     /// Share of the energy of a flat spectrum that the filter takes from each octave, its own and its neighbours'; what lies beyond
     /// the outer octaves counts as theirs.
     pub shares: Vec<f64>,
+    /// Squared correlation of two pulses so many samples apart.
+    squared: Vec<f64>,
     /// Mean squared correlation of two pulses that lie in cells so far apart.
     pub likeness: Vec<f64>,
 }
@@ -77,7 +79,7 @@ impl BandKernel {
             })
             .collect();
         let shares = octave_shares(h, rate_hz, edges_hz);
-        Self { cumulative, half: reach, rate_hz, bandwidth_hz, energy, shares, likeness }
+        Self { cumulative, half: reach, rate_hz, bandwidth_hz, energy, shares, squared, likeness }
     }
 
     /// Share of the energy of a pulse at time zero that comes before `time_s`.
@@ -93,6 +95,16 @@ impl BandKernel {
                 low + (next - low) * (at - index as f64)
             }
             None => 1.0,
+        }
+    }
+
+    /// Squared correlation of two pulses so far apart in time.
+    pub fn alike(&self, apart_s: f64) -> f64 {
+        let at = apart_s.abs() * self.rate_hz;
+        let index = at as usize;
+        match (self.squared.get(index), self.squared.get(index + 1)) {
+            (Some(low), Some(high)) => low + (high - low) * (at - index as f64),
+            _ => 0.0,
         }
     }
 

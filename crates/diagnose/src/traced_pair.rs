@@ -19,6 +19,9 @@ const MODEL_SD: f64 = 0.07;
 const COHERENT_BANDWIDTH_TIMES: f64 = 2.5;
 /// ... with a sign that does not change from place to place as that of later ones does: more than chance, as a share of the energy.
 const COHERENT_SD: f64 = 0.35;
+/// A single reflection comes so much earlier or later than predicted (a centimetre of way): near the end of a bin, part of its
+/// energy falls into the next.
+const TIME_SD_S: f64 = 4e-5;
 /// Exact paths keep their very time for so long after the direct sound, in seconds; later ones are gathered in cells.
 const ALONE_S: f64 = 0.04;
 /// A neighbour from which a filter takes less than this share is left out.
@@ -257,6 +260,9 @@ impl TracedPair {
         let mut all_cells = vec![0.0f64; cells];
         let mut squares = vec![0.0f64; count];
         let mut exact_cells = vec![0.0f64; cells];
+        let mut strayed = vec![0.0f64; count];
+        // Early exact paths by their very times: two that come together add or cancel as a whole.
+        let mut singles: Vec<Vec<(f64, f64)>> = vec![Vec::new(); count];
         let mut alone_row = vec![0.0f64; width];
         for (i, &e) in energies.iter().enumerate() {
             let time_s = f64::from(self.times_s[i]);
@@ -270,19 +276,26 @@ impl TracedPair {
             let row = [1.0, time_s, x, y, z, x * x, y * y, z * z, x * y, x * z, y * z].map(|v| v * e);
             let hits = &self.hits[i * m..(i + 1) * m];
             let group = self.groups[i];
-            all_cells[cell] += e;
             if exact && time_s < ALONE_S {
                 alone_row[0] = e;
                 alone_row[1..].iter_mut().zip(hits).for_each(|(a, n)| *a = e * f64::from(*n));
                 let slice = hit_groups::slice(self.times_s[i]);
+                let mut moved: BTreeMap<usize, f64> = BTreeMap::new();
+                for (shift_s, sign) in [(TIME_SD_S, 0.5), (-TIME_SD_S, -0.5)] {
+                    Self::shares(time_s + shift_s, bins, kernel, count, |bin, share| {
+                        *moved.entry(bin).or_default() += sign * share;
+                    });
+                }
+                moved.into_iter().for_each(|(bin, change)| strayed[bin] += (change * e).powi(2));
                 Self::shares(time_s, bins, kernel, count, |bin, share| {
-                    squares[bin] += (share * e).powi(2);
+                    singles[bin].push((time_s, share * e));
                     add(&mut sums[bin * COLUMNS..(bin + 1) * COLUMNS], &row, share);
                     let own = rows[bin].entry((slice, group)).or_insert_with(|| vec![0.0; width]);
                     add(own, &alone_row, share);
                 });
                 continue;
             }
+            all_cells[cell] += e;
             if exact {
                 exact_cells[cell] += e * e;
             } else if let Some(batch) = self.paths.batch(i) {
@@ -353,7 +366,9 @@ impl TracedPair {
                 state.group_hits.extend(std::iter::repeat_n(0.0, m));
             }
             state.groups.push(state.group_energy.len());
-            let interference = interference(&weighted[bin], kernel) - 2.0 * squares[bin];
+            let interference = interference(&weighted[bin], kernel) - 2.0 * kernel.likeness[0] * squares[bin]
+                + among_singles(&singles[bin], kernel)
+                + strayed[bin];
             let parts = &batch_sums[bin * batches..(bin + 1) * batches];
             let mean = parts.iter().sum::<f64>() / batches as f64;
             let scatter: f64 = parts.iter().map(|p| (p - mean).powi(2)).sum();
@@ -368,12 +383,23 @@ impl TracedPair {
     }
 }
 
+/// Variance of the energy of single pulses of random sign: four times the sum over pairs of w_i w_j r_ij^2.
+fn among_singles(singles: &[(f64, f64)], kernel: &BandKernel) -> f64 {
+    let mut sum = 0.0;
+    for (i, &(time_s, energy)) in singles.iter().enumerate() {
+        for &(other_s, more) in &singles[i + 1..] {
+            sum += energy * more * kernel.alike(other_s - time_s);
+        }
+    }
+    4.0 * sum
+}
+
 fn add(target: &mut [f64], more: &[f64], share: f64) {
     target.iter_mut().zip(more).for_each(|(t, x)| *t += share * x);
 }
 
-/// Variance of the energy in a bin if all pulses had random signs, twice the sum of w_i w_j r_ij^2, those of single paths
-/// with themselves included.
+/// Variance of the energy in a bin if all pulses had random signs: twice the sum of w_i w_j r_ij^2 over all i and j, two paths of
+/// one cell being as alike as two times in it are on the average, a path and itself no more.
 fn interference(cells: &[(usize, f64)], kernel: &BandKernel) -> f64 {
     let mut sum = 0.0;
     for (i, &(cell, energy)) in cells.iter().enumerate() {
