@@ -102,7 +102,7 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
         matcher.start_s(),
         arguments.block_ms
     );
-    println!("{:>7}  {:50}{}", "", "T60 in s at", "EQ in dB at");
+    println!("{:>7}  {:50}EQ in dB at", "", "T60 in s at");
     println!("{:>7}  {}{}", "", row(OctaveBands::T60.iter_hz(), 0), row(OctaveBands::EQ.iter_hz(), 0));
     let pace = if arguments.fast { Pace::Fast } else { Pace::RealTime };
     let mut session = Session::new(live, matcher, arguments.block_ms, pace)?;

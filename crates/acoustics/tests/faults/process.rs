@@ -43,11 +43,18 @@ fn check(output: &Output) {
 }
 
 /// Runs the test of this name in a folder in which nothing can be made or changed.
+#[allow(dead_code)] // each test file uses its part of this one
 pub fn in_read_only_folder(test: &str, folder: &Path) {
     // The superuser may write anywhere: the child is nobody.
     let nobody = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"];
     let wrapper: &[&str] = if is_root() { &nobody } else { &[] };
-    let set = |mode: u32| std::fs::set_permissions(folder, PermissionsExt::from_mode(mode)).unwrap();
+    let folders: Vec<PathBuf> =
+        snapshot(folder).into_keys().filter(|path| path.is_dir()).chain([folder.to_owned()]).collect();
+    let set = |mode: u32| {
+        for folder in &folders {
+            std::fs::set_permissions(folder, PermissionsExt::from_mode(mode)).unwrap();
+        }
+    };
     set(0o555);
     let output = command(wrapper, test, folder).output();
     set(0o755);
@@ -59,6 +66,7 @@ pub fn in_read_only_folder(test: &str, folder: &Path) {
 
 /// Runs the test of this name on a disk of 256 KiB mounted over the folder; where nothing can be mounted, under a limit on
 /// the size of files, which fails in the same place. What the child leaves on the disk only the child can see.
+#[allow(dead_code)] // each test file uses its part of this one
 pub fn on_full_disk(test: &str, folder: &Path) {
     let mount = format!(
         "mount -t tmpfs -o size={DISK_KIB}k none \"${FOLDER}\" && chmod 777 \"${FOLDER}\" && exec \"$@\""
@@ -75,7 +83,15 @@ pub fn on_full_disk(test: &str, folder: &Path) {
     check(&command(&["sh", "-c", &limit, "sh"], test, folder).output().unwrap());
 }
 
+/// Runs the test of this name with so much memory and no more, in KiB.
+#[allow(dead_code)] // each test file uses its part of this one
+pub fn with_memory(test: &str, folder: &Path, kib: usize) {
+    let limit = format!("ulimit -v {kib}; exec \"$@\"");
+    check(&command(&["sh", "-c", &limit, "sh"], test, folder).output().unwrap());
+}
+
 /// Starts the test of this name and kills it, some time after `ready` says that it has begun.
+#[allow(dead_code)] // each test file uses its part of this one
 pub fn killed(test: &str, folder: &Path, after: Duration, ready: impl Fn() -> bool) {
     struct Killed(Child);
     impl Drop for Killed {
@@ -96,6 +112,7 @@ pub fn killed(test: &str, folder: &Path, after: Duration, ready: impl Fn() -> bo
 }
 
 /// Every file below a folder, with its content.
+#[allow(dead_code)] // each test file uses its part of this one
 pub fn snapshot(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in std::fs::read_dir(folder).unwrap() {
