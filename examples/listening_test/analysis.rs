@@ -1,4 +1,4 @@
-//! From ratings to what can be said of the conditions (Tang et al. 2020, section 5.4).
+//! From ratings to what can be said of the conditions (Tang et al. 2020, section 5.5).
 
 use crate::ratings::{Ratings, Trial};
 use crate::screening::{Excluded, Roles, screen};

@@ -1,4 +1,4 @@
-//! What the assessors hear: Tang et al. 2020, section 5.3.
+//! What the assessors hear: Tang et al. 2020, section 5.4.
 
 use ebur128::{EbuR128, Mode};
 use rand::SeedableRng;
@@ -17,7 +17,7 @@ type AnyError = Box<dyn std::error::Error + Send + Sync>;
 /// The stimuli of each item, in the order of [`Item::stimuli`]; `reference` is the explicit one and the hidden one.
 pub const CONDITIONS: [&str; 5] = ["reference", "low_anchor", "mid_anchor", "t60", "t60_eq"];
 
-/// Reverberation time of the mid-range anchor in every octave, in seconds: a typical conference room (section 5.3).
+/// Reverberation time of the mid-range anchor in every octave, in seconds: a typical conference room (section 5.4).
 const MID_ANCHOR_T60_S: f64 = 0.5;
 /// Length of its response: 120 dB of decay.
 const MID_ANCHOR_S: f64 = 1.0;
