@@ -4,7 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 /// Files are written beside their final place under a temporary name; [`OutputFolder::finish`] renames them. Dropped before
-/// that, it leaves nothing behind.
+/// that, it leaves nothing behind. A process that is killed leaves its `.unfinished-...` folder, and only that.
 pub struct OutputFolder {
     folder: PathBuf,
     created: bool,
@@ -61,17 +61,47 @@ impl OutputFolder {
         Ok(())
     }
 
-    /// Moves all files to their names.
+    /// Moves all files to their names. If one cannot take its name, those before it give theirs back, and what was there before is
+    /// there again.
     ///
     /// # Errors
     /// [`OutputError`] for a name that cannot be taken, a folder of that name for example.
     pub fn finish(mut self) -> Result<(), OutputError> {
-        for name in &self.names {
-            let target = self.folder.join(name);
-            std::fs::rename(self.waiting.join(name), &target).map_err(at(&target))?;
+        let before = self.waiting.join("before");
+        std::fs::create_dir(&before).map_err(at(&before))?;
+        for (i, name) in self.names.iter().enumerate() {
+            if let Err(error) = self.place(name, &before) {
+                for name in &self.names[..i] {
+                    self.take_back(name, &before);
+                }
+                return Err(at(&self.folder.join(name))(error));
+            }
         }
         self.created = false;
         Ok(())
+    }
+
+    /// Gives a file its name; the one that had it is kept in `before`, too, and has it until the very moment.
+    fn place(&self, name: &str, before: &Path) -> io::Result<()> {
+        let target = self.folder.join(name);
+        if target.is_dir() {
+            return Err(io::ErrorKind::IsADirectory.into());
+        }
+        if target.exists() {
+            let kept = before.join(name);
+            // Not every file system has links.
+            std::fs::hard_link(&target, &kept).or_else(|_| std::fs::copy(&target, &kept).map(|_| ()))?;
+        }
+        std::fs::rename(self.waiting.join(name), &target)
+    }
+
+    /// Undoes [`OutputFolder::place`]; the error that counts is the one that led here.
+    fn take_back(&self, name: &str, before: &Path) {
+        let target = self.folder.join(name);
+        if std::fs::rename(before.join(name), &target).is_err() {
+            // There was none.
+            let _ = std::fs::remove_file(&target);
+        }
     }
 }
 
@@ -104,6 +134,31 @@ mod tests {
         out.finish().unwrap();
         assert_eq!(std::fs::read(folder.join("a.txt")).unwrap(), b"a");
         assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_name_that_is_taken_leaves_the_old_results() {
+        let parent = tempfile::tempdir().unwrap();
+        let write = |names: &[&str], text: &[u8]| {
+            let mut out = OutputFolder::create(parent.path())?;
+            for name in names {
+                out.write(name, text)?;
+            }
+            out.finish()
+        };
+        write(&["a.txt", "b.txt"], b"old").unwrap();
+        std::fs::create_dir(parent.path().join("taken.txt")).unwrap();
+        let error = write(&["a.txt", "new.txt", "taken.txt", "b.txt"], b"new").unwrap_err();
+        assert_eq!(error.path, parent.path().join("taken.txt"));
+        for name in ["a.txt", "b.txt"] {
+            assert_eq!(std::fs::read(parent.path().join(name)).unwrap(), b"old", "{name}");
+        }
+        let mut names: Vec<_> =
+            std::fs::read_dir(parent.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+        names.sort();
+        assert_eq!(names, ["a.txt", "b.txt", "taken.txt"]);
+        write(&["a.txt", "b.txt"], b"new").unwrap();
+        assert_eq!(std::fs::read(parent.path().join("b.txt")).unwrap(), b"new");
     }
 
     #[test]

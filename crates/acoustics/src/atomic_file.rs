@@ -43,6 +43,16 @@ fn fill(file: File, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) 
 }
 
 fn create_beside(path: &Path) -> io::Result<(PathBuf, File)> {
+    take_name_beside(path, |name| OpenOptions::new().write(true).create_new(true).open(name))
+}
+
+/// Makes a folder beside `path` that nothing else uses: hidden, so that nobody takes it for what it is to become.
+pub(crate) fn create_folder_beside(path: &Path) -> io::Result<PathBuf> {
+    Ok(take_name_beside(path, |name| std::fs::create_dir(name))?.0)
+}
+
+/// Tries temporary names beside `path` until `create` gets one that was free.
+fn take_name_beside<T>(path: &Path, create: impl Fn(&Path) -> io::Result<T>) -> io::Result<(PathBuf, T)> {
     static COUNTER: AtomicU64 = AtomicU64::new(0);
     let name = path.file_name().ok_or_else(|| io::Error::from(io::ErrorKind::InvalidInput))?;
     loop {
@@ -50,8 +60,8 @@ fn create_beside(path: &Path) -> io::Result<(PathBuf, File)> {
         temporary.push(name);
         temporary.push(format!(".{}-{}.tmp", std::process::id(), COUNTER.fetch_add(1, Ordering::Relaxed)));
         let temporary = path.with_file_name(temporary);
-        match OpenOptions::new().write(true).create_new(true).open(&temporary) {
-            Ok(file) => return Ok((temporary, file)),
+        match create(&temporary) {
+            Ok(made) => return Ok((temporary, made)),
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
             Err(error) => return Err(error),
         }

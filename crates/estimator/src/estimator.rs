@@ -115,7 +115,8 @@ impl Estimator {
     /// precision and by how clearly speech stands out in it.
     ///
     /// # Errors
-    /// [`Error::SampleRate`] below the network's rate, [`Error::TooShort`] below [`LEAST_DURATION_S`], or [`Error::Silent`].
+    /// [`Error::SampleRate`] below the network's rate, [`Error::TooShort`] below [`LEAST_DURATION_S`] or a frame of the features,
+    /// [`Error::Silent`], or [`Error::Weights`] where the network's output is not finite.
     pub fn estimate_detailed(&self, speech: &Signal) -> Result<DetailedEstimate, Error> {
         let prepared = self.prepare(speech)?;
         let heard = self.hear_all(&prepared.windows().collect::<Vec<_>>());
@@ -165,14 +166,21 @@ impl Estimator {
             &resampled
         };
         let spectrogram_db = self.extractor.extract(speech.samples());
+        if spectrogram_db.ncols() == 0 {
+            let needed_s = layout.n_fft as f64 / f64::from(needed_hz);
+            return Err(Error::TooShort { duration_s: speech.duration_s(), needed_s });
+        }
         let firsts = first_frames(spectrogram_db.ncols(), layout.frames);
         Ok(Prepared { spectrogram_db, firsts, warnings })
     }
 
     /// Whether there is anything to hear, and what may be wrong with it.
     pub(crate) fn hearable(&self, tops: &FlatTops, duration_s: f64) -> Result<Vec<Warning>, Error> {
-        if duration_s < LEAST_DURATION_S {
-            return Err(Error::TooShort { duration_s, needed_s: LEAST_DURATION_S });
+        // Weights of one's own may have frames longer than that.
+        let needed_s =
+            LEAST_DURATION_S.max(self.model.layout.n_fft as f64 / f64::from(self.sample_rate_hz()));
+        if duration_s < needed_s {
+            return Err(Error::TooShort { duration_s, needed_s });
         }
         if tops.peak() < SILENT_PEAK {
             return Err(Error::Silent { peak: tops.peak() });

@@ -1,10 +1,10 @@
 //! One answer from many windows.
 
-use crate::Error;
 use crate::estimator::{DetailedEstimate, Estimator, WindowEstimate};
 use crate::labels::{LABEL_COUNT, T60_COUNT, label_hz, per_band};
 use crate::warning::Warning;
 use crate::windows::Loudness;
+use crate::{Error, WeightsFault};
 use sabine_acoustics::RoomTargets;
 
 /// What one window says, on the scale of the network.
@@ -121,9 +121,15 @@ impl Estimator {
         let labels: Vec<_> = (0..LABEL_COUNT)
             .map(|k| {
                 let (mean, deviation) = label(k);
-                self.model.labels.decode(k, mean, deviation)
+                let estimate = self.model.labels.decode(k, mean, deviation);
+                // Finite weights can have products that are not: such a network has no answer.
+                if [mean, deviation, estimate.value, estimate.standard_error].iter().all(|v| v.is_finite()) {
+                    return Ok(estimate);
+                }
+                let fault = WeightsFault::NotFinite { tensor: "output".into(), index: k };
+                Err(Error::Weights { name: "estimate of this recording".into(), fault: Box::new(fault) })
             })
-            .collect();
+            .collect::<Result<_, Error>>()?;
         let (t60_s, eq_db) = per_band(&labels);
         Ok(RoomTargets::new(t60_s, eq_db)?)
     }

@@ -4,9 +4,11 @@ use super::file::{
     AirTable, BandsTable, MaterialTable, MeasurementTable, PlaceTable, ResponseTable, RoomFile, RoomTable,
 };
 use super::{MaterialPrior, MeasuredRoom, Measurement};
+use crate::atomic_file::{create_folder_beside, write_atomically};
 use crate::audio::{SampleFormat, write_wav};
 use crate::{Air, Error, ImpulseResponse, Receiver, Scene, Source};
-use std::fmt::Write;
+use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// A room to be written to disk.
@@ -58,9 +60,8 @@ impl NewRoom {
             let (expected, found) = (self.scene.materials().len(), self.priors.len());
             return Err(Error::MaterialCount { expected, found });
         }
-        let mut name = folder.file_name().unwrap_or_default().to_owned();
-        name.push(format!(".{}.tmp", std::process::id()));
-        let draft = folder.with_file_name(name);
+        let draft =
+            create_folder_beside(folder).map_err(|source| Error::Io { path: folder.to_owned(), source })?;
         let written = self.fill(&draft).and_then(|()| {
             std::fs::rename(&draft, folder).map_err(|source| Error::Io { path: folder.to_owned(), source })
         });
@@ -73,23 +74,19 @@ impl NewRoom {
     }
 
     fn fill(&self, draft: &Path) -> Result<(), Error> {
-        let io = |path: &Path| {
-            let path = path.to_owned();
-            move |source| Error::Io { path, source }
-        };
         let ir = draft.join("ir");
-        std::fs::create_dir_all(&ir).map_err(io(&ir))?;
+        std::fs::create_dir(&ir).map_err(|source| Error::Io { path: ir.clone(), source })?;
         for response in &self.responses {
             let path = ir.join(format!("{}.wav", response.name));
             let (samples, rate) = (response.samples.samples(), response.samples.sample_rate_hz());
             write_wav(&path, samples, rate, SampleFormat::Float32)?;
         }
-        let mesh = draft.join("room.obj");
-        std::fs::write(&mesh, self.obj()).map_err(io(&mesh))?;
+        // Atomic within the draft for the sake of the disk: it is told of each file before the folder gets its name.
+        write_atomically(&draft.join("room.obj"), |file| file.write_all(self.obj().as_bytes()))?;
         let path = draft.join("room.toml");
         let text =
             toml::to_string(&self.tables()).map_err(|error| Error::implementation("room.toml", error))?;
-        std::fs::write(&path, text).map_err(io(&path))?;
+        write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
         // What cannot be read back is refused before the folder gets its name.
         MeasuredRoom::read(draft).map(|_| ())
     }

@@ -13,6 +13,8 @@ use std::path::Path;
 
 /// Bytes of all buffers of a file: many may name the same large one.
 const MOST_BYTES: u64 = 4 << 30;
+/// Elements of an accessor that has only a sparse part: the others are zero and cost the file nothing.
+const MOST_ABSENT: u64 = 1_000_000;
 
 /// The buffers of a file, in memory, none shorter than it claims to be.
 pub(super) struct Buffers<'a>(Vec<Cow<'a, [u8]>>);
@@ -72,8 +74,10 @@ impl<'a> Buffers<'a> {
         let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
         let mut elements: Vec<T> = match accessor.buffer_view {
             Some(view) => self.slices(root, view.value(), offset, count, size)?.map(read).collect(),
-            // The caller has checked the count against its limit.
-            None if accessor.sparse.is_some() => vec![T::default(); count as usize],
+            None if accessor.sparse.is_some() => {
+                super::within("elements that are not in the file", 0, count, MOST_ABSENT)?;
+                vec![T::default(); count as usize]
+            }
             None => return Err(Error::Empty { what: "bufferView of the accessor" }),
         };
         if let Some(sparse) = &accessor.sparse {
