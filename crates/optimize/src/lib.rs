@@ -94,6 +94,7 @@
 //! - Zhu, Byrd, Lu, Nocedal, "Algorithm 778: L-BFGS-B", ACM TOMS 23(4), 1997.
 //! - ISO 3382-1:2009, ISO 3382-2:2008: decay curves and reverberation time.
 
+mod assembly;
 mod bounded;
 mod config;
 mod decay;
@@ -109,11 +110,15 @@ mod misfit;
 mod objective;
 mod prediction;
 mod response_band;
+mod response_expansion;
+mod response_solver;
+mod response_spread;
 mod responses;
 mod retrace;
 mod scale;
 mod single_paths;
 mod uncertainty;
+mod unknowns;
 mod variables;
 
 pub use bounded::{Minimum, minimise};
