@@ -55,7 +55,7 @@
 //! | [`Retrace`], [`RetraceConfig`], [`RetracedFit`] | the same, traced again until other rays confirm it |
 //! | [`MeasuredDecay`], [`MeasuredPair`], [`ResponseFit`] | the fit to measured responses ([`MaterialFitter::fit_responses`]) |
 //! | [`DecayMisfit`] | a simulation against a response, for places that were held out |
-//! | [`PredictedChange`], [`RoomPrediction`] | what if: T60, C50, D50 before and after a change of materials |
+//! | [`PredictedChange`], [`RoomPrediction`] | what if: T60, C50, D50 before and after a change of materials, and how sure their difference is |
 //! | [`AbsorptionPrior`] | what is known of a material beforehand; a standard deviation of zero holds it |
 //! | [`MaterialFit`] | the answer, with [`Unreachable`] targets, [`AtBound`], [`Undetermined`] and [`Warning`] beside it |
 //! | [`SlopeEvaluation`], [`SlopeObjective`] | the cost (m - m')2 of one band with its exact gradient: decay curve, the paper's, Li's |
@@ -109,6 +109,7 @@ mod measured_decay;
 mod misfit;
 mod objective;
 mod prediction;
+mod pulse;
 mod response_band;
 mod response_expansion;
 mod response_solver;

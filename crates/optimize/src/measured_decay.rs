@@ -1,12 +1,13 @@
 //! How the energy of a measured response decays, in every band, as far as the noise lets one see.
 
 use crate::Error;
+use crate::pulse::Pulse;
 use sabine_acoustics::{
     DecayFit, FilterBank, ImpulseResponse, NoReading, OctaveBands, PerBand, Reading, RoomParameters,
 };
 
 /// What follows the onset by less than this is direct sound, which the source's directivity changes, not decay; in seconds.
-const DIRECT_S: f64 = 0.005;
+const DIRECT_S: f64 = 0.0025;
 /// The filter rings for about this long, in units of one over the bandwidth: the decay starts so much later, and no time
 /// bin is narrower.
 const RINGING: f64 = 1.5;
@@ -28,58 +29,6 @@ pub struct MeasuredDecay {
     decays: Vec<Result<BinnedDecay, NoReading>>,
 }
 
-/// Energy over time of what a filter without delay makes of a unit impulse.
-#[derive(Clone, Debug)]
-pub(crate) struct Pulse {
-    rate_hz: f64,
-    /// Samples on either side of the impulse.
-    half: usize,
-    /// Share of the energy before the start of each sample, 0 to 1.
-    cumulated: Vec<f64>,
-}
-
-/// What lies outside is this share of a pulse, on either side.
-const CUT_OFF: f64 = 1e-4;
-
-impl Pulse {
-    /// From the filtered impulse at the sample `middle`.
-    fn new(filtered: &[f32], middle: usize, rate_hz: f64) -> Self {
-        let energy = |x: &f32| f64::from(*x) * f64::from(*x);
-        let total: f64 = filtered.iter().map(energy).sum();
-        let mut outside = 0.0;
-        let silent = filtered.iter().take_while(|x| {
-            outside += energy(*x);
-            outside < CUT_OFF * total
-        });
-        let half = middle.saturating_sub(silent.count()).max(1);
-        let mut sum = 0.0;
-        let mut cumulated = vec![0.0];
-        // The instant of a sample is the middle of the interval it stands for.
-        for x in &filtered[middle - half..=middle + half] {
-            sum += energy(x);
-            cumulated.push(sum);
-        }
-        cumulated.iter_mut().for_each(|c| *c /= sum);
-        Self { rate_hz, half, cumulated }
-    }
-
-    /// Share of the energy earlier than a time after the impulse, in seconds.
-    pub fn before(&self, time_s: f64) -> f64 {
-        let place = time_s * self.rate_hz + self.half as f64 + 0.5;
-        if place <= 0.0 {
-            return 0.0;
-        }
-        let (i, part) = (place as usize, place.fract());
-        let at = |i: usize| self.cumulated.get(i).copied().unwrap_or(1.0);
-        at(i) + part * (at(i + 1) - at(i))
-    }
-
-    /// Time on either side within which all of it lies, in seconds.
-    pub fn half_s(&self) -> f64 {
-        (self.half as f64 + 0.5) / self.rate_hz
-    }
-}
-
 /// Energy of one band.
 #[derive(Clone, Debug)]
 pub(crate) struct BinnedDecay {
@@ -93,7 +42,6 @@ pub(crate) struct BinnedDecay {
     pub signal: Vec<f64>,
     /// How the filter spreads the energy of an instant.
     pub pulse: Pulse,
-    pub bandwidth_hz: f64,
     /// Energy after the last bin, by the decay fit.
     pub tail: f64,
 }
@@ -171,7 +119,6 @@ impl BinnedDecay {
             values: Vec::new(),
             signal: Vec::new(),
             pulse: Pulse::new(impulse, middle, rate_hz),
-            bandwidth_hz,
             tail: 0.0,
         };
         let mut end = (from_s * rate_hz).round() as usize;

@@ -3,7 +3,8 @@
 use crate::AbsorptionPrior;
 use crate::decay_slope::Traces;
 use crate::history::History;
-use crate::measured_decay::{BinnedDecay, Pulse};
+use crate::measured_decay::BinnedDecay;
+use crate::pulse::Pulse;
 use crate::unknowns::BandPrior;
 use sabine_acoustics::{Levels, PathSet};
 
@@ -11,6 +12,8 @@ use sabine_acoustics::{Levels, PathSet};
 const POINTS: usize = 8;
 /// A path counts in a measured bin if at least this share of its energy falls into it.
 const LEAST_SHARE: f64 = 1e-4;
+/// Pairs that interfere less are left out.
+const LEAST_OVERLAP: f64 = 1e-7;
 
 /// One band: its priors and the responses that can be read in it.
 pub(crate) struct ResponseBand<'a> {
@@ -27,7 +30,6 @@ pub(crate) struct BandResponse<'a> {
     /// The exact ones: where they stand in the history, and their energy if nothing absorbed.
     pub exact: Vec<(usize, f64)>,
     pub windows: Vec<Window>,
-    pub bandwidth_hz: f64,
 }
 
 /// A measured bin and what falls into it.
@@ -42,6 +44,8 @@ pub(crate) struct Window {
     pub shares: Vec<f64>,
     /// Exact paths, by their place in [`BandResponse::exact`], and the share of each.
     pub exact: Vec<(usize, f64)>,
+    /// Pairs of these, by their place in this list, and how much they interfere ([`Pulse::overlap`]).
+    pub overlaps: Vec<(usize, usize, f64)>,
 }
 
 impl<'a> ResponseBand<'a> {
@@ -78,6 +82,11 @@ impl<'a> ResponseBand<'a> {
                 let after = |edge: f64| pulse.before(edge - history.times_s[i]);
                 (place, after(edges[1]) - after(edges[0]))
             });
+            let exact_here: Vec<(usize, f64)> = paths.filter(|(_, share)| *share > LEAST_SHARE).collect();
+            let time_s = |n: usize| history.times_s[exact[exact_here[n].0].0];
+            let pairs = (0..exact_here.len()).flat_map(|n| (0..n).map(move |m| (n, m)));
+            let overlaps = pairs.map(|(n, m)| (n, m, pulse.overlap(edges, time_s(n), time_s(m))));
+            let overlaps = overlaps.filter(|(_, _, overlap)| *overlap > LEAST_OVERLAP).collect();
             let signal = decay.signal[j];
             Window {
                 energy: decay.energy[j],
@@ -85,13 +94,13 @@ impl<'a> ResponseBand<'a> {
                 noise: (1.0 / (signal * signal) - 1.0) / decay.values[j],
                 from,
                 shares,
-                exact: paths.filter(|(_, share)| *share > LEAST_SHARE).collect(),
+                exact: exact_here,
+                overlaps,
             }
         };
         let windows = edges_s.windows(2).enumerate().map(window).collect();
         let traces = vec![(history, weights)];
-        let bandwidth_hz = decay.bandwidth_hz;
-        self.responses.push(BandResponse { index, traces, exact, windows, bandwidth_hz });
+        self.responses.push(BandResponse { index, traces, exact, windows });
         true
     }
 

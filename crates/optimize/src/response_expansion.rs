@@ -10,7 +10,9 @@ use sabine_acoustics::Levels;
 pub(crate) struct Bin {
     /// Gain group; `None` for a gain of 1.
     pub group: Option<usize>,
-    pub response: usize,
+    /// Its response, and the window of it, by their places.
+    pub place: usize,
+    window: usize,
     measured: f64,
     /// Relative variance of the measurement by chance.
     pub chance: f64,
@@ -33,30 +35,24 @@ pub(crate) struct ResponseExpansion<'b> {
 impl<'b> ResponseExpansion<'b> {
     /// Sums the paths into the measured bins. `path_error` is the relative standard deviation of the energy of an exact path.
     pub fn about(band: &'b ResponseBand<'b>, absorption: &[f64], path_error: f64) -> Self {
-        let mut bins = Vec::new();
-        for response in &band.responses {
+        let mut expansion = Self::without_weights(band, absorption, path_error);
+        for bin in &mut expansion.bins {
+            let response = &band.responses[bin.place];
             let (history, weights) = &response.traces[0];
-            let fine = Bins::of(&response.traces, absorption);
-            let exact = exact_energies(response, absorption);
-            let mut functional = vec![0.0; fine.energy.len()];
-            for window in &response.windows {
-                let range = window.from..window.from + window.shares.len();
-                functional[range.clone()].copy_from_slice(&window.shares);
-                let mut batches = history.batch_sums(weights, absorption, &functional);
-                functional[range].fill(0.0);
-                let Some(bin) = Bin::of(window, response, &fine, &exact, path_error) else { continue };
-                let energy = bin.log_energy.exp();
-                batches.iter_mut().for_each(|p| *p /= energy);
-                let weight = 1.0 / (bin.chance + variance_of_sum(&batches));
-                bins.push(Bin { group: band.gain_group(response.index), weight, batches, ..bin });
-            }
+            let window = &response.windows[bin.window];
+            let mut functional = vec![0.0; history.bins()];
+            functional[window.from..window.from + window.shares.len()].copy_from_slice(&window.shares);
+            bin.batches = history.batch_sums(weights, absorption, &functional);
+            let energy = bin.log_energy.exp();
+            bin.batches.iter_mut().for_each(|p| *p /= energy);
+            bin.weight = 1.0 / (bin.chance + variance_of_sum(&bin.batches));
         }
-        Self { band, about: absorption.to_vec(), bins }
+        expansion
     }
 
     /// The same about another absorption, the bins weighing what they weigh here; `None` where some have lost all energy.
     pub fn moved_to(&self, absorption: &[f64], path_error: f64) -> Option<Self> {
-        let mut moved = Self::about(self.band, absorption, path_error);
+        let mut moved = Self::without_weights(self.band, absorption, path_error);
         if moved.bins.len() != self.bins.len() {
             return None;
         }
@@ -66,11 +62,18 @@ impl<'b> ResponseExpansion<'b> {
         Some(moved)
     }
 
-    /// The bins weighing what they should here.
-    pub fn weighed(&mut self) {
-        for bin in &mut self.bins {
-            bin.weight = 1.0 / (bin.chance + variance_of_sum(&bin.batches));
+    fn without_weights(band: &'b ResponseBand<'b>, absorption: &[f64], path_error: f64) -> Self {
+        let mut bins = Vec::new();
+        for (place, response) in band.responses.iter().enumerate() {
+            let fine = Bins::of(&response.traces, absorption);
+            let exact = exact_energies(response, absorption);
+            for (j, window) in response.windows.iter().enumerate() {
+                let bin = Bin::of(window, &fine, &exact, path_error);
+                let group = band.gain_group(response.index);
+                bins.extend(bin.map(|bin| Bin { group, place, window: j, ..bin }));
+            }
         }
+        Self { band, about: absorption.to_vec(), bins }
     }
 
     /// ln E of a bin at an absorption.
@@ -134,26 +137,20 @@ impl<'b> ResponseExpansion<'b> {
 }
 
 /// Energy and hits of the exact paths of a response, by their place.
-fn exact_energies<'r>(response: &'r BandResponse<'_>, absorption: &[f64]) -> Vec<(f64, &'r [u16], f64)> {
+fn exact_energies<'r>(response: &'r BandResponse<'_>, absorption: &[f64]) -> Vec<(f64, &'r [u16])> {
     let history = response.traces[0].0;
     let k = absorption.len();
     let of = |&(i, weight): &(usize, f64)| {
         let hits = &history.counts[i * k..(i + 1) * k];
         let log: f64 = hits.iter().zip(absorption).map(|(&n, a)| f64::from(n) * (-a).ln_1p()).sum();
-        (weight * log.exp(), hits, history.times_s[i])
+        (weight * log.exp(), hits)
     };
     response.exact.iter().map(of).collect()
 }
 
 impl Bin {
-    /// `None` for a bin without energy; group, weight and batches are left to the caller.
-    fn of(
-        window: &Window,
-        response: &BandResponse<'_>,
-        fine: &Bins,
-        exact: &[(f64, &[u16], f64)],
-        path_error: f64,
-    ) -> Option<Self> {
+    /// `None` for a bin without energy; where it belongs, weight and batches are left to the caller.
+    fn of(window: &Window, fine: &Bins, exact: &[(f64, &[u16])], path_error: f64) -> Option<Self> {
         let materials = fine.hits.len() / fine.energy.len().max(1);
         let (mut sampled, mut hits) = (0.0, vec![0.0; materials]);
         for (i, share) in (window.from..).zip(&window.shares) {
@@ -163,33 +160,27 @@ impl Bin {
             hits.iter_mut().zip(row).for_each(|(h, n)| *h += e * n);
         }
         let mut single = 0.0;
-        let arrivals: Vec<(f64, f64)> = window
-            .exact
-            .iter()
-            .map(|&(place, share)| {
-                let (e, counts, time_s) = exact[place];
-                single += share * e;
-                hits.iter_mut().zip(counts).for_each(|(h, &n)| *h += share * e * f64::from(n));
-                (share * e, time_s)
-            })
-            .collect();
+        for &(place, share) in &window.exact {
+            let (e, counts) = exact[place];
+            single += share * e;
+            hits.iter_mut().zip(counts).for_each(|(h, &n)| *h += share * e * f64::from(n));
+        }
         let energy = sampled + single;
         if energy <= 0.0 {
             return None;
         }
         hits.iter_mut().for_each(|h| *h /= energy);
-        // Arrivals interfere. Of random sign they add 2 sum e_i e_j G^2 over i != j to the variance, G being the share of
-        // energy that pulses so far apart have in common; in a diffuse field that is E^2 / (bandwidth x duration).
+        // Arrivals interfere. Of random sign they add 2 sum e_i e_j G^2 over i != j to the variance, G being what pulses so far
+        // apart have in common; in a diffuse field that is E^2 / (bandwidth x duration).
         let mut variance = (2.0 * single * sampled + sampled * sampled) / window.values;
-        for (n, &(e, at)) in arrivals.iter().enumerate() {
-            variance += (path_error * e).powi(2);
-            for &(other, then) in &arrivals[..n] {
-                variance += 2.0 * e * other * overlap(response.bandwidth_hz * (at - then));
-            }
-        }
+        let whole = |n: usize| exact[window.exact[n].0].0;
+        variance += 2.0 * window.overlaps.iter().map(|&(n, m, o)| o * whole(n) * whole(m)).sum::<f64>();
+        variance +=
+            window.exact.iter().map(|(place, s)| (path_error * s * exact[*place].0).powi(2)).sum::<f64>();
         Some(Self {
             group: None,
-            response: response.index,
+            place: 0,
+            window: 0,
             measured: window.energy,
             chance: variance / (energy * energy) + window.noise,
             weight: 0.0,
@@ -198,10 +189,4 @@ impl Bin {
             batches: Vec::new(),
         })
     }
-}
-
-/// Twice the mean square correlation of two pulses of a band, so many times 1 / bandwidth apart, over all phases.
-fn overlap(distance: f64) -> f64 {
-    let x = std::f64::consts::PI * distance;
-    if x.abs() < 1e-6 { 1.0 } else { (x.sin() / x).powi(2) }
 }

@@ -1,7 +1,7 @@
 //! The most probable materials, given measured responses.
 
 use crate::bounded::minimise;
-use crate::response_band::ResponseBand;
+use crate::response_band::{BandResponse, ResponseBand};
 use crate::response_expansion::ResponseExpansion;
 use crate::uncertainty::Spread;
 use crate::unknowns::Unknowns;
@@ -63,7 +63,7 @@ pub(crate) fn solve(bands: &[ResponseBand<'_>], config: &FitConfig) -> Result<So
         let before = x.clone();
         iterations += descend(&unknowns, &mut x, &mut expansions, &dispersion, config)?;
         let moved = unknowns.distance(&before, &x);
-        expansions.iter_mut().for_each(ResponseExpansion::weighed);
+        expansions = expand(&x);
         let absorption = unknowns.absorption(&x);
         dispersion = expansions.iter().zip(&absorption).map(|(e, a)| e.dispersion(a)).collect();
         unsettled = Some(moved);
@@ -129,11 +129,11 @@ fn descend(
 
 fn gains_db(expansion: &ResponseExpansion<'_>, absorption: &[f64]) -> Vec<(usize, f64)> {
     let gains = expansion.log_gains(absorption);
-    let of = |index: usize| {
-        let bin = expansion.bins.iter().find(|b| b.response == index)?;
-        Some((index, crate::decay::DB_PER_NEPER * bin.group.map_or(0.0, |g| gains[g])))
+    let of = |(place, response): (usize, &BandResponse<'_>)| {
+        let bin = expansion.bins.iter().find(|b| b.place == place)?;
+        Some((response.index, crate::decay::DB_PER_NEPER * bin.group.map_or(0.0, |g| gains[g])))
     };
-    expansion.band.responses.iter().filter_map(|r| of(r.index)).collect()
+    expansion.band.responses.iter().enumerate().filter_map(of).collect()
 }
 
 /// Cost of bands that are solved together: priors, smoothness, and half the deviances divided by the dispersions.
@@ -165,3 +165,6 @@ impl Objective for Likelihood<'_, '_> {
         cost
     }
 }
+
+#[cfg(test)]
+mod tests;
