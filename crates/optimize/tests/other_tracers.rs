@@ -4,10 +4,12 @@
 // A test that cannot be set up should fail.
 #![allow(clippy::unwrap_used)]
 
-use rand::{Rng, SeedableRng};
+mod mirrors;
+
+use mirrors::{Hearing, RECEIVERS, SOURCES};
 use sabine_acoustics::{
-    Air, Estimate, FilterBank, ImpulseResponse, Levels, Material, Measurement, NamedMaterial, OctaveBands,
-    PathSet, PerBand, Propagator, Receiver, Scene, Source, TimeZero, Triangle,
+    Air, Estimate, ImpulseResponse, Levels, Material, Measurement, NamedMaterial, OctaveBands, PathSet,
+    PerBand, Propagator, Receiver, Scene, Source, TimeZero,
 };
 use sabine_optimize::{
     AbsorptionPrior, DecayMisfit, Error, FitConfig, MaterialFitter, MeasuredDecay, MeasuredPair, ResponseFit,
@@ -15,70 +17,17 @@ use sabine_optimize::{
 };
 use sabine_propagate::{PathTracer, TracerConfig};
 use sabine_testkit::ShoeboxImages;
-use std::f64::consts::PI;
 
-const SIZE_M: [f64; 3] = [6.0, 4.5, 3.0];
 const DURATION_S: f64 = 0.7;
 const RATE_HZ: u32 = 16_000;
 const RAYS: usize = 8_000;
-const SOURCES: [[f64; 3]; 3] = [[1.3, 1.1, 1.5], [4.6, 3.2, 1.2], [2.9, 2.4, 2.1]];
-const RECEIVERS: [[f64; 3]; 4] = [[4.9, 1.4, 1.4], [1.6, 3.6, 1.1], [3.4, 0.9, 1.9], [0.8, 2.0, 1.3]];
-
 fn octaves() -> OctaveBands {
     OctaveBands::new(1000.0, 2000.0).unwrap()
 }
 
-/// The box, its six faces made of the given materials; no scattering, so that image sources are the whole truth.
 fn room(faces: [usize; 6], absorption: &[[f64; 2]]) -> Scene {
-    let material = |a: &[f64; 2]| {
-        let absorption = PerBand::new(octaves(), a.to_vec()).unwrap();
-        Material::new(absorption, PerBand::uniform(octaves(), 0.0)).unwrap()
-    };
-    let plain = Material::uniform(octaves(), 0.1, 0.0).unwrap();
-    let shell = Scene::shoebox(SIZE_M, std::array::from_fn(|_| plain.clone())).unwrap();
-    let triangle = |t: &Triangle| Triangle { material: faces[t.material as usize] as u32, ..*t };
-    let triangles = shell.triangles().iter().map(triangle).collect();
-    let named = absorption.iter().enumerate();
-    let materials =
-        named.map(|(k, a)| NamedMaterial { name: format!("m{k}"), material: material(a) }).collect();
-    Scene::new(shell.vertices().to_vec(), triangles, materials).unwrap()
-}
-
-/// Every image source a pulse of amplitude sqrt(energy) and random sign in each octave. With one sign for all, waves along a wall
-/// would be absorbed by it (the Fresnel zone of a path of 34 m at 1 kHz is 3.4 m wide), which no model of energies knows.
-fn pressure(truth: &Scene, source: &Source, receiver: &Receiver, seed: u64) -> Vec<f32> {
-    const HALF: i64 = 24;
-    let air = Air::default();
-    let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
-    let exponents = air.energy_exponent_per_m(octaves());
-    let rate = f64::from(RATE_HZ);
-    let face = |f: usize| {
-        // Faces are x0, x1, y0, y1, z0, z1 in the shell and here.
-        let triangle = &truth.triangles()[2 * f];
-        truth.materials()[triangle.material as usize].material.absorption().clone()
-    };
-    let faces: Vec<PerBand<f64>> = (0..6).map(face).collect();
-    let mut columns = vec![vec![0f32; (DURATION_S * rate) as usize]; 2];
-    for image in ShoeboxImages::new(DURATION_S).unwrap().images(truth, source, receiver, &air).unwrap() {
-        let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
-        let at = image.length_m / air.speed_of_sound_m_s() * rate;
-        for (b, column) in columns.iter_mut().enumerate() {
-            let walls: f64 =
-                image.hits.iter().zip(&faces).map(|(&n, a)| f64::from(n) * (-a.values()[b]).ln_1p()).sum();
-            let energy = (walls - exponents.values()[b] * image.length_m).exp() / image.length_m.powi(2);
-            let first = at.floor() as i64 - HALF + 1;
-            for i in first..first + 2 * HALF {
-                let Some(sample) = usize::try_from(i).ok().and_then(|i| column.get_mut(i)) else { continue };
-                let x = i as f64 - at;
-                let sinc = if x.abs() < 1e-9 { 1.0 } else { (PI * x).sin() / (PI * x) };
-                let window = (0.5 * PI * x / HALF as f64).cos().powi(2);
-                *sample += (sign * energy.sqrt() * sinc * window) as f32;
-            }
-        }
-    }
-    let bank = FilterBank::new(octaves(), RATE_HZ).unwrap();
-    let split: Vec<_> = columns.iter().map(|column| bank.split(column)).collect();
-    (0..columns[0].len()).map(|i| split[0].values()[0][i] + split[1].values()[1][i]).collect()
+    let absorption: Vec<Vec<f64>> = absorption.iter().map(|a| a.to_vec()).collect();
+    mirrors::room(octaves(), faces, &absorption)
 }
 
 /// Walls, floor and ceiling. The walls, which carry the late decay, are alike in both octaves: else what the filter lets pass of a
@@ -91,14 +40,7 @@ struct Measured {
 }
 
 fn tracer(rays: usize, seed: u64) -> PathTracer {
-    PathTracer::new(TracerConfig {
-        rays,
-        duration_s: DURATION_S,
-        seed,
-        image_order: std::env::var("ORDER").map_or(3, |e| e.parse().unwrap()),
-        ..TracerConfig::default()
-    })
-    .unwrap()
+    PathTracer::new(TracerConfig { rays, duration_s: DURATION_S, seed, ..TracerConfig::default() }).unwrap()
 }
 
 /// The response of the true room by image sources, scaled and delayed, and the paths of a tracer, which do not depend on
@@ -114,18 +56,14 @@ fn measure(
     let (source, receiver) = (Source::omni("s", source).unwrap(), Receiver::omni("r", receiver).unwrap());
     let air = Air::default();
     let mut samples = vec![0.0; delay];
-    samples.extend(pressure(truth, &source, &receiver, seed).iter().map(|s| gain * s));
+    samples.extend(
+        Hearing { octaves: octaves(), rate_hz: RATE_HZ, duration_s: DURATION_S }
+            .pressure(truth, &source, &receiver, seed)
+            .iter()
+            .map(|s| gain * s),
+    );
     let response = ImpulseResponse::new(samples, RATE_HZ).unwrap();
-    let paths = if std::env::var("IMG").is_ok() {
-        ShoeboxImages::new(std::env::var("IMG").unwrap().parse().unwrap())
-            .unwrap()
-            .trace(truth, &source, &receiver, &air, &())
-            .unwrap()
-    } else {
-        tracer(std::env::var("RAYS").map_or(RAYS, |e| e.parse().unwrap()), seed)
-            .trace(truth, &source, &receiver, &air, &())
-            .unwrap()
-    };
+    let paths = tracer(RAYS, seed).trace(truth, &source, &receiver, &air, &()).unwrap();
     Measured { decay: MeasuredDecay::new(&response, octaves()).unwrap(), paths }
 }
 
@@ -142,10 +80,7 @@ fn fit(
         measured.iter().map(|m| MeasuredPair { measured: &m.decay, paths: &m.paths }).collect();
     let measurement = Measurement { time_zero, levels };
     // These walls are mirrors, and source and receiver hear all directions alike.
-    let config = FitConfig {
-        reflection_error: std::env::var("RE").map_or(0.05, |e| e.parse().unwrap()),
-        ..FitConfig::default()
-    };
+    let config = FitConfig { reflection_error: 0.05, ..FitConfig::default() };
     MaterialFitter::new(config)
         .unwrap()
         .fit_responses(&pairs, measurement, &guess, &priors, &Air::default(), &())
@@ -209,35 +144,6 @@ fn three_materials_from_two_receivers_are_covered_by_their_intervals() {
             assert!(fit.fit.not_determined.iter().any(named), "{k} at {band_hz} Hz: {error}");
         }
     }
-}
-
-#[test]
-#[ignore = "takes minutes, and misses its goal: docs/validation/optimize.md"]
-fn twelve_pairs_tell_the_large_surfaces() {
-    let absorption = [[0.1, 0.15], [0.2, 0.1], [0.3, 0.25], [0.12, 0.2], [0.35, 0.45], [0.15, 0.3]];
-    let absorption = if std::env::var("SAME").is_ok() { absorption.map(|[_, b]| [b, b]) } else { absorption };
-    let truth = room([0, 1, 2, 3, 4, 5], &absorption);
-    let mut measured = Vec::new();
-    for (s, source) in SOURCES.iter().enumerate() {
-        for (r, receiver) in RECEIVERS.iter().enumerate() {
-            measured.push(measure(&truth, *source, *receiver, (4 * s + r) as u64, 1.0, 0));
-        }
-    }
-    let fit = fit(&truth, &measured, Levels::Common, TimeZero::Emission, (0.2, 0.2));
-    let errors = errors(&truth, &fit);
-    let areas = truth.material_areas_m2();
-    let total: f64 = areas.iter().sum();
-    let large = (0..6).filter(|&k| areas[k] > 0.15 * total);
-    let of_large: Vec<f64> = large.flat_map(|k| errors[k].iter().map(|e| e.0.abs())).collect();
-    let mean = of_large.iter().sum::<f64>() / of_large.len() as f64;
-    println!("twelve pairs: mean absolute error {mean:.4} of the large surfaces; {errors:.3?}");
-    println!(
-        "dispersion {:?}, iterations {}, {:?}",
-        fit.dispersion.values(),
-        fit.fit.iterations,
-        fit.fit.warnings
-    );
-    assert!(mean < 0.02, "{errors:?}");
 }
 
 #[test]
