@@ -17,7 +17,7 @@ use sabine::optimize::{
 };
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use sabine_examples::OutputFolder;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -42,6 +42,9 @@ struct Arguments {
     /// Expect of the materials what the library says, with a standard deviation of 0.1, instead of nothing
     #[arg(long)]
     tables: bool,
+    /// Draw the tables and plots of these earlier sweeps (their sweep.json) instead
+    #[arg(long, value_delimiter = ',', value_name = "FILE,...")]
+    drawn_from: Vec<PathBuf>,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/sweep_materials")]
     out: PathBuf,
@@ -58,7 +61,7 @@ fn main() -> ExitCode {
 }
 
 /// What is fitted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Method {
     /// The decay curve, traced until verified, aimed at what is read from the rendered response.
@@ -72,9 +75,9 @@ enum Method {
 }
 
 /// One octave of one fit.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Point {
-    room: &'static str,
+    room: String,
     method: Method,
     target_s: f64,
     band_hz: f64,
@@ -91,9 +94,9 @@ struct Point {
     fit_error: Option<f64>,
 }
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Run {
-    room: &'static str,
+    room: String,
     target_s: f64,
     rounds: usize,
     paths: usize,
@@ -105,7 +108,16 @@ struct Run {
 fn run(arguments: &Arguments) -> Result<(), AnyError> {
     let mut out = OutputFolder::create(&arguments.out)?;
     let (mut points, mut runs) = (Vec::new(), Vec::new());
-    for room in rooms()?.iter().filter(|room| room.name.contains(&arguments.room)) {
+    for path in &arguments.drawn_from {
+        let named = |error: serde_json::Error| format!("{}: {error}", path.display());
+        let text = std::fs::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let (more_points, more_runs): (Vec<Point>, Vec<Run>) =
+            serde_json::from_slice(&text).map_err(named)?;
+        points.extend(more_points);
+        runs.extend(more_runs);
+    }
+    let traced = arguments.drawn_from.is_empty();
+    for room in rooms()?.iter().filter(|room| traced && room.name.contains(&arguments.room)) {
         println!(
             "{}: {:.0} m3, {:.0} m2, {} materials",
             room.name,
@@ -117,7 +129,7 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
             let run = fit_room(room, target_s, arguments, &mut points)?;
             let errors = |of: fn(&Point) -> Option<f64>| -> String {
                 let mine = points.iter().filter(|p: &&Point| {
-                    (p.room, p.target_s, p.method) == (room.name, target_s, Method::Edc)
+                    (p.room.as_str(), p.target_s, p.method) == (room.name, target_s, Method::Edc)
                 });
                 mine.map(|p| match of(p).filter(|_| p.reachable) {
                     Some(t) => format!("{:>6.1}", 100.0 * (t / target_s - 1.0)),
@@ -267,7 +279,7 @@ fn fit_room(
         for b in 0..octaves.len() {
             let band_hz = octaves.nominal_hz(b);
             points.push(Point {
-                room: room.name,
+                room: room.name.to_owned(),
                 method,
                 target_s,
                 band_hz,
@@ -281,5 +293,13 @@ fn fit_room(
         }
     }
     let (trace_s, fit_s) = edc.seconds;
-    Ok(Run { room: room.name, target_s, rounds: edc.rounds, paths: total, trace_s, fit_s, single_fit_s })
+    Ok(Run {
+        room: room.name.to_owned(),
+        target_s,
+        rounds: edc.rounds,
+        paths: total,
+        trace_s,
+        fit_s,
+        single_fit_s,
+    })
 }

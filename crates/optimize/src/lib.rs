@@ -77,6 +77,9 @@
 //! | of all materials that meet the target, the most probable | `tests/fit_t60.rs` |
 //! | standard errors cover: standardised errors have mean square 1 | `tests/fit_t60.rs` |
 //! | one material from the T60 of another tracer: absorption within 0.0013 | `tests/other_tracers.rs` |
+//! | responses: the optimum of a compass search over plain sums of all paths, smooth or not | tests of `response_solver` |
+//! | three materials from two responses: intervals cover, and what is open is named | `tests/other_tracers.rs` |
+//! | six from twelve: mean absolute error below 0.02 from 2 kHz on, where the Cramer-Rao bound allows it | `tests/twelve_pairs.rs` |
 //! | rays are added until T60 is as sure as asked for | `tests/retracing.rs` |
 //!
 //! `docs/validation/optimize.md` has rooms, targets from 0.2 to 2.5 s, and measured responses.

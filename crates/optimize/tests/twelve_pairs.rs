@@ -133,7 +133,12 @@ fn twelve_pairs_tell_what_they_hold_of_the_large_surfaces() {
             (0..6).map(error).collect::<Vec<_>>(),
         );
         for &k in &large {
-            assert!(error(k).abs() < 3.5 * stated(k), "{band_hz} Hz, wall {k}: {} +- {}", error(k), stated(k));
+            assert!(
+                error(k).abs() < 3.5 * stated(k),
+                "{band_hz} Hz, wall {k}: {} +- {}",
+                error(k),
+                stated(k)
+            );
         }
         if least > 0.02 {
             // The goal is 0.02: here the data do not hold it.
