@@ -249,8 +249,10 @@ def misuka(case, folder, truth):
         scene["walls"] = {"type": "cube", "flip_normals": True, "to_world": middle.scale([x / 2, y / 2, z / 2]), "bsdf": bsdf}
         keys = {"walls": ["walls"]}
     else:
-        for name, at in turned.items():
-            scene[name] = {"type": "rectangle", "to_world": at, "bsdf": bsdf}
+        for i, (name, at) in enumerate(turned.items()):
+            # Equal materials would be merged into one.
+            own = {**bsdf, "scattering": spectrum(SCATTERING + 1e-6 * i)}
+            scene[name] = {"type": "rectangle", "to_world": at, "bsdf": own}
         keys = {"walls": [f"wall_{i}" for i in range(4)], "floor": ["floor"], "ceiling": ["ceiling"]}
     for i in range(used):
         scene[f"receiver_{i}"] = {
