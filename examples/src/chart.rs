@@ -198,6 +198,8 @@ impl Chart {
         let (y0, y1) = self.y_range();
         let mut chart = ChartBuilder::on(&body)
             .margin_right(14)
+            // plotters places the label by the capitals of one font; in others it rises higher.
+            .margin_left(if self.y_label.is_empty() { 0 } else { 6 })
             .x_label_area_size(if self.x_label.is_empty() { 24 } else { 46 })
             .y_label_area_size(if self.y_label.is_empty() { 40 } else { 58 })
             .build_cartesian_2d(x0..x1, y0..y1)?;

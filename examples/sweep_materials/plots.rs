@@ -39,11 +39,15 @@ pub fn tables(points: &[Point]) -> String {
         "| objective | read from | targets | reachable | not read | median % | 95th percentile % | largest % |\n|---|---|---|---|---|---|---|---|\n",
     );
     type Reading = fn(&Point) -> Option<f64>;
-    let readings: [(&str, Reading); 2] =
-        [("rendered response", |p| p.rendered_s), ("energy", |p| p.energy_s)];
-    for (method, name) in METHODS {
+    let readings: [(&str, Reading); 3] = [
+        ("mean of responses", |p| p.mean_rendered_s),
+        ("one response", |p| p.rendered_s),
+        ("energy", |p| p.energy_s),
+    ];
+    let sure = (Method::Edc, "decay curve, where the fit has no doubt", true);
+    for (method, name, sure) in METHODS.map(|(m, name)| (m, name, false)).into_iter().chain([sure]) {
         for (what, read) in readings {
-            let mine = || points.iter().filter(move |p| p.method == method);
+            let mine = || points.iter().filter(move |p| p.method == method && !(sure && p.doubted));
             let (errors, unread) = sorted_errors(mine(), read);
             let percent = |value: f64| if value.is_nan() { "-".to_owned() } else { format!("{value:.2}") };
             let _ = writeln!(
@@ -60,7 +64,7 @@ pub fn tables(points: &[Point]) -> String {
     text.push_str("\n| T60 wanted, s | median % | 95th percentile % | largest % |\n|---|---|---|---|\n");
     for target in targets(points) {
         let mine = points.iter().filter(|p| p.method == Method::Edc && p.target_s == target);
-        let (errors, _) = sorted_errors(mine, |p| p.rendered_s);
+        let (errors, _) = sorted_errors(mine, |p| p.mean_rendered_s);
         let _ = writeln!(
             text,
             "| {target:.2} | {:.2} | {:.2} | {:.1} |",
@@ -87,7 +91,7 @@ pub fn reached(points: &[Point]) -> Result<String, AnyError> {
     for (colour, (method, name)) in METHODS.into_iter().enumerate().filter(|(i, _)| *i != 1) {
         let of = |target: f64| {
             let mine = points.iter().filter(|p| p.method == method && p.target_s == target && p.reachable);
-            let mut read: Vec<f64> = mine.filter_map(|p| p.rendered_s).collect();
+            let mut read: Vec<f64> = mine.filter_map(|p| p.mean_rendered_s).collect();
             read.sort_by(f64::total_cmp);
             (target, quantile(&read, 0.5))
         };
@@ -95,7 +99,7 @@ pub fn reached(points: &[Point]) -> Result<String, AnyError> {
     }
     let chart = Chart {
         x_label: "T60 wanted, s".to_owned(),
-        y_label: "median T30 rendered, s".to_owned(),
+        y_label: "median T30 read, s".to_owned(),
         x: Scale::Linear(0.0, 1.05 * longest),
         y: Some((0.0, 1.4 * longest)),
         series,
@@ -112,7 +116,7 @@ pub fn errors(points: &[Point]) -> Result<String, AnyError> {
         for (share, look, in_legend) in [(0.5, Look::Dots, true), (0.95, Look::Dashed, false)] {
             let of = |target: f64| {
                 let mine = points.iter().filter(|p| p.method == method && p.target_s == target);
-                (target, quantile(&sorted_errors(mine, |p| p.rendered_s).0, share))
+                (target, quantile(&sorted_errors(mine, |p| p.mean_rendered_s).0, share))
             };
             let points = targets.iter().map(|&t| of(t)).collect();
             series.push(Series { in_legend, ..Series::new(name, look, colour, points) });
@@ -120,7 +124,7 @@ pub fn errors(points: &[Point]) -> Result<String, AnyError> {
     }
     let chart = Chart {
         x_label: "T60 wanted, s".to_owned(),
-        y_label: "error, % (dashed: 95th percentile)".to_owned(),
+        y_label: "error, %; dashed: 95th pct.".to_owned(),
         x: Scale::Linear(0.0, 1.05 * targets.last().copied().unwrap_or(1.0)),
         y: Some((0.0, 50.0)),
         series,

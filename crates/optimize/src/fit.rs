@@ -206,6 +206,13 @@ pub enum Warning {
         /// Fitted absorption less the prior's mean, in standard deviations.
         deviations: f64,
     },
+    /// The fit to responses stopped before the materials came to rest.
+    NotSettled {
+        /// Nominal centre of the band, in Hz.
+        band_hz: f64,
+        /// Greatest change of a material in the last round, in standard deviations of its prior.
+        deviations: f64,
+    },
     /// So few paths carry the decay that T60 is uncertain by more than 3 %: the fit follows their accidents, and other
     /// rays will decay otherwise, most likely longer.
     FewPaths {
@@ -232,6 +239,9 @@ impl Warning {
             Self::FarFromPrior { material, band_hz, deviations } => format!(
                 "{band_hz} Hz: {} had to move {deviations:+.1} standard deviations from its prior",
                 name_of(*material, names)
+            ),
+            Self::NotSettled { band_hz, deviations } => format!(
+                "{band_hz} Hz: the fit has not settled; a material still moved by {deviations:.2} standard deviations"
             ),
             Self::FewPaths { band_hz, relative_error } => format!(
                 "{band_hz} Hz: the rays leave T60 uncertain by {:.0} %; trace more of them",

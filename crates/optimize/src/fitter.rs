@@ -1,5 +1,6 @@
 //! Fits the absorption of materials to reverberation times.
 
+use crate::assembly::FoundBand;
 use crate::decay_slope::DecaySlope;
 use crate::fit::{AtBound, MaterialFit, Unreachable, UnreachableReason, Warning};
 use crate::group::{Band, Fitted, Group};
@@ -7,9 +8,10 @@ use crate::history::History;
 use crate::objective::check_paths;
 use crate::single_paths::SinglePathSlope;
 use crate::uncertainty::Spread;
+use crate::unknowns::BandPrior;
 use crate::{AbsorptionPrior, Error, FitConfig, SlopeObjective};
 use rayon::prelude::*;
-use sabine_acoustics::{Air, Estimate, Material, NoReading, Observer, PathSet, PerBand, report};
+use sabine_acoustics::{Air, Estimate, Material, Observer, PathSet, PerBand, report};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Shortest and longest T60 that is accepted as a target, in seconds: a studio's booth and a mausoleum.
@@ -18,8 +20,6 @@ pub(crate) const TARGET_RANGE_S: (f64, f64) = (0.02, 20.0);
 const STAGE: &str = "fit materials";
 /// Relative Monte-Carlo error of T60 that is worth a warning.
 const FEW_PATHS: f64 = 0.03;
-/// Deviation from a prior that is worth a warning, in standard deviations.
-pub(crate) const FAR_FROM_PRIOR: f64 = 3.0;
 
 /// Fits materials so that the simulated decay of every band has the slope -60/T60.
 ///
@@ -119,8 +119,7 @@ impl MaterialFitter {
                     curve: DecaySlope::new(by_pair(traces, weighted), self.config.range_db),
                     line,
                     target_s: targets.values()[b].value,
-                    mean: priors.iter().map(|p| p.mean.values()[b]).collect(),
-                    standard_deviation: priors.iter().map(|p| p.standard_deviation.values()[b]).collect(),
+                    prior: BandPrior::new(priors, b),
                 })
             })
             .collect::<Result<Vec<_>, Error>>()?;
@@ -144,40 +143,25 @@ impl MaterialFitter {
             })
             .collect::<Result<Vec<_>, Error>>()?;
 
-        let hits: Vec<u64> =
-            (0..materials.len()).map(|k| histories.iter().map(|h| h.hits[k]).sum()).collect();
-        let mut fit = MaterialFit {
-            materials: Vec::new(),
-            absorption_standard_error: Vec::new(),
-            predicted_t60_s: PerBand::from_fn(octaves, |_| Err(NoReading::NoDecay)),
-            unreachable: Vec::new(),
-            at_bounds: Vec::new(),
-            not_determined: Vec::new(),
-            warnings: Vec::new(),
-            iterations: fitted.iter().map(|(s, _)| s.iterations).sum(),
-            cost: fitted.iter().map(|(s, _)| s.cost).sum(),
-        };
+        let found: Vec<FoundBand<'_>> = bands
+            .iter()
+            .enumerate()
+            .map(|(b, band)| {
+                let (solution, spread) = &fitted[b / together];
+                let place = b % together;
+                FoundBand { prior: &band.prior, absorption: &solution.bands[place].absorption, spread, place }
+            })
+            .collect();
+        let mut fit = MaterialFit::of_bands(materials, &histories, &found, &self.config)?;
+        fit.iterations = fitted.iter().map(|(s, _)| s.iterations).sum();
+        fit.cost = fitted.iter().map(|(s, _)| s.cost).sum();
         let mut predicted = Vec::new();
-        let mut absorption = vec![Vec::new(); materials.len()];
-        let mut standard_error = vec![Vec::new(); materials.len()];
         for (b, band) in bands.iter().enumerate() {
             let band_hz = octaves.nominal_hz(b);
-            let (solution, spread) = &fitted[b / together];
-            let here = b % together;
-            let found = &solution.bands[here];
-            let values = &found.absorption;
-            let bounded = AtBound::find(&band.standard_deviation, values, band_hz, self.config.bounds);
+            let found = &fitted[b / together].0.bands[b % together];
             let reading = found.t60_s.clone();
             if let Some(reason) = self.unreachable(band, found, limits_s.values()[b]) {
                 fit.unreachable.push(Unreachable { band_hz, reason });
-            }
-            for k in 0..materials.len() {
-                absorption[k].push(values[k]);
-                standard_error[k].push(spread.standard_error[here][k]);
-                let deviations = (values[k] - band.mean[k]) / band.standard_deviation[k];
-                if deviations.is_finite() && deviations.abs() > FAR_FROM_PRIOR {
-                    fit.warnings.push(Warning::FarFromPrior { material: k, band_hz, deviations });
-                }
             }
             if let Ok(t60_s) = &reading {
                 let relative_error = t60_s.standard_error / t60_s.value;
@@ -191,22 +175,9 @@ impl MaterialFitter {
             if traced_s < advised_s {
                 fit.warnings.push(Warning::ShortPaths { band_hz, traced_s, advised_s });
             }
-            spread.name_open(
-                here,
-                &band.standard_deviation,
-                band_hz,
-                &hits,
-                &bounded,
-                &mut fit.not_determined,
-            );
-            fit.at_bounds.extend(bounded);
             predicted.push(reading);
         }
         fit.predicted_t60_s = PerBand::new(octaves, predicted)?;
-        for ((material, absorption), error) in materials.iter().zip(absorption).zip(standard_error) {
-            fit.materials.push(material.with_absorption(PerBand::new(octaves, absorption)?)?);
-            fit.absorption_standard_error.push(PerBand::new(octaves, error)?);
-        }
         Ok(fit)
     }
 
@@ -227,8 +198,7 @@ impl MaterialFitter {
         let Fitted { absorption, gradient, .. } = found;
         let greatest = gradient.iter().fold(0.0f64, |w, g| w.max(g.abs()));
         let matters = |k: &usize| gradient[*k].abs() > 1e-3 * greatest;
-        let mut free =
-            (0..absorption.len()).filter(|&k| band.standard_deviation[k] > 0.0).filter(matters).peekable();
+        let mut free = band.prior.free().filter(matters).peekable();
         if free.peek().is_none() {
             return Some(UnreachableReason::AllHeld { reached_s, target_s });
         }

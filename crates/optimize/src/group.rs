@@ -5,8 +5,8 @@ use crate::decay_slope::DecaySlope;
 use crate::expansion::Expansion;
 use crate::history::History;
 use crate::objective::SlopeModel;
-use crate::scale::Scale;
 use crate::single_paths::SinglePathSlope;
+use crate::unknowns::{BandPrior, Unknowns};
 use crate::{Error, FitConfig};
 use rayon::prelude::*;
 use sabine_acoustics::{Objective, Reading};
@@ -18,9 +18,7 @@ pub(crate) struct Band<'a> {
     /// The slope that is fitted, where that is another.
     pub line: Option<SinglePathSlope>,
     pub target_s: f64,
-    /// Prior of each material.
-    pub mean: Vec<f64>,
-    pub standard_deviation: Vec<f64>,
+    pub prior: BandPrior,
 }
 
 impl Band<'_> {
@@ -99,38 +97,16 @@ const SETTLED: f64 = 0.02;
 pub(crate) struct Group<'a, 'b> {
     bands: &'b [Band<'a>],
     config: &'b FitConfig,
-    /// Band and material of each variable; held materials have none.
-    free: Vec<(usize, usize)>,
-    scales: Vec<Scale>,
-    /// Variables of the same material in neighbouring bands.
-    neighbours: Vec<(usize, usize)>,
-    lower: Vec<f64>,
-    upper: Vec<f64>,
+    pub unknowns: Unknowns<'b>,
 }
 
 impl<'a, 'b> Group<'a, 'b> {
     pub fn new(bands: &'b [Band<'a>], config: &'b FitConfig) -> Self {
-        let free: Vec<(usize, usize)> = bands
-            .iter()
-            .enumerate()
-            .flat_map(|(b, band)| (0..band.mean.len()).map(move |k| (b, k)))
-            .filter(|&(b, k)| bands[b].standard_deviation[k] > 0.0)
-            .collect();
-        let scale = |&(b, k): &(usize, usize)| {
-            let mean = bands[b].mean[k].clamp(config.bounds.0, config.bounds.1);
-            Scale::about(mean, bands[b].standard_deviation[k])
-        };
-        let scales: Vec<Scale> = free.iter().map(scale).collect();
-        let lower = scales.iter().map(|s| s.variable(config.bounds.0)).collect();
-        let upper = scales.iter().map(|s| s.variable(config.bounds.1)).collect();
-        let at = |b: usize, k: usize| free.iter().position(|&f| f == (b, k));
-        let pairs = free.iter().enumerate();
-        let neighbours = pairs.filter_map(|(low, &(b, k))| at(b + 1, k).map(|high| (low, high))).collect();
-        Self { bands, config, free, scales, neighbours, lower, upper }
+        Self { bands, config, unknowns: Unknowns::new(bands.iter().map(|b| &b.prior).collect(), config) }
     }
 
     pub fn solve(&self) -> Result<Solution, Error> {
-        let prior = self.solve_from(&vec![0.0; self.free.len()])?;
+        let prior = self.solve_from(&self.unknowns.start())?;
         if self.met(&prior) {
             return Ok(prior);
         }
@@ -149,7 +125,7 @@ impl<'a, 'b> Group<'a, 'b> {
     }
 
     fn solve_from(&self, start: &[f64]) -> Result<Solution, Error> {
-        let bounds = self.lower.iter().zip(&self.upper);
+        let bounds = self.unknowns.lower.iter().zip(&self.unknowns.upper);
         let mut x: Vec<f64> = start.iter().zip(bounds).map(|(x, (l, u))| x.clamp(*l, *u)).collect();
         let mut iterations = 0;
         let mut rounds = Rounds::new(self, self.expand(&x), &x);
@@ -159,8 +135,7 @@ impl<'a, 'b> Group<'a, 'b> {
             let at_last = rounds.approach(&x);
             let minimum = rounds.solve(&x, reach)?;
             iterations += minimum.iterations;
-            let (before, after) = (self.deviations(&x), self.deviations(&minimum.x));
-            let moved = before.iter().zip(&after).fold(0.0, |w: f64, (a, b)| w.max((a - b).abs()));
+            let moved = self.unknowns.distance(&x, &minimum.x);
             // Steps that turn back upon themselves are shortened: what the expansion leaves out makes them overshoot.
             let step: Vec<f64> = x.iter().zip(&minimum.x).map(|(from, to)| to - from).collect();
             let along: f64 = step.iter().zip(&last).map(|(a, b)| a * b).sum();
@@ -190,7 +165,7 @@ impl<'a, 'b> Group<'a, 'b> {
     }
 
     fn solution(&self, x: &[f64], models: Vec<Model<'b>>, iterations: usize) -> Solution {
-        let absorption = self.absorption(x);
+        let absorption = self.unknowns.absorption(x);
         let at = |((band, model), absorption): ((&Band<'_>, Model<'_>), &Vec<f64>)| {
             let mut gradient = vec![0.0; absorption.len()];
             let residual = band.residual(&model, absorption, &mut gradient);
@@ -201,12 +176,12 @@ impl<'a, 'b> Group<'a, 'b> {
             Fitted { absorption: absorption.clone(), residual, gradient, t60_s: band.curve.reading(&curve) }
         };
         let bands = self.bands.par_iter().zip(models).zip(&absorption).map(at).collect();
-        let cost = self.prior_cost(x, &mut vec![0.0; x.len()]);
+        let cost = self.unknowns.prior_cost(x, &mut vec![0.0; x.len()]);
         Solution { bands, iterations, cost }
     }
 
     fn expand(&self, x: &[f64]) -> Vec<Model<'b>> {
-        self.bands.par_iter().zip(self.absorption(x)).map(|(band, a)| band.expand(&a)).collect()
+        self.bands.par_iter().zip(self.unknowns.absorption(x)).map(|(band, a)| band.expand(&a)).collect()
     }
 
     /// The prior's means, ln(1 - absorption) multiplied in each band by what gives the wanted slope; `None` if no factor does.
@@ -226,9 +201,9 @@ impl<'a, 'b> Group<'a, 'b> {
                     let exponent = log_factor.exp() * (-mean.clamp(lower, upper)).ln_1p();
                     (-exponent.exp_m1()).clamp(lower, upper)
                 };
-                band.mean.iter().zip(&band.standard_deviation).map(of).collect()
+                band.prior.mean.iter().zip(&band.prior.standard_deviation).map(of).collect()
             };
-            let scratch = &mut vec![0.0; band.mean.len()];
+            let scratch = &mut vec![0.0; band.prior.materials()];
             let mut residual = |log_factor: f64| band.residual(&band.paths(), &scaled(log_factor), scratch);
             let (mut low, mut high) = (-6.0, 6.0);
             if !(residual(low)? < 0.0 && residual(high)? > 0.0) {
@@ -241,59 +216,7 @@ impl<'a, 'b> Group<'a, 'b> {
             absorption[b] = scaled(0.5 * (low + high));
             found = true;
         }
-        let variable = |(&(b, k), scale): (&(usize, usize), &Scale)| scale.variable(absorption[b][k]);
-        found.then(|| self.free.iter().zip(&self.scales).map(variable).collect())
-    }
-
-    /// Absorption by band and material.
-    fn absorption(&self, x: &[f64]) -> Vec<Vec<f64>> {
-        let mut absorption: Vec<Vec<f64>> = self.bands.iter().map(|b| b.mean.clone()).collect();
-        let (lower, upper) = self.config.bounds;
-        for ((&(b, k), scale), x) in self.free.iter().zip(&self.scales).zip(x) {
-            // The bound may be missed by a rounding error.
-            absorption[b][k] = scale.absorption(*x).clamp(lower, upper);
-        }
-        absorption
-    }
-
-    fn prior_cost(&self, x: &[f64], gradient: &mut [f64]) -> f64 {
-        let z = self.deviations(x);
-        let mut cost = 0.5 * z.iter().map(|z| z * z).sum::<f64>();
-        gradient.copy_from_slice(&z);
-        for &(low, high) in self.neighbours() {
-            let step = z[high] - z[low];
-            cost += 0.5 * self.config.smoothness * step * step;
-            gradient[high] += self.config.smoothness * step;
-            gradient[low] -= self.config.smoothness * step;
-        }
-        for (i, g) in gradient.iter_mut().enumerate() {
-            let (b, k) = self.free[i];
-            *g *= self.scales[i].by_variable(x[i]) / self.bands[b].standard_deviation[k];
-        }
-        cost
-    }
-
-    /// Deviations of absorption from the priors, in standard deviations.
-    fn deviations(&self, x: &[f64]) -> Vec<f64> {
-        let of = |((&(b, k), scale), x): ((&(usize, usize), &Scale), &f64)| {
-            (scale.absorption(*x) - self.bands[b].mean[k]) / self.bands[b].standard_deviation[k]
-        };
-        self.free.iter().zip(&self.scales).zip(x).map(of).collect()
-    }
-
-    /// Variables of the same material in neighbouring bands; without smoothness each band is a group of its own.
-    pub fn neighbours(&self) -> &[(usize, usize)] {
-        &self.neighbours
-    }
-
-    /// See [`FitConfig::smoothness`].
-    pub fn smoothness(&self) -> f64 {
-        self.config.smoothness
-    }
-
-    /// Band and material of each variable.
-    pub fn free(&self) -> &[(usize, usize)] {
-        &self.free
+        found.then(|| self.unknowns.variables(&absorption))
     }
 }
 
@@ -316,7 +239,7 @@ impl<'g, 'a, 'b> Rounds<'g, 'a, 'b> {
         for ((weight, residual), band) in rounds.weight.iter_mut().zip(residuals).zip(group.bands) {
             // The slope's variance under the prior.
             let square: f64 = residual.map_or(0.0, |(_, g)| {
-                g.iter().zip(&band.standard_deviation).map(|(g, sd)| (g * sd).powi(2)).sum()
+                g.iter().zip(&band.prior.standard_deviation).map(|(g, sd)| (g * sd).powi(2)).sum()
             });
             *weight = if square > 0.0 { 1.0 / (group.config.prior_weight * square) } else { 0.0 };
         }
@@ -353,8 +276,9 @@ impl<'g, 'a, 'b> Rounds<'g, 'a, 'b> {
         let mut before = vec![f64::INFINITY; self.models.len()];
         let mut stuck = vec![0; self.models.len()];
         let mut minimum = Minimum { x: start.to_vec(), cost: f64::NAN, iterations: 0 };
-        let lower: Vec<f64> = self.group.lower.iter().zip(start).map(|(l, x)| l.max(x - reach)).collect();
-        let upper: Vec<f64> = self.group.upper.iter().zip(start).map(|(u, x)| u.min(x + reach)).collect();
+        let unknowns = &self.group.unknowns;
+        let lower: Vec<f64> = unknowns.lower.iter().zip(start).map(|(l, x)| l.max(x - reach)).collect();
+        let upper: Vec<f64> = unknowns.upper.iter().zip(start).map(|(u, x)| u.min(x + reach)).collect();
         for _ in 0..config.max_rounds {
             let next = minimise(&*self, &minimum.x, &lower, &upper, config.max_iterations)?;
             minimum = Minimum { iterations: minimum.iterations + next.iterations, ..next };
@@ -383,7 +307,7 @@ impl Group<'_, '_> {
         self.bands
             .par_iter()
             .zip(models)
-            .zip(self.absorption(x))
+            .zip(self.unknowns.absorption(x))
             .map(|((band, model), absorption)| {
                 let mut gradient = vec![0.0; absorption.len()];
                 let residual = band.residual(model, &absorption, &mut gradient)?;
@@ -395,11 +319,11 @@ impl Group<'_, '_> {
 
 impl Objective for Rounds<'_, '_, '_> {
     fn dimension(&self) -> usize {
-        self.group.free.len()
+        self.group.unknowns.len()
     }
 
     fn value_and_gradient(&self, x: &[f64], gradient: &mut [f64]) -> f64 {
-        let mut cost = self.group.prior_cost(x, gradient);
+        let mut cost = self.group.unknowns.prior_cost(x, gradient);
         let residuals = self.group.residuals(&self.models, x);
         for (b, residual) in residuals.iter().enumerate() {
             if let Some((r, _)) = residual {
@@ -408,10 +332,10 @@ impl Objective for Rounds<'_, '_, '_> {
             }
         }
         for (i, g) in gradient.iter_mut().enumerate() {
-            let (b, k) = self.group.free[i];
+            let (b, k) = self.group.unknowns.free[i];
             if let Some((r, by)) = &residuals[b] {
                 let missing = (1.0 + r) / self.aim[b] - 1.0;
-                let by = by[k] * self.group.scales[i].by_variable(x[i]) / self.aim[b];
+                let by = by[k] * self.group.unknowns.by_variable(i, x) / self.aim[b];
                 *g += self.weight[b] * (missing + self.shift[b]) * by;
             }
         }

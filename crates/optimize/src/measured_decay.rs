@@ -1,17 +1,19 @@
 //! How the energy of a measured response decays, in every band, as far as the noise lets one see.
 
 use crate::Error;
+use crate::pulse::Pulse;
 use sabine_acoustics::{
     DecayFit, FilterBank, ImpulseResponse, NoReading, OctaveBands, PerBand, Reading, RoomParameters,
 };
 
 /// What follows the onset by less than this is direct sound, which the source's directivity changes, not decay; in seconds.
-const DIRECT_S: f64 = 0.005;
+const DIRECT_S: f64 = 0.0025;
 /// The filter rings for about this long, in units of one over the bandwidth: the decay starts so much later, and no time
 /// bin is narrower.
 const RINGING: f64 = 1.5;
-/// Most time bins.
-const BINS: f64 = 48.0;
+/// Most time bins. The first are as narrow as the filter allows, for early on single reflections tell single walls; the later
+/// ones grow in a geometric series.
+const BINS: usize = 64;
 /// Fewest time bins that a decay is read from.
 const LEAST_BINS: usize = 6;
 /// Noise may not exceed this share of what a bin holds.
@@ -34,8 +36,12 @@ pub(crate) struct BinnedDecay {
     pub edges_s: Vec<f64>,
     /// Energy of each bin less the noise; a unit impulse has energy 1.
     pub energy: Vec<f64>,
-    /// Shape of its Gamma distribution: (mean / standard deviation)2.
-    pub shape: Vec<f64>,
+    /// Independent values of the band in each bin.
+    pub values: Vec<f64>,
+    /// Share of the signal in what was measured in each bin, 0 to 1.
+    pub signal: Vec<f64>,
+    /// How the filter spreads the energy of an instant.
+    pub pulse: Pulse,
     /// Energy after the last bin, by the decay fit.
     pub tail: f64,
 }
@@ -55,8 +61,7 @@ impl MeasuredDecay {
         let mut impulse = vec![0.0; response.sample_rate_hz() as usize];
         let middle = impulse.len() / 2;
         impulse[middle] = 1.0;
-        let units =
-            bank.analyse(&impulse).map(|x| x.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>());
+        let impulses = bank.analyse(&impulse);
         let of_band = |b: usize| {
             let fit = parameters.fits.values()[b].as_ref().map_err(NoReading::clone)?;
             let (lower_hz, upper_hz) = bands.edges_hz(b);
@@ -65,7 +70,7 @@ impl MeasuredDecay {
                 rate,
                 onset_s,
                 upper_hz - lower_hz,
-                units.values()[b],
+                (&impulses.values()[b], middle),
                 fit,
             )
         };
@@ -99,13 +104,23 @@ impl BinnedDecay {
         rate_hz: f64,
         onset_s: f64,
         bandwidth_hz: f64,
-        unit_energy: f64,
+        (impulse, middle): (&[f32], usize),
         fit: &DecayFit,
     ) -> Result<Self, NoReading> {
         let from_s = onset_s + DIRECT_S.max(RINGING / bandwidth_hz);
         let to_s = fit.knee_s().min(samples.len() as f64 / rate_hz);
-        let width_s = (RINGING / bandwidth_hz).max((to_s - from_s) / BINS);
-        let mut decay = Self { edges_s: Vec::new(), energy: Vec::new(), shape: Vec::new(), tail: 0.0 };
+        let unit_energy: f64 = impulse.iter().map(|&x| f64::from(x) * f64::from(x)).sum();
+        let first_s = RINGING / bandwidth_hz;
+        let growth = growth((to_s - from_s) / first_s);
+        let mut width_s = first_s;
+        let mut decay = Self {
+            edges_s: Vec::new(),
+            energy: Vec::new(),
+            values: Vec::new(),
+            signal: Vec::new(),
+            pulse: Pulse::new(impulse, middle, rate_hz),
+            tail: 0.0,
+        };
         let mut end = (from_s * rate_hz).round() as usize;
         loop {
             let from = end;
@@ -122,11 +137,13 @@ impl BinnedDecay {
             decay.edges_s.push(from as f64 / rate_hz);
             decay.energy.push((gross - noise) / unit_energy);
             // Two degrees of freedom for each independent value of the band, of which there are B dt.
-            decay.shape.push(bandwidth_hz * (to - from) as f64 / rate_hz * signal * signal);
+            decay.values.push(bandwidth_hz * (to - from) as f64 / rate_hz);
+            decay.signal.push(signal);
             end = to;
+            width_s *= growth;
         }
         if decay.energy.len() < LEAST_BINS {
-            let (needed_s, available_s) = (LEAST_BINS as f64 * width_s, (to_s - from_s).max(0.0));
+            let (needed_s, available_s) = (LEAST_BINS as f64 * first_s, (to_s - from_s).max(0.0));
             return Err(NoReading::TooShort { needed_s, available_s });
         }
         decay.edges_s.push(end as f64 / rate_hz);
@@ -155,4 +172,18 @@ impl BinnedDecay {
         let first = level[0];
         level.iter().map(|l| l - first).collect()
     }
+}
+
+/// Factor from one bin's width to the next with which [`BINS`] of them fill a duration, given in widths of the first.
+fn growth(duration: f64) -> f64 {
+    let filled = |growth: f64| (0..BINS).fold(0.0, |sum, _| 1.0 + growth * sum);
+    if duration <= BINS as f64 {
+        return 1.0;
+    }
+    let (mut low, mut high) = (1.0, 2.0);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if filled(middle) < duration { low = middle } else { high = middle }
+    }
+    high
 }

@@ -19,7 +19,7 @@ pub struct DecayMisfit {
     /// T30 of the paths, in seconds.
     pub simulated_t30_s: PerBand<Reading>,
     /// Root mean square difference of the two decay curves, in dB: both start just after the direct sound at 0 dB and are
-    /// compared down to -35 dB or the noise.
+    /// compared down to -35 dB or the noise, every second of the decay counting alike.
     pub rmse_db: PerBand<Result<f64, NoReading>>,
     /// The curves compared: time after emission in seconds, measured and simulated level in dB; empty where there are none.
     pub curves: PerBand<Vec<(f64, f64, f64)>>,
@@ -72,8 +72,12 @@ impl DecayMisfit {
             if points.len() < 3 {
                 return Err(NoReading::NoDecay);
             }
-            let square: f64 = points.iter().map(|p| (p.1 - p.2).powi(2)).sum();
-            Ok((square / points.len() as f64).sqrt())
+            let square = |p: &[(f64, f64, f64)]| {
+                let at = |i: usize| (p[i].1 - p[i].2).powi(2);
+                0.5 * (at(0) + at(1)) * (p[1].0 - p[0].0)
+            };
+            let duration_s = points[points.len() - 1].0 - points[0].0;
+            Ok((points.windows(2).map(square).sum::<f64>() / duration_s).sqrt())
         };
         Ok(Self {
             measured_t30_s: pair.measured.t30_s().clone(),

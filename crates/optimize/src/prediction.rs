@@ -13,7 +13,8 @@ use sabine_acoustics::{Air, EnergyDecayCurve, Estimate, Material, NoReading, Pat
 /// Early sound ends this long after the direct sound, in seconds (ISO 3382-1, A.2.3: speech).
 const EARLY_S: f64 = 0.05;
 
-/// What is predicted for one source and receiver; standard errors are those of the paths (Monte Carlo).
+/// One side of a [`PredictedChange`], or the difference of both; standard errors are those of the paths (Monte Carlo). For a single
+/// set of materials `sabine_acoustics::PathParameters` reads more.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RoomPrediction {
     /// Reverberation time over -5 to -35 dB of the decay curve, in seconds.
@@ -34,16 +35,6 @@ pub struct PredictedChange {
     /// After less before. As both are read from the same paths, their errors partly cancel: the standard error of the
     /// difference is smaller than those of its parts suggest.
     pub difference: RoomPrediction,
-}
-
-impl RoomPrediction {
-    /// Reads what `paths` say with `materials`, without tracing again.
-    ///
-    /// # Errors
-    /// For paths and materials that do not belong together.
-    pub fn new(paths: &PathSet, materials: &[Material], air: &Air) -> Result<Self, Error> {
-        Ok(PredictedChange::new(paths, materials, materials, air)?.before)
-    }
 }
 
 impl PredictedChange {

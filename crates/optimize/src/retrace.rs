@@ -3,7 +3,7 @@
 use crate::fitter::Trace;
 use crate::objective::check_paths;
 use crate::prediction::t60_of_traces;
-use crate::{AbsorptionPrior, Error, MaterialFit, MaterialFitter};
+use crate::{AbsorptionPrior, Error, MaterialFit, MaterialFitter, Unreachable, UnreachableReason};
 use sabine_acoustics::{Air, Estimate, Material, Observer, OctaveBands, PathSet, PerBand, Reading, report};
 use std::time::Instant;
 
@@ -194,8 +194,11 @@ impl MaterialFitter {
         loop {
             rounds += 1;
             report(observer, STAGE, rounds as u64 - 1, config.max_rounds as u64)?;
-            let fit =
+            let mut fit =
                 clock.fitting(|| self.fit_traces(&pool.shares(), materials, priors, air, &aim, observer))?;
+            for unreachable in &mut fit.unreachable {
+                unreachable.as_read(&aim, &target);
+            }
             let last = rounds == config.max_rounds;
             let wanted = fit.effort_for(config.t60_error, pool.effort()).min(largest_effort);
             if wanted > WORTHWHILE * pool.effort() && !last {
@@ -274,6 +277,25 @@ impl MaterialFit {
                 effort * (relative / t60_error).powi(2)
             });
         needed.fold(1.0, f64::max)
+    }
+}
+
+impl Unreachable {
+    /// Names the target itself where the aim was another, and what would be read with the closest that was reached.
+    fn as_read(&mut self, aim: &PerBand<Estimate>, target: &PerBand<Estimate>) {
+        let (Some(aim), Some(target)) = (aim.at_hz(self.band_hz), target.at_hz(self.band_hz)) else { return };
+        let factor = target.value / aim.value;
+        match &mut self.reason {
+            UnreachableReason::AirLimit { limit_s: reached_s, target_s }
+            | UnreachableReason::AbsorptionAtUpperBound { reached_s, target_s }
+            | UnreachableReason::AbsorptionAtLowerBound { reached_s, target_s }
+            | UnreachableReason::AllHeld { reached_s, target_s }
+            | UnreachableReason::NothingCloser { reached_s, target_s } => {
+                *reached_s *= factor;
+                *target_s = target.value;
+            }
+            UnreachableReason::NoEnergy => {}
+        }
     }
 }
 

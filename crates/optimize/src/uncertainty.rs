@@ -34,26 +34,18 @@ impl Spread {
         relative_error: &[f64],
         bounds: (f64, f64),
     ) -> Self {
-        let free = group.free();
+        let free = &group.unknowns.free;
         let n = free.len();
-        let zeros = || -> Vec<Vec<f64>> { bands.iter().map(|b| vec![0.0; b.mean.len()]).collect() };
+        let zeros = || -> Vec<Vec<f64>> { bands.iter().map(|b| vec![0.0; b.prior.materials()]).collect() };
         let mut spread = Self {
             standard_error: zeros(),
             remaining: zeros(),
-            shows: bands.iter().map(|b| vec![false; b.mean.len()]).collect(),
+            shows: bands.iter().map(|b| vec![false; b.prior.materials()]).collect(),
             data: vec![false; bands.len()],
         };
 
-        let mut precision = DMatrix::<f64>::identity(n, n);
-        for &(low, high) in group.neighbours() {
-            let s = group.smoothness();
-            precision[(low, low)] += s;
-            precision[(high, high)] += s;
-            precision[(low, high)] -= s;
-            precision[(high, low)] -= s;
-        }
         // Positive definite by construction: a unit matrix and squares.
-        let prior = precision.try_inverse().unwrap_or_else(|| DMatrix::identity(n, n));
+        let prior = group.unknowns.prior_precision().try_inverse().unwrap_or_else(|| DMatrix::identity(n, n));
 
         // One row for each band with a slope: relative change of T60 by each deviation, and its error.
         let (mut rows, mut movable, mut errors) = (Vec::new(), Vec::new(), Vec::new());
@@ -63,7 +55,11 @@ impl Spread {
             spread.data[b] = true;
             let at = |i: usize| -> f64 {
                 let (of, k) = free[i];
-                if of == b { fitted.gradient[k] / (1.0 + residual) * band.standard_deviation[k] } else { 0.0 }
+                if of == b {
+                    fitted.gradient[k] / (1.0 + residual) * band.prior.standard_deviation[k]
+                } else {
+                    0.0
+                }
             };
             let row = DVector::from_fn(n, |i, _| at(i));
             let fixed = |i: usize| {
@@ -95,7 +91,7 @@ impl Spread {
         let covariance = &left * &prior * left.transpose() + &gain * noise * gain.transpose();
         for (i, &(b, k)) in free.iter().enumerate() {
             let variance = covariance[(i, i)];
-            spread.standard_error[b][k] = bands[b].standard_deviation[k] * variance.sqrt();
+            spread.standard_error[b][k] = bands[b].prior.standard_deviation[k] * variance.sqrt();
             spread.remaining[b][k] = variance / prior[(i, i)];
         }
         spread

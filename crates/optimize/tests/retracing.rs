@@ -114,6 +114,34 @@ fn what_is_read_in_the_end_meets_the_target() {
 }
 
 #[test]
+fn a_target_out_of_reach_is_named_as_it_was_asked_for() {
+    // At 8 kHz air alone ends the decay long before 20 s; what is read is a tenth longer than what is fitted.
+    let listener = Longer(AtomicUsize::new(0));
+    let materials = vec![Material::uniform(OCTAVES, 0.1, 0.5).unwrap(); 3];
+    let priors = [0.05, 0.3, 0.8].map(|mean| AbsorptionPrior::uniform(OCTAVES, mean, 0.001));
+    let targets = PerBand::uniform(OCTAVES, Estimate::exact(0.1));
+    let bounds = (0.005, 0.7);
+    let found = MaterialFitter::new(FitConfig { bounds, ..FitConfig::default() })
+        .unwrap()
+        .fit_t60_retracing(
+            &listener,
+            &materials,
+            &priors,
+            &Air::default(),
+            &targets,
+            &RetraceConfig { max_effort: 4.0, ..RetraceConfig::default() },
+            &(),
+        )
+        .unwrap();
+    assert_eq!(found.fit.unreachable.len(), OCTAVES.len());
+    for (unreachable, read) in found.fit.unreachable.iter().zip(found.read_t60_s.values()) {
+        let text = unreachable.to_string();
+        assert!(text.contains("target of 0.10 s"), "{text}");
+        assert!(read.clone().unwrap().value > 0.1);
+    }
+}
+
+#[test]
 fn settings_out_of_range_and_a_tracer_that_fails() {
     let good = RetraceConfig::default;
     for (name, config) in [

@@ -1,0 +1,170 @@
+//! The most probable materials, given measured responses.
+
+use crate::bounded::minimise;
+use crate::response_band::{BandResponse, ResponseBand};
+use crate::response_expansion::ResponseExpansion;
+use crate::uncertainty::Spread;
+use crate::unknowns::Unknowns;
+use crate::{Error, FitConfig};
+use sabine_acoustics::Objective;
+
+/// Most times that the bins are weighed anew.
+const WEIGHINGS: usize = 40;
+/// Most expansions between two weighings.
+const STEPS: usize = 40;
+/// Change of any material from one weighing to the next, in standard deviations of its prior, below which it has settled.
+const SETTLED: f64 = 0.005;
+/// Gain in log-probability that is not worth a step: it moves an answer by a thousandth of its standard error.
+const NEGLIGIBLE: f64 = 1e-5;
+/// A step is taken if the paths gain this share of what the expansion promised, and the next may be longer if they gain
+/// that much (Nocedal and Wright 2006, algorithm 4.1).
+const TAKEN: f64 = 0.1;
+const LONGER: f64 = 0.75;
+const SHORTER: f64 = 0.25;
+
+/// Where the fit of bands that were solved together ended.
+pub(crate) struct Solved {
+    /// By band and material.
+    pub absorption: Vec<Vec<f64>>,
+    pub spread: Spread,
+    /// Gain of each response of each band in dB.
+    pub gains_db: Vec<Vec<(usize, f64)>>,
+    /// `None` in a band without data.
+    pub dispersion: Vec<Option<f64>>,
+    pub prior_cost: f64,
+    pub iterations: usize,
+    /// Change of the materials in the last round, in standard deviations, if it has not settled.
+    pub unsettled: Option<f64>,
+}
+
+/// Minimises priors plus half the deviance over the dispersion.
+///
+/// Two things are solved for in turn. With the weights of the bins and the dispersions held, a trust-region method: the paths
+/// are expanded about the present materials, L-BFGS-B finds the minimum of the expansion within reach, the paths say
+/// what that is worth, and the reach grows or shrinks by how well the expansion foretold it; until nothing more is promised. Then weights
+/// and dispersions are taken anew, until the materials stay where they are: the iteratively reweighted fit of a generalised linear
+/// model (McCullagh and Nelder 1989, section 2.5).
+pub(crate) fn solve(bands: &[ResponseBand<'_>], config: &FitConfig) -> Result<Solved, Error> {
+    let unknowns = Unknowns::new(bands.iter().map(|b| &b.prior).collect(), config);
+    let expand = |x: &[f64]| -> Vec<ResponseExpansion<'_>> {
+        let absorption = unknowns.absorption(x);
+        bands
+            .iter()
+            .zip(absorption)
+            .map(|(band, a)| ResponseExpansion::about(band, &a, config.reflection_error))
+            .collect()
+    };
+    let mut x = unknowns.start();
+    let mut expansions = expand(&x);
+    // Far from the answer everything is badly explained, which says nothing of how well it will be.
+    let mut dispersion = vec![1.0; bands.len()];
+    let (mut iterations, mut unsettled) = (0, Some(f64::INFINITY));
+    for _ in 0..WEIGHINGS {
+        let before = x.clone();
+        iterations += descend(&unknowns, &mut x, &mut expansions, &dispersion, config)?;
+        let moved = unknowns.distance(&before, &x);
+        expansions = expand(&x);
+        let absorption = unknowns.absorption(&x);
+        dispersion = expansions.iter().zip(&absorption).map(|(e, a)| e.dispersion(a)).collect();
+        unsettled = Some(moved);
+        if moved < SETTLED {
+            unsettled = None;
+            break;
+        }
+    }
+    let absorption = unknowns.absorption(&x);
+    let spread = Spread::of_responses(&unknowns, &expansions, &absorption, &dispersion, config.bounds);
+    let gains_db = expansions.iter().zip(&absorption).map(|(e, a)| gains_db(e, a)).collect();
+    let prior_cost = unknowns.prior_cost(&x, &mut vec![0.0; x.len()]);
+    let dispersion = dispersion.iter().zip(&expansions).map(|(d, e)| (!e.bins.is_empty()).then_some(*d));
+    let dispersion = dispersion.collect();
+    Ok(Solved { absorption, spread, gains_db, dispersion, prior_cost, iterations, unsettled })
+}
+
+/// The trust-region method with weights and dispersions held; moves `x` and the expansions, and counts the solver's iterations.
+fn descend(
+    unknowns: &Unknowns<'_>,
+    x: &mut Vec<f64>,
+    expansions: &mut Vec<ResponseExpansion<'_>>,
+    dispersion: &[f64],
+    config: &FitConfig,
+) -> Result<usize, Error> {
+    let (mut reach, mut iterations) = (f64::INFINITY, 0);
+    for _ in 0..STEPS {
+        let cost = Likelihood { unknowns, expansions, dispersion };
+        let scratch = &mut vec![0.0; x.len()];
+        let here = cost.value_and_gradient(x, scratch);
+        let lower: Vec<f64> = unknowns.lower.iter().zip(&*x).map(|(l, x)| l.max(x - reach)).collect();
+        let upper: Vec<f64> = unknowns.upper.iter().zip(&*x).map(|(u, x)| u.min(x + reach)).collect();
+        let minimum = minimise(&cost, x, &lower, &upper, config.max_iterations)?;
+        iterations += minimum.iterations;
+        let promised = here - minimum.cost;
+        if promised.is_nan() || promised <= NEGLIGIBLE {
+            break;
+        }
+        let absorption = unknowns.absorption(&minimum.x);
+        let moved: Option<Vec<ResponseExpansion<'_>>> = expansions
+            .iter()
+            .zip(&absorption)
+            .map(|(expansion, a)| expansion.moved_to(a, config.reflection_error))
+            .collect();
+        let gained = moved.as_ref().map_or(f64::NEG_INFINITY, |moved| {
+            here - Likelihood { unknowns, expansions: moved, dispersion }
+                .value_and_gradient(&minimum.x, scratch)
+        });
+        let step = x.iter().zip(&minimum.x).fold(0.0, |w: f64, (from, to)| w.max((to - from).abs()));
+        let kept = gained / promised;
+        if kept > LONGER {
+            reach = reach.max(2.0 * step);
+        } else if kept < SHORTER || kept.is_nan() {
+            reach = 0.25 * step;
+        }
+        if let Some(moved) = moved.filter(|_| kept > TAKEN) {
+            *x = minimum.x;
+            *expansions = moved;
+        }
+    }
+    Ok(iterations)
+}
+
+fn gains_db(expansion: &ResponseExpansion<'_>, absorption: &[f64]) -> Vec<(usize, f64)> {
+    let gains = expansion.log_gains(absorption);
+    let of = |(place, response): (usize, &BandResponse<'_>)| {
+        let bin = expansion.bins.iter().find(|b| b.place == place)?;
+        Some((response.index, crate::decay::DB_PER_NEPER * bin.group.map_or(0.0, |g| gains[g])))
+    };
+    expansion.band.responses.iter().enumerate().filter_map(of).collect()
+}
+
+/// Cost of bands that are solved together: priors, smoothness, and half the deviances divided by the dispersions.
+struct Likelihood<'f, 'b> {
+    unknowns: &'f Unknowns<'f>,
+    expansions: &'f [ResponseExpansion<'b>],
+    dispersion: &'f [f64],
+}
+
+impl Objective for Likelihood<'_, '_> {
+    fn dimension(&self) -> usize {
+        self.unknowns.len()
+    }
+
+    fn value_and_gradient(&self, x: &[f64], gradient: &mut [f64]) -> f64 {
+        let absorption = self.unknowns.absorption(x);
+        let mut cost = self.unknowns.prior_cost(x, gradient);
+        let mut by_absorption = Vec::with_capacity(self.expansions.len());
+        for ((expansion, a), dispersion) in self.expansions.iter().zip(&absorption).zip(self.dispersion) {
+            let mut by = vec![0.0; a.len()];
+            cost += expansion.cost(a, &mut by) / dispersion;
+            by.iter_mut().for_each(|g| *g /= dispersion);
+            by_absorption.push(by);
+        }
+        for (i, g) in gradient.iter_mut().enumerate() {
+            let (b, k) = self.unknowns.free[i];
+            *g += by_absorption[b][k] * self.unknowns.by_variable(i, x);
+        }
+        cost
+    }
+}
+
+#[cfg(test)]
+mod tests;
