@@ -19,6 +19,8 @@ const SILENCE: f64 = 1e-9;
 const FREE_GAIN_DB: f64 = 40.0;
 /// Step of differences, in prior standard deviations (or logarithms of energy).
 const STEP: f64 = 1e-4;
+/// Starts that are followed to their top.
+const MOST_STARTS: usize = 2;
 /// Bounds of absorption.
 pub(crate) const ABSORPTION: (f64, f64) = (0.002, 0.98);
 
@@ -407,8 +409,13 @@ pub(crate) fn fit(
             })
             .collect();
     }
+    // Only the most promising starts are followed.
+    let mut ranked: Vec<(f64, Vec<f64>)> =
+        starts.into_iter().map(|x| (model.log_likelihood(&x, None), x)).collect();
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    ranked.truncate(MOST_STARTS);
     let mut best: Option<Maximum> = None;
-    for start in starts {
+    for (_, start) in ranked {
         let found = maximise(&model, &start, "decays")?;
         if best.as_ref().is_none_or(|b| found.log_evidence > b.log_evidence) {
             best = Some(found);

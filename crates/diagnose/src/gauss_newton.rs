@@ -39,6 +39,7 @@ pub(crate) struct Maximum {
     pub covariance: DMatrix<f64>,
     /// Logarithm of the probability of the data, the parameters integrated out (Laplace: MacKay 2003, chapter 27).
     pub log_evidence: f64,
+    /// Whether the search came to rest; else it took what it had.
     pub settled: bool,
 }
 
@@ -48,9 +49,11 @@ impl Maximum {
     }
 }
 
-const MOST_STEPS: usize = 60;
-/// A step shorter than this many prior or posterior standard deviations ends the search.
-const SETTLED: f64 = 1e-3;
+const MOST_STEPS: usize = 40;
+/// A step shorter than this many prior standard deviations ends the search ...
+const SETTLED: f64 = 0.02;
+/// ... if it gains less than this, in nats.
+const GAIN_NATS: f64 = 0.02;
 
 /// Levenberg-Marquardt on the log-posterior within bounds.
 pub(crate) fn maximise(model: &dyn Model, start: &[f64], what: &'static str) -> Result<Maximum, Error> {
@@ -113,7 +116,7 @@ pub(crate) fn maximise(model: &dyn Model, start: &[f64], what: &'static str) -> 
         };
         x = next;
         likelihood = fill(model, &x, &mut slopes);
-        if length < SETTLED && gain < 1e-3 {
+        if length < SETTLED && gain < GAIN_NATS {
             settled = true;
             break;
         }

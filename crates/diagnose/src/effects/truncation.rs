@@ -13,7 +13,7 @@ pub struct Truncation;
 /// Energy that a cut leaves: rounding.
 const LEFT: f64 = 1e-9;
 /// Points within a bin at which the fade is averaged.
-const POINTS: usize = 8;
+const POINTS: usize = 4;
 
 impl Effect for Truncation {
     fn id(&self) -> &'static str {
