@@ -5,6 +5,7 @@ use crate::diagnosis::{
     LackOfFit, ResidualCell, Verdict,
 };
 use crate::effect::{Case, Effect, Evidence, Nuisance};
+use crate::energy_model::Before;
 use crate::isolability::{isolability, would_decide};
 use crate::lack_of_fit;
 use crate::prediction::{Compared, Errors, compare, decay_db};
@@ -113,13 +114,13 @@ impl Diagnoser {
         let search = Search::new(&bench, &cases, self.effects.len(), used.clone());
         let base = search.state(&[], None)?;
         let state = search.state(&found.chosen, Some(&base))?;
-        let lack_before = lack_of_fit::test(&bench, &[], &base.energy, &used)?;
+        let lack_before = lack_of_fit::test(&bench, &[], base.before(), &used)?;
         report(observer, "lack of fit", 1, 2)?;
         let energy_cases = search.cases_of(&state.chosen, Evidence::Energy);
         let lack_after = if state.chosen.is_empty() {
             None
         } else {
-            Some(lack_of_fit::test(&bench, &energy_cases, &state.energy, &used)?)
+            Some(lack_of_fit::test(&bench, &energy_cases, state.before(), &used)?)
         };
         let lack_after = lack_after.as_ref().unwrap_or(&lack_before);
         let free_alone = base.energy.log_evidence + lack_before.discrepancy_nats;
@@ -490,7 +491,7 @@ impl Folds {
             .par_iter()
             .map(|(used, pairs)| {
                 let before = search.bench.fit_energy(&[], used, None)?.0;
-                let after = search.bench.fit_energy(&cases, used, Some(&before.values))?.0;
+                let after = search.bench.fit_energy(&cases, used, Some(state.before()))?.0;
                 Ok(decays_of(search.bench, pairs, (&[], &before.values), (&cases, &after.values), true))
             })
             .collect::<Result<_, Error>>()?;
@@ -537,8 +538,10 @@ fn predict(
                 let mut cases = search.cases_of(chosen, Evidence::Energy);
                 cases.extend(free);
                 let arrivals = search.cases_of(chosen, Evidence::Arrivals);
-                let fitted = bench.fit_energy(&cases, used, Some(&state.energy.values))?.0;
-                let with = bench.fit_energy(&cases, &whole, Some(&state.energy.values))?.0;
+                let firsts: &[usize] = if *chosen == *state.chosen { &state.energy_firsts } else { &[] };
+                let before = Before { values: &state.energy.values, firsts };
+                let fitted = bench.fit_energy(&cases, used, Some(before))?.0;
+                let with = bench.fit_energy(&cases, &whole, Some(before))?.0;
                 let energy = with.log_evidence - fitted.log_evidence;
                 let times = bench.fit_arrivals(&arrivals, &whole)?.0.log_evidence
                     - bench.fit_arrivals(&arrivals, used)?.0.log_evidence;

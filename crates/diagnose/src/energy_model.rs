@@ -384,20 +384,27 @@ impl Model for EnergyModel<'_> {
     }
 }
 
+/// An earlier fit to start from: its values, and where the parameters of its cases stand; they are the first cases of the new one.
+#[derive(Clone, Copy)]
+pub(crate) struct Before<'a> {
+    pub values: &'a [f64],
+    pub firsts: &'a [usize],
+}
+
 /// The best of the fits from all starts, and where the parameters of each case stand, in the order of `cases`.
 pub(crate) fn fit(
     data: &EnergyData<'_>,
     cases: &[&dyn Case],
     used: &[bool],
-    before: Option<&[f64]>,
+    before: Option<Before<'_>>,
 ) -> Result<(Maximum, Vec<usize>), Error> {
     let model = EnergyModel::new(data, cases, used);
-    let mut starts: Vec<Vec<f64>> = vec![model.start(before)];
-    // The last case is the new one: all its starts; the first of the others, or what they had before.
+    let mut starts: Vec<Vec<f64>> = vec![model.start(before.map(|b| b.values))];
     for (order, case) in cases.iter().enumerate() {
         let first = model.first_of(order);
-        let mut options = case.starts(data.survey);
-        options.truncate(if order + 1 < cases.len() { 1 } else { options.len() });
+        let count = case.parameters(data.survey).len();
+        let known = before.and_then(|b| b.values.get(*b.firsts.get(order)?..)?.get(..count));
+        let options = known.map_or_else(|| case.starts(data.survey), |known| vec![known.to_vec()]);
         starts = options
             .iter()
             .flat_map(|option| {

@@ -2,8 +2,7 @@
 
 use crate::Error;
 use crate::effect::Case;
-use crate::energy_model::BinResidual;
-use crate::gauss_newton::Maximum;
+use crate::energy_model::{Before, BinResidual};
 use crate::measured::Measured;
 use crate::workbench::Workbench;
 use rand::SeedableRng;
@@ -29,25 +28,25 @@ pub(crate) struct Lack {
 pub(crate) fn test(
     bench: &Workbench,
     cases: &[&dyn Case],
-    fitted: &Maximum,
+    fitted: Before<'_>,
     used: &[bool],
 ) -> Result<Lack, Error> {
     let free = bench.free_discrepancy();
     let gain = |measured: &[Measured]| -> Result<(f64, f64), Error> {
-        let base = bench.fit_energy_to(measured, cases, used, Some(&fitted.values))?;
+        let base = bench.fit_energy_to(measured, cases, used, Some(fitted))?;
         let mut all = cases.to_vec();
         all.push(&free as &dyn Case);
-        let more = bench.fit_energy_to(measured, &all, used, Some(&fitted.values))?;
+        let more = bench.fit_energy_to(measured, &all, used, Some(fitted))?;
         Ok((more.log_likelihood - base.log_likelihood, more.log_evidence - base.log_evidence))
     };
     let (found, discrepancy_nats) = gain(&bench.measured)?;
     let simulated: Vec<f64> = (0..bench.config.simulations as u64)
         .into_par_iter()
-        .map(|i| Ok(gain(&simulate(bench, cases, &fitted.values, i))?.0))
+        .map(|i| Ok(gain(&simulate(bench, cases, fitted.values, i))?.0))
         .collect::<Result<_, Error>>()?;
     let smooth = upper_tail(found, &simulated);
     let pairs: Vec<usize> = (0..used.len()).filter(|&p| used[p]).collect();
-    let residuals = bench.residuals(cases, &fitted.values, &pairs);
+    let residuals = bench.residuals(cases, fitted.values, &pairs);
     let odd = odd_bins(&residuals, bench.survey.bands.len());
     let p_odd = poisson_tail(odd, ODD_BY_CHANCE);
     Ok(Lack { p_value: (2.0 * smooth.min(p_odd)).min(1.0), discrepancy_nats })

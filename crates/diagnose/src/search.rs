@@ -1,6 +1,7 @@
 //! Which causes the data speak for.
 
 use crate::effect::{Case, Effect, Evidence};
+use crate::energy_model::Before;
 use crate::gauss_newton::Maximum;
 use crate::workbench::Workbench;
 use crate::Error;
@@ -42,6 +43,11 @@ pub(crate) struct State {
 }
 
 impl State {
+    /// The fit of the decays as a start for one with more cases.
+    pub fn before(&self) -> Before<'_> {
+        Before { values: &self.energy.values, firsts: &self.energy_firsts }
+    }
+
     /// Place of a response's gain among the values of the decays.
     pub fn energy_gain(&self, search: &Search<'_>, response: usize) -> usize {
         let survey = &search.bench.survey;
@@ -85,7 +91,7 @@ impl<'a> Search<'a> {
     }
 
     pub fn state(&self, chosen: &[usize], near: Option<&State>) -> Result<State, Error> {
-        let before = near.map(|s| &s.energy.values[..]);
+        let before = near.map(|s| Before { values: &s.energy.values, firsts: &[] });
         let cases = self.cases_of(chosen, Evidence::Energy);
         let (energy, energy_firsts) = self.bench.fit_energy(&cases, &self.used, before)?;
         let cases = self.cases_of(chosen, Evidence::Arrivals);
@@ -109,7 +115,7 @@ impl<'a> Search<'a> {
         if evidence != Evidence::Arrivals && !turned {
             let cases = self.cases_of(&next.chosen, Evidence::Energy);
             (next.energy, next.energy_firsts) =
-                self.bench.fit_energy(&cases, &self.used, Some(&state.energy.values))?;
+                self.bench.fit_energy(&cases, &self.used, Some(state.before()))?;
         }
         if evidence != Evidence::Energy && !turned {
             let cases = self.cases_of(&next.chosen, Evidence::Arrivals);

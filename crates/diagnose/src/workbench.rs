@@ -3,7 +3,7 @@
 use crate::arrival_model::{self, ArrivalData};
 use crate::discrepancy::FreeDiscrepancy;
 use crate::effect::Case;
-use crate::energy_model::{self, ABSORPTION, BinResidual, EnergyData, EnergyModel};
+use crate::energy_model::{self, ABSORPTION, Before, BinResidual, EnergyData, EnergyModel};
 use crate::gauss_newton::{Maximum, Prior};
 use crate::kernel::BandKernel;
 use crate::measured::{Measured, PEAKS_S};
@@ -263,7 +263,7 @@ impl Workbench {
         &self,
         cases: &[&dyn Case],
         used: &[bool],
-        before: Option<&[f64]>,
+        before: Option<Before<'_>>,
     ) -> Result<(Maximum, Vec<usize>), Error> {
         energy_model::fit(&self.energy_data(), cases, used, before)
     }
@@ -345,7 +345,7 @@ impl Workbench {
         measured: &[Measured],
         cases: &[&dyn Case],
         used: &[bool],
-        before: Option<&[f64]>,
+        before: Option<Before<'_>>,
     ) -> Result<Maximum, Error> {
         let data = EnergyData { measured, ..self.energy_data() };
         Ok(energy_model::fit(&data, cases, used, before)?.0)
