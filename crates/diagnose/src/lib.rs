@@ -2,14 +2,18 @@
 mod arrival_model;
 mod bins;
 mod config;
+mod diagnosis;
 mod discrepancy;
 mod effect;
 mod effects;
 mod energy_model;
 mod error;
+mod extended_model;
 mod gauss_newton;
 mod kernel;
 mod measured;
+mod recording_chain;
+mod rendering;
 mod search;
 mod survey;
 mod traced_pair;
@@ -17,9 +21,15 @@ mod views;
 mod workbench;
 
 pub use config::DiagnoseConfig;
+pub use diagnosis::{
+    CandidateScore, Cause, DecayCurves, Diagnosis, FittedMaterial, FoundParameter, HeldOut, HeldOutGain,
+    Isolability, LackOfFit, ResidualCell, Verdict,
+};
 pub use effect::{Case, Effect, Evidence, Nuisance, Parameter, Stage};
 pub use effects::*;
 pub use error::Error;
+pub use extended_model::{CoupledDecay, Dimensions, ExtendedModel};
+pub use rendering::ExtendedRoom;
 pub use survey::{Place, Survey, SurveyedResponse};
 pub use views::{ArrivalView, BandView};
 
@@ -46,16 +56,31 @@ pub fn draft(room: &sabine_acoustics::MeasuredRoom, config: &DiagnoseConfig) -> 
         let mut e = search.cases_of(&state.chosen, Evidence::Energy);
         e.push(&free);
         let z = bench.fit_energy(&e, &used, Some(&state.energy.values))?.0;
-        eprintln!("state Z {:.1} (E {:.1} A {:.1} P {:.1}) free {:+.1}", state.log_evidence(), state.energy.log_evidence, state.arrivals.log_evidence, state.polarity, z.log_evidence - state.energy.log_evidence);
+        eprintln!(
+            "state Z {:.1} (E {:.1} A {:.1} P {:.1}) free {:+.1}",
+            state.log_evidence(),
+            state.energy.log_evidence,
+            state.arrivals.log_evidence,
+            state.polarity,
+            z.log_evidence - state.energy.log_evidence
+        );
         let scores = search.by_effect(&search.scores(&state, &())?);
         for s in scores.iter().take(8) {
             eprintln!("  {:22} {:8.1} {:?}", s.id, s.nats, search.candidates[s.best].case.subject());
         }
-        if scores[0].nats < search.threshold() || round == 2 { break; }
-        for s in search.rivals(&state, &scores)? { eprintln!("  rival {}", s.id); }
+        if scores[0].nats < search.threshold() || round == 2 {
+            break;
+        }
+        for s in search.rivals(&state, &scores)? {
+            eprintln!("  rival {}", s.id);
+        }
         state = search.with(&state, scores[0].best)?;
         let n = search.candidates[scores[0].best].case.parameters(&bench.survey).len();
-        let m = if search.candidates[scores[0].best].case.evidence() == Evidence::Arrivals { &state.arrivals } else { &state.energy };
+        let m = if search.candidates[scores[0].best].case.evidence() == Evidence::Arrivals {
+            &state.arrivals
+        } else {
+            &state.energy
+        };
         for (i, p) in search.candidates[scores[0].best].case.parameters(&bench.survey).iter().enumerate() {
             let k = m.values.len() - n + i;
             eprintln!("     {} {:.3} +- {:.3} {}", p.name, m.values[k], m.sd(k), p.unit);
