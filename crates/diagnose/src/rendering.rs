@@ -47,6 +47,16 @@ impl ExtendedRoom {
         }
     }
 
+    /// The measured room with this model of it in place of the stated one. Its air is [`ExtendedRoom::air`], in attenuation too;
+    /// patterns of sources, and all that comes after propagation, are left out.
+    ///
+    /// # Errors
+    /// [`Error::Acoustics`] for a room of other materials, sources or receivers than that of the model.
+    pub fn measured_room(&self, stated: &MeasuredRoom) -> Result<MeasuredRoom, Error> {
+        let (sources, receivers) = (self.sources.clone(), self.receivers.clone());
+        Ok(stated.with_model(self.scene.clone(), self.air, sources, receivers)?)
+    }
+
     /// What happens to a response after propagation, which begins at the emission and in which the direct sound at 1 m has
     /// amplitude 1: sound of a coupled volume joins, then gains by octave, noise, clock and latency, truncation, gain and
     /// polarity of the channel. Responses that were exchanged are a matter of names and stay as they are.
