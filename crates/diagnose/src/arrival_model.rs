@@ -69,7 +69,7 @@ impl<'a> ArrivalModel<'a> {
         }
         let mut assignment: Vec<usize> = (0..survey.responses.len()).collect();
         let mut effects = Vec::new();
-        for &case in cases {
+        for (order, &case) in cases.iter().enumerate() {
             for (nuisance, sd) in case.widens() {
                 let first = match nuisance {
                     Nuisance::SourcePosition(i) => 3 * i,
@@ -89,7 +89,7 @@ impl<'a> ArrivalModel<'a> {
                 low: p.bounds.0,
                 high: p.bounds.1,
             }));
-            effects.push(Placed { case, parameters, first });
+            effects.push(Placed { case, parameters, first, order });
         }
         Self { data, effects, priors, used, assignment, first_receiver, first_latency, width_s: None }
     }
@@ -212,17 +212,6 @@ impl<'a> ArrivalModel<'a> {
 
     pub fn by_pair(&self, values: &[f64]) -> Vec<f64> {
         (0..self.assignment.len()).map(|pair| self.pair_likelihood(values, pair, None)).collect()
-    }
-
-    /// Measured less predicted time of each direct sound, by pair.
-    pub fn direct_residuals_s(&self, values: &[f64]) -> Vec<Option<f64>> {
-        (0..self.assignment.len())
-            .map(|pair| {
-                let direct = self.data.arrivals[pair].first()?;
-                let measured = self.data.measured[self.assignment[pair]].direct_s;
-                Some(measured - self.time(values, pair, direct, false).0)
-            })
-            .collect()
     }
 }
 

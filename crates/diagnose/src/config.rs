@@ -3,6 +3,9 @@
 use crate::Error;
 use sabine_propagate::TracerConfig;
 
+/// Specular paths in a cuboid that are predicted exactly.
+const CUBOID_PATHS: usize = 150_000;
+
 /// Settings of [`Diagnoser`](crate::Diagnoser).
 #[derive(Clone, Debug, PartialEq)]
 pub struct DiagnoseConfig {
@@ -75,6 +78,7 @@ impl DiagnoseConfig {
             duration_s,
             seed: self.seed,
             image_order: self.image_order,
+            cuboid_paths: CUBOID_PATHS,
             allow_leaks: self.allow_leaks,
             ..TracerConfig::default()
         }

@@ -4,7 +4,7 @@
 //! the energy of band-limited noise is (Kuttruff, Room Acoustics, 6th ed., 3.5), and the prediction's own Monte-Carlo error makes it wider.
 
 use crate::effect::{Case, Nuisance, Parameter};
-use crate::gauss_newton::{Model, Prior, Slopes};
+use crate::gauss_newton::{Maximum, Model, Prior, Slopes, maximise};
 use crate::measured::Measured;
 use crate::traced_pair::BandState;
 use crate::views::BandView;
@@ -47,6 +47,8 @@ pub(crate) struct Placed<'a> {
     pub case: &'a dyn Case,
     pub parameters: Vec<Parameter>,
     pub first: usize,
+    /// Number of the case, as the caller counts.
+    pub order: usize,
 }
 
 pub(crate) struct EnergyModel<'a> {
@@ -90,11 +92,11 @@ impl<'a> EnergyModel<'a> {
         let first_gain = priors.len();
         let sd = if levels == Levels::PerResponse { FREE_GAIN_DB } else { data.gain_sd_db };
         priors.extend(survey.responses.iter().map(|_| Prior::normal(0.0, sd)));
-        let mut ordered: Vec<&dyn Case> = cases.to_vec();
-        ordered.sort_by_key(|c| c.stage());
+        let mut ordered: Vec<(usize, &dyn Case)> = cases.iter().copied().enumerate().collect();
+        ordered.sort_by_key(|(_, c)| c.stage());
         let mut assignment: Vec<usize> = (0..survey.responses.len()).collect();
         let mut effects = Vec::new();
-        for case in ordered {
+        for (order, case) in ordered {
             for (nuisance, sd) in case.widens() {
                 match nuisance {
                     Nuisance::Absorption(material) => {
@@ -120,7 +122,7 @@ impl<'a> EnergyModel<'a> {
                 low: p.bounds.0,
                 high: p.bounds.1,
             }));
-            effects.push(Placed { case, parameters, first });
+            effects.push(Placed { case, parameters, first, order });
         }
         Self { data, effects, priors, used, assignment, common_gain, first_gain }
     }
@@ -144,12 +146,13 @@ impl<'a> EnergyModel<'a> {
         self.first_gain + response
     }
 
-    pub fn common_gain_index(&self) -> Option<usize> {
-        self.common_gain
+    /// Where the parameters of the case with this number start.
+    pub fn first_of(&self, order: usize) -> usize {
+        self.effects.iter().find(|p| p.order == order).map_or(self.priors.len(), |p| p.first)
     }
 
-    pub fn set_prior(&mut self, index: usize, prior: Prior) {
-        self.priors[index] = prior;
+    pub fn common_gain_index(&self) -> Option<usize> {
+        self.common_gain
     }
 
     fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
@@ -167,7 +170,6 @@ impl<'a> EnergyModel<'a> {
         let bands = self.data.survey.bands.len();
         let m = self.data.absorption.len();
         let state = &self.data.states[pair][band];
-        let pairs = m * (m + 1) / 2;
         let shift: Vec<f64> = (0..m)
             .map(|k| ((1.0 - values[k * bands + band]) / (1.0 - self.data.absorption[k][band])).ln())
             .collect();
@@ -176,25 +178,25 @@ impl<'a> EnergyModel<'a> {
             values[self.first_gain + response] + self.common_gain.map_or(0.0, |index| values[index]);
         let mut ln_energy = Vec::with_capacity(count);
         let mut slopes = Vec::with_capacity(count * m);
+        let mut moved = vec![0.0; m];
         for bin in 0..count {
-            let mut sum = state.ln_energy[bin] + gain_db * LN_PER_DB;
-            let covariance = &state.hits_covariance[bin * pairs..(bin + 1) * pairs];
-            let mut moved = state.hits[bin * m..(bin + 1) * m].to_vec();
-            let mut place = 0;
-            for a in 0..m {
-                sum += state.hits[bin * m + a] * shift[a];
-                for b in a..m {
-                    let c = covariance[place];
-                    place += 1;
-                    sum += c * shift[a] * shift[b] * if a == b { 0.5 } else { 1.0 };
-                    moved[a] += c * shift[b];
-                    if a != b {
-                        moved[b] += c * shift[a];
-                    }
-                }
+            let groups = state.groups[bin]..state.groups[bin + 1];
+            let mut energy = 0.0;
+            moved.fill(0.0);
+            for group in groups {
+                let hits = &state.group_hits[group * m..(group + 1) * m];
+                let exponent: f64 = hits.iter().zip(&shift).map(|(n, s)| n * s).sum();
+                let e = state.group_energy[group] * exponent.exp();
+                energy += e;
+                moved.iter_mut().zip(hits).for_each(|(sum, n)| *sum += e * n);
             }
-            ln_energy.push(sum);
-            slopes.extend((0..m).map(|k| -moved[k] / (1.0 - values[k * bands + band])));
+            let sum = energy.ln();
+            moved.iter_mut().for_each(|n| *n /= energy);
+            // What leaks in from other octaves does not change with this octave's absorption.
+            let with_leak = (sum.exp() + state.leak[bin]).ln();
+            let own = (sum - with_leak).exp();
+            ln_energy.push(with_leak + gain_db * LN_PER_DB);
+            slopes.extend((0..m).map(|k| -own * moved[k] / (1.0 - values[k * bands + band])));
         }
         (ln_energy, slopes)
     }
@@ -212,7 +214,7 @@ impl<'a> EnergyModel<'a> {
     }
 
     /// Bins that are compared, and their measured energies.
-    fn compared(&self, pair: usize, band: usize) -> Option<&[f64]> {
+    pub fn compared(&self, pair: usize, band: usize) -> Option<&[f64]> {
         let energies = self.data.measured[self.assignment[pair]].energies[band].as_deref()?;
         let count = self.data.ends[pair][band].min(energies.len());
         (count > 0).then(|| &energies[..count])
@@ -376,48 +378,38 @@ impl Model for EnergyModel<'_> {
     }
 }
 
-/// The best of the fits from all starts of the last case.
+/// The best of the fits from all starts, and where the parameters of each case stand, in the order of `cases`.
 pub(crate) fn fit(
     data: &EnergyData<'_>,
     cases: &[&dyn Case],
     used: &[bool],
     before: Option<&[f64]>,
-    effect_starts: Option<&[f64]>,
-) -> Result<(crate::gauss_newton::Maximum, Vec<usize>), Error> {
+) -> Result<(Maximum, Vec<usize>), Error> {
     let model = EnergyModel::new(data, cases, used);
-    let base = model.start(before);
-    let mut starts: Vec<Vec<f64>> = vec![base.clone()];
-    for (i, placed) in model.effects.iter().enumerate() {
-        let known = effect_starts.filter(|s| s.len() >= base.len());
-        let options = match known {
-            Some(known) => vec![known[placed.first..placed.first + placed.parameters.len()].to_vec()],
-            None => placed.case.starts(data.survey),
-        };
-        // All starts of the effect that has most, the first of the others.
-        let most = model.effects.iter().map(|p| p.case.starts(data.survey).len()).max().unwrap_or(1);
-        if options.len() == most && starts.len() == 1 {
-            starts = options
-                .iter()
-                .map(|o| {
-                    let mut x = starts[0].clone();
-                    x[placed.first..placed.first + o.len()].copy_from_slice(o);
+    let mut starts: Vec<Vec<f64>> = vec![model.start(before)];
+    // The last case is the new one: all its starts; the first of the others, or what they had before.
+    for (order, case) in cases.iter().enumerate() {
+        let first = model.first_of(order);
+        let mut options = case.starts(data.survey);
+        options.truncate(if order + 1 < cases.len() { 1 } else { options.len() });
+        starts = options
+            .iter()
+            .flat_map(|option| {
+                starts.iter().map(move |start| {
+                    let mut x = start.clone();
+                    x[first..first + option.len()].copy_from_slice(option);
                     x
                 })
-                .collect();
-        } else if let Some(o) = options.first() {
-            for x in &mut starts {
-                x[placed.first..placed.first + o.len()].copy_from_slice(o);
-            }
-        }
-        let _ = i;
+            })
+            .collect();
     }
-    let mut best: Option<crate::gauss_newton::Maximum> = None;
+    let mut best: Option<Maximum> = None;
     for start in starts {
-        let found = crate::gauss_newton::maximise(&model, &start, "decays")?;
+        let found = maximise(&model, &start, "decays")?;
         if best.as_ref().is_none_or(|b| found.log_evidence > b.log_evidence) {
             best = Some(found);
         }
     }
-    let firsts = model.effects.iter().map(|p| p.first).collect();
+    let firsts = (0..cases.len()).map(|order| model.first_of(order)).collect();
     best.map(|b| (b, firsts)).ok_or(Error::Singular { what: "decays" })
 }

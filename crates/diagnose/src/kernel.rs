@@ -12,8 +12,13 @@ pub(crate) struct BandKernel {
     cumulative: Vec<f64>,
     half: usize,
     rate_hz: f64,
+    /// Width of the octave.
+    pub bandwidth_hz: f64,
     /// Squared samples of the filtered unit pulse, summed.
     pub energy: f64,
+    /// Share of the energy of a flat spectrum that the filter takes from each octave, its own and its neighbours'; what lies beyond
+    /// the outer octaves counts as theirs.
+    pub shares: Vec<f64>,
     /// Mean squared correlation of two pulses that lie in cells so far apart.
     pub likeness: Vec<f64>,
 }
@@ -27,10 +32,19 @@ impl BandKernel {
         let mut pulse = vec![0.0f32; 2 * half + 1];
         pulse[half] = 1.0;
         let filtered = FilterBank::new(bands, rate_hz)?.analyse(&pulse);
-        Ok(filtered.values().iter().map(|h| Self::new(h, rate, cell_s)).collect())
+        let edges_hz: Vec<f64> = (1..bands.len()).map(|b| bands.edges_hz(b).0).collect();
+        Ok(filtered
+            .values()
+            .iter()
+            .enumerate()
+            .map(|(band, h)| {
+                let (low_hz, high_hz) = bands.edges_hz(band);
+                Self::new(h, rate, cell_s, &edges_hz, high_hz - low_hz)
+            })
+            .collect())
     }
 
-    fn new(pulse: &[f32], rate_hz: f64, cell_s: f64) -> Self {
+    fn new(pulse: &[f32], rate_hz: f64, cell_s: f64, edges_hz: &[f64], bandwidth_hz: f64) -> Self {
         let h: Vec<f64> = pulse.iter().copied().map(f64::from).collect();
         let energy: f64 = h.iter().map(|x| x * x).sum();
         let mut sum = 0.0;
@@ -62,7 +76,8 @@ impl BandKernel {
                     .sum()
             })
             .collect();
-        Self { cumulative, half: h.len() / 2, rate_hz, energy, likeness }
+        let shares = octave_shares(h, rate_hz, edges_hz);
+        Self { cumulative, half: reach, rate_hz, bandwidth_hz, energy, shares, likeness }
     }
 
     /// Share of the energy of a pulse at time zero that comes before `time_s`.
@@ -85,6 +100,25 @@ impl BandKernel {
     pub fn reach_s(&self) -> f64 {
         self.half as f64 / self.rate_hz
     }
+}
+
+/// Energy of a pulse response between the edges of the octaves, as shares of the whole.
+fn octave_shares(mut pulse: Vec<f64>, rate_hz: f64, edges_hz: &[f64]) -> Vec<f64> {
+    // Enough zeros that the lowest octave has many lines.
+    pulse.resize((2 * pulse.len()).next_power_of_two(), 0.0);
+    let size = pulse.len() as f64;
+    let forward = realfft::RealFftPlanner::<f64>::new().plan_fft_forward(pulse.len());
+    let mut lines = forward.make_output_vec();
+    // The plan made the buffer: the lengths agree.
+    let _ = forward.process(&mut pulse, &mut lines);
+    let mut shares = vec![0.0; edges_hz.len() + 1];
+    for (i, line) in lines.iter().enumerate() {
+        let hz = i as f64 * rate_hz / size;
+        shares[edges_hz.partition_point(|&edge| edge <= hz)] += line.norm_sqr();
+    }
+    let sum: f64 = shares.iter().sum();
+    shares.iter_mut().for_each(|s| *s /= sum);
+    shares
 }
 
 #[cfg(test)]
@@ -110,5 +144,15 @@ mod tests {
         let integral: f64 = 1e-3 * (kernel.likeness[0] + 2.0 * kernel.likeness[1..].iter().sum::<f64>());
         let (low, high) = bands.edges_hz(0);
         assert!((integral * 2.0 * (high - low) - 1.0).abs() < 0.25, "{integral}");
+    }
+
+    #[test]
+    fn most_of_an_octave_is_its_own() {
+        let bands = OctaveBands::T60;
+        for (band, kernel) in BandKernel::all(bands, 48000, 1e-3).unwrap().iter().enumerate() {
+            assert!(kernel.shares[band] > 0.85, "{:?}", kernel.shares);
+            assert!((kernel.shares.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            assert!(kernel.shares.iter().enumerate().all(|(b, s)| b.abs_diff(band) < 2 || *s < 1e-3));
+        }
     }
 }

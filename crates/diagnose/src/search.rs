@@ -3,7 +3,7 @@
 use crate::effect::{Case, Effect, Evidence};
 use crate::gauss_newton::Maximum;
 use crate::workbench::Workbench;
-use crate::{Error};
+use crate::Error;
 use rayon::prelude::*;
 use sabine_acoustics::{Observer, report};
 
@@ -36,9 +36,19 @@ pub(crate) struct State {
     pub energy: Maximum,
     pub arrivals: Maximum,
     pub polarity: f64,
+    /// Where the parameters of each chosen case that bears on decays start, and of each that bears on arrivals.
+    pub energy_firsts: Vec<usize>,
+    pub arrival_firsts: Vec<usize>,
 }
 
 impl State {
+    /// Place of a response's gain among the values of the decays.
+    pub fn energy_gain(&self, search: &Search<'_>, response: usize) -> usize {
+        let survey = &search.bench.survey;
+        let common = usize::from(survey.measurement.levels == sabine_acoustics::Levels::Common);
+        search.bench.priors.len() * survey.bands.len() + common + response
+    }
+
     pub fn log_evidence(&self) -> f64 {
         self.energy.log_evidence + self.arrivals.log_evidence + self.polarity
     }
@@ -76,10 +86,12 @@ impl<'a> Search<'a> {
 
     pub fn state(&self, chosen: &[usize], near: Option<&State>) -> Result<State, Error> {
         let before = near.map(|s| &s.energy.values[..]);
-        let (energy, _) = self.bench.fit_energy(&self.cases_of(chosen, Evidence::Energy), &self.used, before)?;
-        let (arrivals, _) = self.bench.fit_arrivals(&self.cases_of(chosen, Evidence::Arrivals), &self.used)?;
+        let cases = self.cases_of(chosen, Evidence::Energy);
+        let (energy, energy_firsts) = self.bench.fit_energy(&cases, &self.used, before)?;
+        let cases = self.cases_of(chosen, Evidence::Arrivals);
+        let (arrivals, arrival_firsts) = self.bench.fit_arrivals(&cases, &self.used)?;
         let polarity = self.bench.polarity(&self.all_cases(chosen), &self.used);
-        Ok(State { chosen: chosen.to_vec(), energy, arrivals, polarity })
+        Ok(State { chosen: chosen.to_vec(), energy, arrivals, polarity, energy_firsts, arrival_firsts })
     }
 
     pub fn all_cases(&self, chosen: &[usize]) -> Vec<&'a dyn Case> {
@@ -96,11 +108,12 @@ impl<'a> Search<'a> {
         let turned = case.inverted().is_some();
         if evidence != Evidence::Arrivals && !turned {
             let cases = self.cases_of(&next.chosen, Evidence::Energy);
-            next.energy = self.bench.fit_energy(&cases, &self.used, Some(&state.energy.values))?.0;
+            (next.energy, next.energy_firsts) =
+                self.bench.fit_energy(&cases, &self.used, Some(&state.energy.values))?;
         }
         if evidence != Evidence::Energy && !turned {
-            next.arrivals =
-                self.bench.fit_arrivals(&self.cases_of(&next.chosen, Evidence::Arrivals), &self.used)?.0;
+            let cases = self.cases_of(&next.chosen, Evidence::Arrivals);
+            (next.arrivals, next.arrival_firsts) = self.bench.fit_arrivals(&cases, &self.used)?;
         }
         if turned {
             next.polarity = self.bench.polarity(&self.all_cases(&next.chosen), &self.used);
@@ -215,7 +228,7 @@ impl<'a> Search<'a> {
     /// Drops chosen candidates that the others have made superfluous.
     pub fn backward(&self, mut state: State) -> Result<State, Error> {
         loop {
-            let mut weakest: Option<(f64, State, f64)> = None;
+            let mut weakest: Option<(f64, State)> = None;
             if state.chosen.len() < 2 {
                 return Ok(state);
             }
@@ -224,11 +237,11 @@ impl<'a> Search<'a> {
                 let without = self.state(&rest, Some(&state))?;
                 let nats = state.log_evidence() - without.log_evidence() - self.price(candidate);
                 if weakest.as_ref().is_none_or(|w| nats < w.0) {
-                    weakest = Some((nats, without, nats));
+                    weakest = Some((nats, without));
                 }
             }
             match weakest {
-                Some((nats, without, _)) if nats < self.threshold() => state = without,
+                Some((nats, without)) if nats < self.threshold() => state = without,
                 _ => return Ok(state),
             }
         }

@@ -1,9 +1,11 @@
 //! Traced paths between one source and one receiver, and the energies that they predict.
 
 use crate::bins::Bins;
+use crate::hit_groups;
 use crate::kernel::BandKernel;
 use rayon::prelude::*;
 use sabine_acoustics::{Air, Conditions, Error, Material, OctaveBands, PathSet, PerBand};
+use std::collections::BTreeMap;
 
 /// Width of the cells in which sampled paths are gathered, in seconds.
 pub(crate) const CELL_S: f64 = 1e-3;
@@ -13,6 +15,14 @@ pub(crate) const SCATTERING_GRID: [f64; 8] = [-1.0, -0.5, 0.0, 0.1, 0.25, 0.45, 
 const NO_EXTRA: usize = 2;
 /// What the model itself may be off by, as a share of a bin's energy: a single early pulse is never predicted better.
 const MODEL_SD: f64 = 0.07;
+/// Within so long after the direct sound, in units of one over the bandwidth, single reflections add to it or take from it ...
+const COHERENT_BANDWIDTH_TIMES: f64 = 2.5;
+/// ... with a sign that does not change from place to place as that of later ones does: more than chance, as a share of the energy.
+const COHERENT_SD: f64 = 0.35;
+/// Exact paths keep their very time for so long after the direct sound, in seconds; later ones are gathered in cells.
+const ALONE_S: f64 = 0.04;
+/// A neighbour from which a filter takes less than this share is left out.
+const LEAST_LEAK: f64 = 1e-7;
 /// Energy of a bin without paths, as a share of the strongest: it counts as nothing.
 const NOTHING: f64 = 1e-12;
 
@@ -40,6 +50,8 @@ pub(crate) struct TracedPair {
     departures: Vec<[f32; 3]>,
     /// Time after the direct sound.
     times_s: Vec<f32>,
+    /// Group of like hits that each path belongs to, within its slice of time.
+    groups: Vec<u8>,
 }
 
 /// Predicted energy of one band in time bins, at the materials of the expansion, and how it changes.
@@ -47,10 +59,14 @@ pub(crate) struct TracedPair {
 pub(crate) struct BandState {
     pub bins: Bins,
     pub ln_energy: Vec<f64>,
-    /// Energy-weighted mean number of hits, `[bin * materials + material]`.
-    pub hits: Vec<f64>,
-    /// Their covariance, upper triangle row by row.
-    pub hits_covariance: Vec<f64>,
+    /// Energy that the octave filter lets in from the neighbouring octaves.
+    pub leak: Vec<f64>,
+    /// Groups of paths with like hits: those of bin k are `groups[k]..groups[k + 1]`.
+    pub groups: Vec<usize>,
+    /// Energy of each group.
+    pub group_energy: Vec<f64>,
+    /// Its mean number of hits, `[group * materials + material]`.
+    pub group_hits: Vec<f64>,
     /// Energy-weighted mean time after the direct sound.
     pub time_s: Vec<f64>,
     pub departure: Vec<[f64; 3]>,
@@ -75,7 +91,8 @@ impl BandState {
 }
 
 impl TracedPair {
-    pub fn new(paths: PathSet, ends: [usize; 2], air: Air) -> Self {
+    /// `stated` are the materials as far as they are known: they say which paths matter.
+    pub fn new(paths: PathSet, ends: [usize; 2], air: Air, stated: &[Material]) -> Result<Self, Error> {
         let speed_m_s = air.speed_of_sound_m_s();
         let shortest = paths.lengths_m().iter().copied().fold(f32::INFINITY, f32::min);
         let direct = (0..paths.len()).find(|&i| paths.is_direct(i)).map(|i| paths.lengths_m()[i]);
@@ -89,10 +106,13 @@ impl TracedPair {
             hits.extend(out.iter().zip(back).map(|(a, b)| f32::from(a + b)));
         }
         let departures = (0..paths.len()).map(|i| paths.departure(i).map(|x| x as f32)).collect();
-        let times_s =
+        let times_s: Vec<f32> =
             paths.lengths_m().iter().map(|l| (f64::from(*l) / speed_m_s - direct_s) as f32).collect();
         let [source, receiver] = ends;
-        Self { paths, source, receiver, air, speed_m_s, direct_s, hits, departures, times_s }
+        let energies = paths.energies(stated, &air)?;
+        let weights: Vec<f32> = (0..paths.len()).map(|i| energies.iter().map(|e| e[i]).sum()).collect();
+        let groups = hit_groups::group(&times_s, &weights, &hits, materials);
+        Ok(Self { paths, source, receiver, air, speed_m_s, direct_s, hits, departures, times_s, groups })
     }
 
     /// The exact paths, the shortest first.
@@ -128,8 +148,17 @@ impl TracedPair {
         let mut states: Vec<BandState> = energies
             .par_iter()
             .enumerate()
-            .map(|(band, e)| self.band(e, Bins::new(bands, band), &kernels[band], duration_s))
+            .map(|(band, e)| self.band(band, e, Bins::new(bands, band), &kernels[band], duration_s))
             .collect();
+        for (band, state) in states.iter_mut().enumerate() {
+            let shares = &kernels[band].shares;
+            let mut others = vec![0.0f32; self.paths.len()];
+            for (b, e) in energies.iter().enumerate().filter(|(b, _)| *b != band && shares[*b] > LEAST_LEAK) {
+                let share = shares[b] as f32;
+                others.iter_mut().zip(e).for_each(|(o, e)| *o += share * e);
+            }
+            state.leak = self.sums(&others, state.bins, &kernels[band], duration_s);
+        }
         if scattering {
             let mut table: Vec<Vec<Vec<f64>>> = vec![Vec::new(); bands.len()];
             for (place, &extra) in SCATTERING_GRID.iter().enumerate() {
@@ -147,7 +176,11 @@ impl TracedPair {
                         Some(e) => {
                             let sums = self.sums(&e[band], state.bins, &kernels[band], duration_s);
                             let floor = NOTHING * sums.iter().copied().fold(0.0, f64::max);
-                            sums.iter().zip(&state.ln_energy).map(|(s, l)| s.max(floor).ln() - l).collect()
+                            let own = kernels[band].shares[band].ln();
+                            sums.iter()
+                                .zip(&state.ln_energy)
+                                .map(|(s, l)| own + s.max(floor).ln() - l)
+                                .collect()
                         }
                     });
                 }
@@ -191,7 +224,7 @@ impl TracedPair {
         let mut sums = vec![0.0; count];
         for (i, &e) in energies.iter().enumerate() {
             let (time_s, e) = (f64::from(self.times_s[i]), f64::from(e));
-            if self.paths.is_exact(i) {
+            if time_s < ALONE_S && self.paths.is_exact(i) {
                 Self::shares(time_s, bins, kernel, count, |bin, share| sums[bin] += share * e);
             } else if let Some(c) = cell.get_mut((time_s.max(0.0) / CELL_S) as usize) {
                 *c += e;
@@ -204,21 +237,32 @@ impl TracedPair {
         sums
     }
 
-    fn band(&self, energies: &[f32], bins: Bins, kernel: &BandKernel, duration_s: f64) -> BandState {
+    fn band(
+        &self,
+        band: usize,
+        energies: &[f32],
+        bins: Bins,
+        kernel: &BandKernel,
+        duration_s: f64,
+    ) -> BandState {
         let m = self.paths.materials();
-        let pairs = m * (m + 1) / 2;
-        // Columns: energy, time, departure, its products, hits, products of hits.
-        let columns = 11 + m + pairs;
+        // Of a bin: energy, time, departure, its products. Of a group: energy, hits.
+        const COLUMNS: usize = 11;
+        let width = 1 + m;
         let count = bins.count(duration_s);
         let cells = (duration_s / CELL_S).ceil() as usize + 1;
         let batches = usize::from(PathSet::BATCHES);
-        let mut gathered = vec![0.0f64; cells * columns];
+        let mut gathered = vec![0.0f64; cells * COLUMNS];
+        let mut grouped = vec![0.0f64; cells * hit_groups::MOST * width];
         let mut by_batch = vec![0.0f32; cells * batches];
-        let mut sums = vec![0.0f64; count * columns];
+        let mut sums = vec![0.0f64; count * COLUMNS];
+        // Groups of each bin, by slice of time and number.
+        let mut rows: Vec<BTreeMap<(usize, u8), Vec<f64>>> = vec![BTreeMap::new(); count];
         // For the spread: energy in cells, exact paths included, and squares of the exact ones in each bin.
         let mut all_cells = vec![0.0f64; cells];
         let mut squares = vec![0.0f64; count];
-        let mut row = vec![0.0f64; columns];
+        let mut exact_cells = vec![0.0f64; cells];
+        let mut alone_row = vec![0.0f64; width];
         for (i, &e) in energies.iter().enumerate() {
             let time_s = f64::from(self.times_s[i]);
             let cell = (time_s.max(0.0) / CELL_S) as usize;
@@ -227,38 +271,32 @@ impl TracedPair {
             }
             let e = f64::from(e);
             let exact = self.paths.is_exact(i);
-            let target = if exact {
-                row.fill(0.0);
-                &mut row[..]
-            } else {
-                &mut gathered[cell * columns..(cell + 1) * columns]
-            };
             let [x, y, z] = self.departures[i].map(f64::from);
-            target[0] += e;
-            target[1] += e * time_s;
-            for (k, v) in [x, y, z, x * x, y * y, z * z, x * y, x * z, y * z].into_iter().enumerate() {
-                target[2 + k] += e * v;
-            }
+            let row = [1.0, time_s, x, y, z, x * x, y * y, z * z, x * y, x * z, y * z].map(|v| v * e);
             let hits = &self.hits[i * m..(i + 1) * m];
-            let mut product = 11 + m;
-            for (a, &n) in hits.iter().enumerate() {
-                let en = e * f64::from(n);
-                target[11 + a] += en;
-                for &o in &hits[a..] {
-                    target[product] += en * f64::from(o);
-                    product += 1;
-                }
-            }
+            let group = self.groups[i];
             all_cells[cell] += e;
-            if exact {
+            if exact && time_s < ALONE_S {
+                alone_row[0] = e;
+                alone_row[1..].iter_mut().zip(hits).for_each(|(a, n)| *a = e * f64::from(*n));
+                let slice = hit_groups::slice(self.times_s[i]);
                 Self::shares(time_s, bins, kernel, count, |bin, share| {
                     squares[bin] += (share * e).powi(2);
-                    let sums = &mut sums[bin * columns..(bin + 1) * columns];
-                    sums.iter_mut().zip(&row).for_each(|(s, r)| *s += share * r);
+                    add(&mut sums[bin * COLUMNS..(bin + 1) * COLUMNS], &row, share);
+                    let own = rows[bin].entry((slice, group)).or_insert_with(|| vec![0.0; width]);
+                    add(own, &alone_row, share);
                 });
+                continue;
+            }
+            if exact {
+                exact_cells[cell] += e * e;
             } else if let Some(batch) = self.paths.batch(i) {
                 by_batch[cell * batches + usize::from(batch)] += e as f32;
             }
+            add(&mut gathered[cell * COLUMNS..(cell + 1) * COLUMNS], &row, 1.0);
+            let own = &mut grouped[(cell * hit_groups::MOST + usize::from(group)) * width..][..width];
+            own[0] += e;
+            own[1..].iter_mut().zip(hits).for_each(|(a, n)| *a += e * f64::from(*n));
         }
         let mut batch_sums = vec![0.0f64; count * batches];
         // Energy of each cell in each bin, for the spread.
@@ -268,57 +306,75 @@ impl TracedPair {
                 continue;
             }
             let time_s = (cell as f64 + 0.5) * CELL_S;
-            let own = &gathered[cell * columns..(cell + 1) * columns];
-            let parts = &by_batch[cell * batches..(cell + 1) * batches];
+            let slice = hit_groups::slice(time_s as f32);
             Self::shares(time_s, bins, kernel, count, |bin, share| {
                 weighted[bin].push((cell, share * all_cells[cell]));
-                if own[0] > 0.0 {
-                    let sums = &mut sums[bin * columns..(bin + 1) * columns];
-                    sums.iter_mut().zip(own).for_each(|(s, r)| *s += share * r);
-                    let sums = &mut batch_sums[bin * batches..(bin + 1) * batches];
-                    sums.iter_mut().zip(parts).for_each(|(s, r)| *s += share * f64::from(*r));
+                squares[bin] += share * share * exact_cells[cell];
+                if gathered[cell * COLUMNS] == 0.0 {
+                    return;
+                }
+                let own = &gathered[cell * COLUMNS..(cell + 1) * COLUMNS];
+                add(&mut sums[bin * COLUMNS..(bin + 1) * COLUMNS], own, share);
+                let parts = &by_batch[cell * batches..(cell + 1) * batches];
+                let target = &mut batch_sums[bin * batches..(bin + 1) * batches];
+                target.iter_mut().zip(parts).for_each(|(s, r)| *s += share * f64::from(*r));
+                for group in 0..hit_groups::MOST {
+                    let own = &grouped[(cell * hit_groups::MOST + group) * width..][..width];
+                    if own[0] > 0.0 {
+                        let row = rows[bin].entry((slice, group as u8)).or_insert_with(|| vec![0.0; width]);
+                        add(row, own, share);
+                    }
                 }
             });
         }
-        let floor = NOTHING * (0..count).map(|k| sums[k * columns]).fold(0.0, f64::max).max(1e-30);
+        let floor = NOTHING * (0..count).map(|k| sums[k * COLUMNS]).fold(0.0, f64::max).max(1e-30);
         let mut state = BandState {
             bins,
             ln_energy: Vec::with_capacity(count),
-            hits: Vec::with_capacity(count * m),
-            hits_covariance: Vec::with_capacity(count * pairs),
+            leak: Vec::new(),
+            groups: vec![0],
+            group_energy: Vec::new(),
+            group_hits: Vec::new(),
             time_s: Vec::with_capacity(count),
             departure: Vec::with_capacity(count),
             departure_products: Vec::with_capacity(count),
             variance: Vec::with_capacity(count),
             scattering: Vec::new(),
         };
+        let own_share = kernel.shares[band];
         for bin in 0..count {
-            let s = &sums[bin * columns..(bin + 1) * columns];
+            let s = &sums[bin * COLUMNS..(bin + 1) * COLUMNS];
             let e = s[0].max(floor);
-            state.ln_energy.push(e.ln());
+            state.ln_energy.push((own_share * e).ln());
             state.time_s.push(if s[0] > floor { s[1] / e } else { bins.centre_s(bin) });
             state.departure.push(std::array::from_fn(|k| s[2 + k] / e));
             state.departure_products.push(std::array::from_fn(|k| s[5 + k] / e));
-            let mean: Vec<f64> = s[11..11 + m].iter().map(|h| h / e).collect();
-            let mut product = 11 + m;
-            for a in 0..m {
-                for b in a..m {
-                    state.hits_covariance.push(s[product] / e - mean[a] * mean[b]);
-                    product += 1;
-                }
+            for row in rows[bin].values().filter(|r| r[0] > 0.0) {
+                state.group_energy.push(own_share * row[0]);
+                state.group_hits.extend(row[1..].iter().map(|h| h / row[0]));
             }
-            state.hits.extend(mean);
+            if s[0] <= floor {
+                state.group_energy.push(own_share * floor);
+                state.group_hits.extend(std::iter::repeat_n(0.0, m));
+            }
+            state.groups.push(state.group_energy.len());
             let interference = interference(&weighted[bin], kernel) - 2.0 * squares[bin];
             let parts = &batch_sums[bin * batches..(bin + 1) * batches];
             let mean = parts.iter().sum::<f64>() / batches as f64;
             let scatter: f64 = parts.iter().map(|p| (p - mean).powi(2)).sum();
             let monte_carlo = scatter * batches as f64 / (batches as f64 - 1.0);
-            let variance = (interference.max(0.0) + monte_carlo) / (e * e) + MODEL_SD * MODEL_SD;
+            let coherent = bins.centre_s(bin) < COHERENT_BANDWIDTH_TIMES / kernel.bandwidth_hz;
+            let model_sd = if coherent { COHERENT_SD } else { MODEL_SD };
+            let variance = (interference.max(0.0) + monte_carlo) / (e * e) + model_sd * model_sd;
             // Nothing scatters more than the square of one Gaussian sample.
             state.variance.push(variance.min(2.0));
         }
         state
     }
+}
+
+fn add(target: &mut [f64], more: &[f64], share: f64) {
+    target.iter_mut().zip(more).for_each(|(t, x)| *t += share * x);
 }
 
 /// Variance of the energy in a bin if all pulses had random signs, twice the sum of w_i w_j r_ij^2, those of single paths

@@ -2,7 +2,7 @@
 
 use crate::arrival_model::{self, ArrivalData};
 use crate::discrepancy::FreeDiscrepancy;
-use crate::effect::{Case, Evidence};
+use crate::effect::Case;
 use crate::energy_model::{self, ABSORPTION, BinResidual, EnergyData, EnergyModel};
 use crate::gauss_newton::{Maximum, Prior};
 use crate::kernel::BandKernel;
@@ -19,6 +19,8 @@ use std::collections::BTreeMap;
 
 /// Extra scattering of the bands of the traced scene, in turn: its paths then serve any scattering.
 const TRACED_SCATTERING: [f64; 4] = [0.0, 0.12, 0.4, 0.85];
+/// Share of the stated absorption at which images are chosen.
+const CAUTION: f64 = 0.7;
 /// Longest time that is traced after the direct sound, in seconds.
 const LONGEST_S: f64 = 2.5;
 /// Shortest.
@@ -35,23 +37,6 @@ const SETTLED: f64 = 0.1;
 const LIKENESS_SD: f64 = 0.2;
 /// Share of pulses whose likeness says nothing.
 const ODD_PULSE_SHARE: f64 = 1e-3;
-
-/// A fit of some causes.
-#[derive(Clone)]
-pub(crate) struct Fitted {
-    pub energy: Maximum,
-    /// Where the parameters of each energy case start, in the order in which they are applied.
-    pub energy_firsts: Vec<usize>,
-    pub arrivals: Maximum,
-    pub arrival_firsts: Vec<usize>,
-    pub polarity: f64,
-}
-
-impl Fitted {
-    pub fn log_evidence(&self) -> f64 {
-        self.energy.log_evidence + self.arrivals.log_evidence + self.polarity
-    }
-}
 
 pub(crate) struct Workbench {
     pub survey: Survey,
@@ -156,7 +141,7 @@ impl Workbench {
             box_m: [corner(f64::min, f64::INFINITY), corner(f64::max, f64::NEG_INFINITY)],
             declared_scattering: scatterings.iter().sum::<f64>() / scatterings.len() as f64,
         };
-        let priors = room.priors().iter().map(absorption_priors).collect();
+        let priors: Vec<Vec<Prior>> = room.priors().iter().map(absorption_priors).collect();
         let traced_s = traced_s(&survey, &measured, config.range_db);
         let pairs = trace(room, &survey, &materials, config, traced_s, observer)?;
         let absorption = materials
@@ -284,17 +269,7 @@ impl Workbench {
         used: &[bool],
         before: Option<&[f64]>,
     ) -> Result<(Maximum, Vec<usize>), Error> {
-        energy_model::fit(&self.energy_data(), cases, used, before, None)
-    }
-
-    /// The same from known values of the effects as well.
-    pub fn refit_energy(
-        &self,
-        cases: &[&dyn Case],
-        used: &[bool],
-        known: &[f64],
-    ) -> Result<(Maximum, Vec<usize>), Error> {
-        energy_model::fit(&self.energy_data(), cases, used, Some(known), Some(known))
+        energy_model::fit(&self.energy_data(), cases, used, before)
     }
 
     pub fn fit_arrivals(&self, cases: &[&dyn Case], used: &[bool]) -> Result<(Maximum, Vec<usize>), Error> {
@@ -368,15 +343,25 @@ impl Workbench {
         FreeDiscrepancy { end_s }
     }
 
-    /// All three parts under some causes.
-    pub fn fit(&self, cases: &[&dyn Case], used: &[bool]) -> Result<Fitted, Error> {
-        let energy: Vec<&dyn Case> =
-            cases.iter().copied().filter(|c| c.evidence() != Evidence::Arrivals).collect();
-        let arrivals: Vec<&dyn Case> =
-            cases.iter().copied().filter(|c| c.evidence() != Evidence::Energy).collect();
-        let (energy, energy_firsts) = self.fit_energy(&energy, used, None)?;
-        let (arrivals, arrival_firsts) = self.fit_arrivals(&arrivals, used)?;
-        Ok(Fitted { energy, energy_firsts, arrivals, arrival_firsts, polarity: self.polarity(cases, used) })
+    /// Fits decays to energies other than those measured.
+    pub fn fit_energy_to(
+        &self,
+        measured: &[Measured],
+        cases: &[&dyn Case],
+        used: &[bool],
+        before: Option<&[f64]>,
+    ) -> Result<Maximum, Error> {
+        let data = EnergyData { measured, ..self.energy_data() };
+        Ok(energy_model::fit(&data, cases, used, before)?.0)
+    }
+
+    /// Which response holds which pair.
+    pub fn assignment(&self, cases: &[&dyn Case]) -> Vec<usize> {
+        let mut assignment: Vec<usize> = (0..self.pairs.len()).collect();
+        for (a, b) in cases.iter().filter_map(|c| c.exchanged()) {
+            assignment.swap(a, b);
+        }
+        assignment
     }
 
     /// Bins of the given pairs under fitted values.
@@ -483,7 +468,9 @@ fn trace(
             let columns: Vec<Material> =
                 TRACED_SCATTERING.iter().map(|&extra| scattering_more(m, extra)).collect::<Result<_, _>>()?;
             let scattering = PerBand::from_fn(bands, |b| columns[b % columns.len()].scattering().values()[b]);
-            Material::new(m.absorption().clone(), scattering)
+            // Absorption only says which images of a cuboid matter: less than stated, for it may be fitted so.
+            let absorption = PerBand::from_fn(bands, |b| CAUTION * m.absorption().values()[b]);
+            Material::new(absorption, scattering)
         })
         .collect::<Result<_, sabine_acoustics::Error>>()?;
     let scene: Scene = room.scene().with_materials(spread)?;
@@ -500,7 +487,7 @@ fn trace(
         report(observer, "tracing", i as u64, survey.responses.len() as u64)?;
         let (source, receiver) = (&room.sources()[response.source], &room.receivers()[response.receiver]);
         let paths = tracer.trace_prepared(&prepared, source, receiver, &response.air, &())?;
-        found.push(TracedPair::new(paths, [response.source, response.receiver], response.air));
+        found.push(TracedPair::new(paths, [response.source, response.receiver], response.air, materials)?);
     }
     Ok(found)
 }

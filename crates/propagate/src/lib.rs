@@ -86,6 +86,7 @@ mod ambisonic_response;
 mod band_masks;
 mod box_tree;
 mod brute_force_scene;
+mod cuboid;
 mod direction_cells;
 mod early_memory;
 mod edge_diffraction;

@@ -29,6 +29,11 @@ pub struct TracerConfig {
     pub seed: u64,
     /// Specular paths of up to so many reflections (0 to 10) are found exactly, by image sources.
     pub image_order: usize,
+    /// Where the mesh is a cuboid (six whole faces at right angles, each of one material, nothing inside), specular paths have
+    /// a closed form. If this is above zero, so many of any order are found exactly, those that carry most energy with the
+    /// scene's materials in the octave in which they carry most, instead of those up to `image_order`; rays then count none that
+    /// is specular throughout. 0 to 10 million; 200,000 serve most rooms. Worth it where little is scattered.
+    pub cuboid_paths: usize,
     /// Radius of the spheres about both ends that count rays whose last reflection is specular and beyond
     /// [`TracerConfig::image_order`],
     /// 1 cm to 10 m; it shrinks to the distance of the nearest surface.
@@ -49,6 +54,7 @@ impl Default for TracerConfig {
             duration_s: 1.5,
             seed: 0,
             image_order: 3,
+            cuboid_paths: 0,
             receiver_radius_m: 0.5,
             diffraction: false,
             allow_leaks: false,
@@ -61,6 +67,7 @@ impl TracerConfig {
         check_range("rays", self.rays as f64, 1.0, 1e8, "between 1 and 100 million")?;
         check_range("duration_s", self.duration_s, 1e-3, 60.0, "between 1 ms and 60 s")?;
         check_range("image_order", self.image_order as f64, 0.0, 10.0, "between 0 and 10")?;
+        check_range("cuboid_paths", self.cuboid_paths as f64, 0.0, 1e7, "between 0 and 10 million")?;
         check_range("receiver_radius_m", self.receiver_radius_m, 0.01, 10.0, "between 1 cm and 10 m")
     }
 }
@@ -71,7 +78,7 @@ impl TracerConfig {
 /// | path | found by |
 /// |---|---|
 /// | direct | exactly |
-/// | specular reflections only, up to `image_order` | image sources: exactly |
+/// | specular reflections only, up to `image_order` (`cuboid_paths` in a cuboid) | image sources: exactly |
 /// | specular reflections only, more than that | rays from either end through a sphere about the other |
 /// | with scattering | all that apply of: a line from the last scattering to the other end; a line between a ray from the source and one from the receiver; two such rays that meet on a patch of wall; where the last reflection is specular, the other end's sphere |
 ///
@@ -143,7 +150,12 @@ impl PathTracer {
         let (from, to) = (source.position_m, receiver.position_m);
         let (order, rays, seed) = (self.config.image_order, self.config.rays, self.config.seed);
         report(observer, "image sources", 0, 1)?;
-        add_exact_paths(&mut paths, &scene.mesh, from, to, order, rays.min(1 << 17), seed);
+        match &scene.cuboid {
+            Some(cuboid) if self.config.cuboid_paths > 0 => {
+                cuboid.add_paths(&mut paths, from, to, self.config.cuboid_paths, &scene.named);
+            }
+            _ => add_exact_paths(&mut paths, &scene.mesh, from, to, order, rays.min(1 << 17), seed),
+        }
         if let Some(edges) = &scene.edges {
             report(observer, "edges", 0, 1)?;
             edges.add_paths(&mut paths, &scene.mesh, from, to);

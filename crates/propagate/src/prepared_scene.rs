@@ -1,11 +1,12 @@
 //! A scene made ready for many traces.
 
+use crate::cuboid::Cuboid;
 use crate::edge_diffraction::DiffractingEdges;
 use crate::event_mixture::EventProbabilities;
 use crate::mesh_scene::MeshScene;
 use crate::patches::Patches;
 use crate::{Error, MeshReport};
-use sabine_acoustics::Scene;
+use sabine_acoustics::{NamedMaterial, Scene};
 use std::fmt;
 
 /// What a tracer needs to know of a scene, whatever the places of source and receiver: made once by
@@ -16,7 +17,11 @@ pub struct PreparedScene {
     pub(crate) patches: Patches,
     pub(crate) probabilities: EventProbabilities,
     pub(crate) edges: Option<DiffractingEdges>,
+    /// The cuboid that the mesh is, if it is one.
+    pub(crate) cuboid: Option<Cuboid>,
     pub(crate) materials: usize,
+    /// The materials, which say what images of a cuboid matter.
+    pub(crate) named: Vec<NamedMaterial>,
     pub(crate) surface_m2: f64,
     /// Share of the reflections that scatter, over the surfaces and bands.
     pub(crate) mean_scattering: f64,
@@ -34,8 +39,10 @@ impl PreparedScene {
         Ok(Self {
             patches: Patches::new(&mesh.surfaces, patch_side_m),
             edges: diffraction.then(|| DiffractingEdges::find(scene, &mesh)),
+            cuboid: Cuboid::find(&mesh.surfaces),
             probabilities,
             materials: scene.materials().len(),
+            named: scene.materials().to_vec(),
             surface_m2,
             mean_scattering: scattering_m2 / surface_m2,
             mesh,

@@ -27,6 +27,8 @@ pub(crate) struct Tracing<'a> {
     pairs: usize,
     /// Parts into which they are split, all of the same size: so many for each batch, with so many rays for each class.
     parts: usize,
+    /// Specular paths of up to so many reflections are found by others.
+    exact_order: usize,
     config: &'a TracerConfig,
 }
 
@@ -110,6 +112,10 @@ impl<'a> Tracing<'a> {
             ends: [sphere(SOURCE), sphere(RECEIVER)],
             pairs: parts * pairs.div_ceil(parts).next_multiple_of(scene.probabilities.classes()),
             parts,
+            exact_order: match scene.cuboid {
+                Some(_) if config.cuboid_paths > 0 => usize::MAX,
+                _ => config.image_order,
+            },
             config,
         }
     }
@@ -202,7 +208,7 @@ impl<'a> Tracing<'a> {
             let depth = walk.arrivals.len();
             // Specular paths that image sources have found, and those that a line has found, are not counted again.
             if mirrored
-                && (ever_scattered || depth > self.config.image_order)
+                && (ever_scattered || depth > self.exact_order)
                 && let Some((middle_m, chord_m)) = there.chord(origin, heading, leg_m)
                 && travelled_m + middle_m <= self.max_length_m
             {

@@ -69,10 +69,18 @@ const HALF: usize = 32;
 /// A pulse of amplitude 1 at any instant: the sample at which it begins (perhaps before the first), and a windowed sinc.
 pub(crate) fn pulse(at: f64) -> (i64, [f64; 2 * HALF]) {
     let first = at.floor() as i64 - HALF as i64 + 1;
+    let start = first as f64 - at;
+    // From sample to sample the sine only changes its sign, and the window's angle goes on by the same step.
+    let mut sine = (PI * start).sin() / PI;
+    let (mut im, mut re) = (PI * start / HALF as f64).sin_cos();
+    let (step_im, step_re) = (PI / HALF as f64).sin_cos();
     let value = |i: usize| {
-        let x = (first + i as i64) as f64 - at;
-        let sinc = if x.abs() < 1e-9 { 1.0 } else { (PI * x).sin() / (PI * x) };
-        sinc * (FRAC_PI_2 * x / HALF as f64).cos().powi(2)
+        let x = start + i as f64;
+        let sinc = if x.abs() < 1e-9 { 1.0 } else { sine / x };
+        let window = 0.5 + 0.5 * re;
+        sine = -sine;
+        (re, im) = (re * step_re - im * step_im, re * step_im + im * step_re);
+        sinc * window
     };
     (first, std::array::from_fn(value))
 }

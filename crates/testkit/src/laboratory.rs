@@ -2,13 +2,13 @@
 //!
 //! Physics: image sources of a box as pressure pulses with an amplitude for each octave, octaves joined by filters of zero phase
 //! whose crossovers are an eighth of an octave wide; air per octave at its exact centre (ISO 9613-1); a random sign for every image
-//! but the direct sound, the same in all octaves, so that energies add up and no standing waves arise. Where surfaces scatter, images
+//! of every pair but for the direct sound, the same in all octaves, so that energies add up and no standing waves arise. Where surfaces scatter, images
 //! keep (1 - scattering) of each reflection, and particles (Lambert) carry the rest: their energy at the receivers is filled with Gaussian
 //! noise. It shares no code with the tracer, nor with what fits or diagnoses.
 //!
 //! Always there, and not told: microphones differ by 0.3 dB, receivers are 5 mm (standard deviation along each axis) from where they
 //! are said to be, materials differ from their tables by the stated standard deviation (0.03, of some 0.06) in each octave, and white
-//! noise adds up over a response to -60 dB of the response's energy in the octave where it is worst. Responses end
+//! noise adds up over a response to -63 dB of the response's energy in the octave where it is worst. Responses end
 //! when the slowest octave has fallen by 65 dB.
 //!
 //! What it does **not** do: phase at walls, standing waves, diffraction, rooms other than boxes. The particles' first
@@ -154,7 +154,9 @@ impl Laboratory {
             effect.apply(&mut truth)?;
         }
         truth.keep_inside();
-        truth.duration_s = truth.duration_s.max(coupled_tail::tails_end_s(effects));
+        truth.duration_s = (random_room::fallen_s(&truth)? + random_room::MARGIN_S)
+            .max(truth.duration_s)
+            .max(coupled_tail::tails_end_s(effects));
         truth.duration_s += truth.latencies_s.iter().copied().fold(0.0, f64::max);
         Ok(truth)
     }
@@ -194,7 +196,8 @@ impl Laboratory {
         let medium = truth.medium()?;
         let rate_hz = f64::from(self.config.sample_rate_hz);
         let samples = (truth.duration_s * rate_hz).ceil() as usize;
-        let decay = BoxDecay::new(truth, &medium, truth.duration_s);
+        // A little longer, so that no image is missed at the end.
+        let decay = BoxDecay::new(truth, &medium, truth.duration_s + 0.2);
         let scattered: Vec<_> =
             (0..truth.sources.len()).map(|s| ScatteredField::new(truth, &medium, s)).collect();
         let render = |index: usize| {
@@ -243,7 +246,9 @@ impl Laboratory {
         truth_file: Option<&Path>,
     ) -> Result<MeasuredRoom, Error> {
         let truth = self.truth(effects)?;
-        if let Some(path) = truth_file.filter(|path| path.starts_with(folder)) {
+        // Two ways to say where something is must not hide that it is the same place.
+        let full = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        if let Some(path) = truth_file.filter(|path| full(path).starts_with(full(folder))) {
             let source =
                 io::Error::new(io::ErrorKind::InvalidInput, "the truth must not lie within the room");
             return Err(Error::Io { path: path.to_owned(), source });
@@ -287,11 +292,6 @@ impl Laboratory {
 
     pub(crate) fn null(&self) -> &Truth {
         &self.truth
-    }
-
-    /// About the decay time of the slowest octave: the time in which the box falls by 60 dB.
-    pub(crate) fn decay_s(&self) -> f64 {
-        (self.truth.duration_s - random_room::MARGIN_S) * 60.0 / random_room::FALL_DB
     }
 }
 

@@ -1,6 +1,6 @@
 //! What mirrors send: image sources, each with a sign of its own.
 
-use super::box_decay::BoxDecay;
+use super::box_decay::{BoxDecay, LANES};
 use super::stream::{Purpose, key, mix, unit};
 use super::truth::{Medium, Truth};
 use crate::filter::pulse;
@@ -64,7 +64,7 @@ pub(crate) fn add_images(
     let bands = truth.bands_hz.len();
     let seed = key(truth.seed, Purpose::Signs, pair.0 * truth.receivers_m.len() + pair.1);
     let end_s = columns.start_s + columns.samples[0].len() as f64 / columns.rate_hz;
-    let longest_m = end_s.min(decay.fallen_s(medium, LEAST_DB)) * medium.speed_m_s;
+    let longest_m = end_s.min(decay.all_fallen_s(medium, LEAST_DB)) * medium.speed_m_s;
     let axes = [0, 1, 2].map(|a| Axis::new(truth, a, source.position_m[a], receiver[a], longest_m));
     let gains: Vec<f64> = truth.source_gains_db.iter().map(|db| 10f64.powf(db / 20.0)).collect();
     let volume_m3 = truth.volume_m3();
@@ -72,7 +72,8 @@ pub(crate) fn add_images(
     let exact_s =
         (EXACT_PER_SAMPLE * columns.rate_hz * volume_m3 / (4.0 * PI * medium.speed_m_s.powi(3))).sqrt();
     let share = PULSES_PER_SAMPLE * columns.rate_hz * volume_m3 / (4.0 * PI * medium.speed_m_s);
-    let mut row = vec![0.0; bands];
+    let weights = decay.weights(medium);
+    let mut row = [0.0; LANES];
     let mut amplitudes = vec![0.0; bands];
     for x in &axes[0].images {
         let row_x = mix(seed ^ x.index as u64);
@@ -82,7 +83,7 @@ pub(crate) fn add_images(
                 continue;
             }
             let row_seed = mix(row_x ^ y.index as u64);
-            (0..bands).for_each(|b| row[b] = x.walls[b] * y.walls[b]);
+            (0..LANES).for_each(|b| row[b] = x.walls[b] * y.walls[b]);
             for z in &axes[2].images {
                 let square = flat + z.offset_m * z.offset_m;
                 if square > longest_m * longest_m {
@@ -91,8 +92,9 @@ pub(crate) fn add_images(
                 let length_m = square.sqrt();
                 let time_s = length_m / medium.speed_m_s;
                 let hash = mix(row_seed ^ z.index as u64);
-                let left = decay.at(time_s);
-                let strongest = (0..bands).map(|b| row[b] * z.walls[b] / left[b]).fold(0.0, f64::max);
+                let mut worth = *weights.at(time_s);
+                (0..LANES).for_each(|b| worth[b] *= row[b] * z.walls[b]);
+                let strongest = worth.into_iter().fold(0.0, f64::max);
                 let kept = (share * strongest / square).min(1.0);
                 if unit(hash) >= kept {
                     continue;
@@ -131,7 +133,7 @@ struct AxisImage {
     /// Where the path leaves, times its length.
     departure: f64,
     /// Energy that the two walls leave, by band.
-    walls: Vec<f64>,
+    walls: [f64; LANES],
 }
 
 impl Axis {
@@ -145,10 +147,10 @@ impl Axis {
             // Beyond the upper wall an odd image has met that wall once more, and beyond the lower wall the lower.
             let (more, fewer) = (index.unsigned_abs().div_ceil(2) as f64, (index.unsigned_abs() / 2) as f64);
             let (low, high) = if index > 0 { (fewer, more) } else { (more, fewer) };
-            let walls = mirrored
-                .iter()
-                .map(|logs| (low * logs[2 * axis] + high * logs[2 * axis + 1]).exp())
-                .collect();
+            let mut walls = [0.0; LANES];
+            for (left, logs) in walls.iter_mut().zip(&mirrored) {
+                *left = (low * logs[2 * axis] + high * logs[2 * axis + 1]).exp();
+            }
             AxisImage { index, offset_m, departure: if turned { offset_m } else { -offset_m }, walls }
         };
         Self { images: (-reach..=reach).map(image).collect() }

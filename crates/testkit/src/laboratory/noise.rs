@@ -10,7 +10,7 @@ use sabine_acoustics::OctaveBands;
 
 /// Energy of the recorder's noise over the whole response relative to the response's own, in dB, in the octave and the response
 /// where it is largest.
-const FLOOR_DB: f64 = -60.0;
+const FLOOR_DB: f64 = -63.0;
 /// Interval whose energy background noise is relative to, in seconds.
 const STRONGEST_S: f64 = 0.02;
 

@@ -22,8 +22,10 @@ const APART_M: f64 = 0.8;
 const T60_S: (f64, f64) = (0.25, 0.9);
 /// Longest time in which the box may take to fall by [`FALL_DB`].
 const LONGEST_S: f64 = 1.35;
+/// Longest response to a box alone, in seconds.
+const AT_MOST_S: f64 = 2.0;
 /// How far responses fall before they end, in dB.
-pub(crate) const FALL_DB: f64 = 65.0;
+const FALL_DB: f64 = 65.0;
 /// Margin after that, in seconds.
 pub(crate) const MARGIN_S: f64 = 0.06;
 /// Standard deviation of a microphone's gain in dB, and of a receiver's place along each axis in metres.
@@ -102,8 +104,7 @@ pub(crate) fn draw(config: &LabConfig) -> Result<(Declared, Truth), Error> {
         if !fits(&truth)? {
             continue;
         }
-        let medium = truth.medium()?;
-        let fallen_s = BoxDecay::new(&truth, &medium, LONGEST_S + 0.05).fallen_s(&medium, FALL_DB);
+        let fallen_s = fallen_s(&truth)?;
         if fallen_s > LONGEST_S {
             continue;
         }
@@ -118,6 +119,14 @@ pub(crate) fn draw(config: &LabConfig) -> Result<(Declared, Truth), Error> {
     }
     let (field, range) = ("rooms drawn in vain", "fewer than 20000");
     Err(Error::OutOfRange { field, value: TRIES as f64, range })
+}
+
+/// When the slowest octave has fallen far enough for a recording to end, if no wall scatters (which rarely makes it longer).
+pub(crate) fn fallen_s(truth: &Truth) -> Result<f64, Error> {
+    let mut mirrors = truth.clone();
+    mirrors.materials.iter_mut().flat_map(|m| &mut m.scattering).for_each(|s| *s = 0.0);
+    let medium = truth.medium()?;
+    Ok(BoxDecay::new(&mirrors, &medium, AT_MOST_S).all_fallen_s(&medium, FALL_DB))
 }
 
 /// Places as they are, channels and time zero.

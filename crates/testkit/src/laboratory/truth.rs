@@ -276,3 +276,19 @@ pub(crate) struct Medium {
     /// Energy attenuation of each octave in 1/m.
     pub exponents_per_m: Vec<f64>,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pattern_radiates_as_much_as_a_sphere() {
+        for q in [0.0, 0.3, 0.5, 0.8, 1.0] {
+            let source = TrueSource { position_m: [0.0; 3], axis: [1.0, 0.0, 0.0], omni_share: vec![q] };
+            // Rings of equal area are equally wide in the cosine.
+            let ring = |i: i32| source.gain(0, (f64::from(i) + 0.5) / 500.0 - 1.0).powi(2);
+            let mean = (0..1000).map(ring).sum::<f64>() / 1000.0;
+            assert!((mean - 1.0).abs() < 1e-5, "{q}: {mean}");
+        }
+    }
+}

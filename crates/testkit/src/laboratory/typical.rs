@@ -1,5 +1,6 @@
 //! Effects as they occur, by strength.
 
+use super::box_decay::BoxDecay;
 use super::hidden::{End, Fault, Gap, Hidden};
 use super::random_room::face_areas_m2;
 use super::stream::{Purpose, stream};
@@ -25,6 +26,7 @@ impl Hidden {
         check_range("strength", strength, 0.0, 3.0, "between 0 and 3")?;
         let mut random = stream(seed, Purpose::Effect, 0);
         let (truth, r) = (lab.null(), &mut random);
+        let decay_s = decay_s(truth)?;
         Ok(match id {
             "transducer_response" => {
                 Self::TransducerResponse { gains_db: smooth(r, truth.bands_hz.len(), 5.0 * strength) }
@@ -40,8 +42,8 @@ impl Hidden {
                     levels_db: tilted(truth, |o| level_db(middle_db, strength) + slope_db * o),
                 }
             }
-            "coupled_volume" => coupled_volume(r, truth, strength),
-            "truncation" => truncation(r, truth, lab.decay_s(), strength),
+            "coupled_volume" => coupled_volume(r, truth, decay_s, strength),
+            "truncation" => truncation(r, truth, decay_s, strength),
             "sound_speed" => Self::SoundSpeed { temperature_offset_k: 8.0 * strength * sign(r) },
             "sampling_clock" => Self::SamplingClock { ppm: 900.0 * strength * sign(r) },
             "room_dimensions" => {
@@ -75,8 +77,8 @@ impl Hidden {
                 period_s: 0.15 + 0.15 * unit(r),
                 phase_rad: std::f64::consts::TAU * unit(r),
             },
-            "dropouts" => dropouts(r, truth, lab.decay_s(), strength),
-            "foreign_chirp" => foreign_chirp(r, truth, lab.decay_s(), strength),
+            "dropouts" => dropouts(r, truth, decay_s, strength),
+            "foreign_chirp" => foreign_chirp(r, truth, decay_s, strength),
             _ => return Err(Error::UnknownId { id: id.to_owned() }),
         })
     }
@@ -132,9 +134,9 @@ fn surface_absorption(r: &mut Pcg64Mcg, truth: &Truth, strength: f64) -> Hidden 
     }
 }
 
-fn coupled_volume(r: &mut Pcg64Mcg, truth: &Truth, strength: f64) -> Hidden {
-    let t60_s = truth.duration_s * 0.9;
-    let middle_s = (t60_s * (1.5 + 1.5 * unit(r))).min(2.5);
+/// A decay 1.5 to 3 times as long as the room's at 1 kHz, at most 2.5 s.
+fn coupled_volume(r: &mut Pcg64Mcg, truth: &Truth, decay_s: f64, strength: f64) -> Hidden {
+    let middle_s = (decay_s * (1.5 + 1.5 * unit(r))).min(2.5);
     let tilt = 0.08 * (unit(r) - 0.8);
     let decay_s = tilted(truth, |octaves| (middle_s * (tilt * octaves).exp()).clamp(0.3, 2.5));
     let wall = r.random_range(0..4);
@@ -149,7 +151,7 @@ fn coupled_volume(r: &mut Pcg64Mcg, truth: &Truth, strength: f64) -> Hidden {
     }
 }
 
-/// Strength 1 ends where the decay is 25 to 30 dB down; strength 0 at the end of the response.
+/// Strength 1 ends where the decay at 1 kHz is 25 to 30 dB down; strength 0 at the end of the response.
 fn truncation(r: &mut Pcg64Mcg, truth: &Truth, decay_s: f64, strength: f64) -> Hidden {
     let from_end = truth.duration_s + latest_s(truth);
     let strong_s = decay_s * (25.0 + 5.0 * unit(r)) / 60.0 + latest_s(truth);
@@ -159,7 +161,7 @@ fn truncation(r: &mut Pcg64Mcg, truth: &Truth, decay_s: f64, strength: f64) -> H
     Hidden::Truncation { end_s: if strength == 0.0 { end_s + 1.0 } else { end_s }, fade_s }
 }
 
-/// Somewhere on a sphere, turned back into the room where that would leave it.
+/// In any direction; at strength 1 no place comes nearer to a wall than 0.3 m.
 fn position_error(r: &mut Pcg64Mcg, truth: &Truth, strength: f64) -> Hidden {
     let (sources, receivers) = (truth.sources.len(), truth.receivers_m.len());
     let pick = r.random_range(0..sources + receivers);
@@ -207,6 +209,15 @@ fn foreign_chirp(r: &mut Pcg64Mcg, truth: &Truth, decay_s: f64, strength: f64) -
         to_hz,
         level_db: if strength > 0.0 { 3.0 + 20.0 * strength.log10() } else { -300.0 },
     }
+}
+
+/// Decay time of the box in the octave nearest to 1 kHz, from its first 30 dB.
+fn decay_s(truth: &Truth) -> Result<f64, Error> {
+    let medium = truth.medium()?;
+    let fallen = BoxDecay::new(truth, &medium, truth.duration_s).fallen_s(&medium, 30.0);
+    let octaves = |band: usize| (truth.bands_hz[band] / 1000.0).log2().abs();
+    let middle = (0..fallen.len()).min_by(|&a, &b| octaves(a).total_cmp(&octaves(b)));
+    Ok(2.0 * middle.map_or(truth.duration_s, |band| fallen[band]))
 }
 
 fn latest_s(truth: &Truth) -> f64 {

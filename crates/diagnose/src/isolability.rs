@@ -1,0 +1,178 @@
+//! Which effects the positions of a survey can tell apart, from the Jacobians alone.
+
+use crate::diagnosis::Isolability;
+use crate::effect::{Case, Evidence, Nuisance};
+use crate::energy_model::EnergyModel;
+use crate::gauss_newton::{Model, Slopes};
+use crate::search::Candidate;
+use crate::workbench::Workbench;
+use crate::{Error, arrival_model};
+use nalgebra::{DMatrix, DVector};
+
+/// Signatures closer than this cannot be told apart.
+const TWINS: f64 = 0.95;
+
+/// The angle between each two effects that bear on the same data.
+pub(crate) fn isolability(bench: &Workbench, candidates: &[Candidate<'_>]) -> Result<Vec<Isolability>, Error> {
+    let mut found = Vec::new();
+    for evidence in [Evidence::Energy, Evidence::Arrivals] {
+        // One case stands for its effect.
+        let mut own: Vec<&Candidate<'_>> = Vec::new();
+        for c in candidates.iter().filter(|c| c.case.evidence() == evidence) {
+            if own.iter().all(|o| o.effect != c.effect) {
+                own.push(c);
+            }
+        }
+        for (i, a) in own.iter().enumerate() {
+            for b in &own[i + 1..] {
+                let Some(cosine) = cosine(bench, evidence, a.case, b.case) else { continue };
+                found.push(Isolability {
+                    effects: [a.id.to_owned(), b.id.to_owned()],
+                    cosine,
+                    separable: cosine < TWINS,
+                    would_decide: would_decide(a.id, b.id).to_owned(),
+                });
+            }
+        }
+    }
+    found.sort_by(|a, b| b.cosine.total_cmp(&a.cosine));
+    Ok(found)
+}
+
+/// A direction in parameter space along which an effect grows.
+struct Direction {
+    along: DVector<f64>,
+    /// Parameters that are the effect's own.
+    own: Vec<usize>,
+}
+
+fn cosine(bench: &Workbench, evidence: Evidence, a: &dyn Case, b: &dyn Case) -> Option<f64> {
+    let used = vec![true; bench.pairs.len()];
+    let cases = [a, b];
+    let (slopes, priors, directions) = if evidence == Evidence::Energy {
+        let data = bench.energy_data();
+        let model = EnergyModel::new(&data, &cases, &used);
+        let mut values = model.start(None);
+        for (m, material) in bench.absorption.iter().enumerate() {
+            for (band, a) in material.iter().enumerate() {
+                values[m * material.len() + band] = *a;
+            }
+        }
+        let place = |nuisance: Nuisance| match nuisance {
+            Nuisance::Absorption(m) => {
+                let bands = bench.survey.bands.len();
+                Some(m * bands..(m + 1) * bands)
+            }
+            Nuisance::ResponseGain(r) => Some(model.gain_index(r)..model.gain_index(r) + 1),
+            _ => None,
+        };
+        let firsts: Vec<(usize, usize)> =
+            (0..2).map(|order| first_of(&model.effects, order)).collect::<Option<_>>()?;
+        let directions = directions(bench, &cases, &firsts, &mut values, place);
+        (expected(&model, &values), model.priors().to_vec(), directions)
+    } else {
+        let data = bench.arrival_data();
+        let model = arrival_model::settled(&data, &cases, &used);
+        let mut values: Vec<f64> = model.priors().iter().map(|p| p.mean).collect();
+        let place = |nuisance: Nuisance| match nuisance {
+            Nuisance::SourcePosition(i) => Some(model.source_index(i)..model.source_index(i) + 3),
+            Nuisance::ReceiverPosition(i) => Some(model.receiver_index(i)..model.receiver_index(i) + 3),
+            _ => None,
+        };
+        let firsts: Vec<(usize, usize)> =
+            (0..2).map(|order| first_of(&model.effects, order)).collect::<Option<_>>()?;
+        // Arrivals belong where they are: the information is taken without the effects.
+        let neutral = values.clone();
+        let directions = directions(bench, &cases, &firsts, &mut values, place);
+        (expected(&model, &neutral), model.priors().to_vec(), directions)
+    };
+    let [first, second] = &directions[..] else { return None };
+    let n = priors.len();
+    let rest: Vec<usize> = (0..n).filter(|i| !first.own.contains(i) && !second.own.contains(i)).collect();
+    let information = slopes.information;
+    let among = DMatrix::from_fn(rest.len(), rest.len(), |i, j| {
+        information[(rest[i], rest[j])] + if i == j { priors[rest[i]].sd.powi(-2) } else { 0.0 }
+    });
+    let inverse = among.cholesky()?;
+    let onto = |d: &Direction| {
+        let whole = &information * &d.along;
+        let part = DVector::from_iterator(rest.len(), rest.iter().map(|&i| whole[i]));
+        (whole, part)
+    };
+    let ((whole_a, part_a), (whole_b, part_b)) = (onto(first), onto(second));
+    let product = |x: &Direction, whole: &DVector<f64>, px: &DVector<f64>, py: &DVector<f64>| {
+        x.along.dot(whole) - px.dot(&inverse.solve(py))
+    };
+    let aa = product(first, &whole_a, &part_a, &part_a);
+    let bb = product(second, &whole_b, &part_b, &part_b);
+    let ab = product(first, &whole_b, &part_a, &part_b);
+    (aa > 1e-9 && bb > 1e-9).then(|| (ab.abs() / (aa * bb).sqrt()).min(1.0))
+}
+
+fn first_of(effects: &[crate::energy_model::Placed<'_>], order: usize) -> Option<(usize, usize)> {
+    effects.iter().find(|p| p.order == order).map(|p| (p.first, p.parameters.len()))
+}
+
+fn directions(
+    bench: &Workbench,
+    cases: &[&dyn Case],
+    firsts: &[(usize, usize)],
+    values: &mut [f64],
+    place: impl Fn(Nuisance) -> Option<std::ops::Range<usize>>,
+) -> Vec<Direction> {
+    cases
+        .iter()
+        .zip(firsts)
+        .map(|(case, &(first, count))| {
+            let mut along = DVector::zeros(values.len());
+            let mut own: Vec<usize> = (first..first + count).collect();
+            for (i, p) in case.parameters(&bench.survey).iter().enumerate() {
+                along[first + i] = p.typical - p.neutral;
+                values[first + i] = p.typical;
+            }
+            for (nuisance, sd) in case.widens() {
+                for i in place(nuisance).into_iter().flatten() {
+                    along[i] = sd;
+                    own.push(i);
+                }
+            }
+            Direction { along, own }
+        })
+        .collect()
+}
+
+fn expected(model: &dyn Model, values: &[f64]) -> Slopes {
+    let n = model.priors().len();
+    let mut slopes = Slopes { gradient: DVector::zeros(n), information: DMatrix::zeros(n, n) };
+    model.log_likelihood(values, Some(&mut slopes));
+    slopes
+}
+
+/// The measurement that tells two effects apart, in plain words.
+pub(crate) fn would_decide(a: &str, b: &str) -> &'static str {
+    let is = |x: &str, y: &str| (a == x && b == y) || (a == y && b == x);
+    let has = |x: &str| a == x || b == x;
+    if is("sound_speed", "sampling_clock") {
+        "Record a loopback click at the beginning and end of the sweep, or read a thermometer in the room."
+    } else if is("air_absorption", "surface_absorption") || is("air_absorption", "scattering") {
+        "Measure again at another humidity (a morning and an evening), or read a hygrometer in the room."
+    } else if is("coupled_volume", "background_noise") {
+        "Measure again 10 dB louder and with a longer sweep: noise stays where it is, a coupled volume rises with the source."
+    } else if has("coupled_volume") {
+        "Measure again with the doors and openings of the room closed."
+    } else if has("background_noise") || has("truncation") {
+        "Record a longer response, and some seconds of silence before it."
+    } else if has("source_directivity") {
+        "Turn the loudspeaker by 90 degrees and measure again."
+    } else if has("time_zero") {
+        "Record a loopback of the excitation beside the microphones: it shows the latency."
+    } else if has("position_error") || has("room_dimensions") || has("sound_speed") {
+        "Measure two distances with a laser: between the far walls, and from the loudspeaker to a microphone."
+    } else if has("channel_fault") {
+        "Exchange the microphone's cable and channel with a neighbour's and measure again."
+    } else if has("scattering") {
+        "Measure at more positions, some of them close to the walls."
+    } else {
+        "Measure at more positions, with the source in another place."
+    }
+}

@@ -1,0 +1,279 @@
+//! A room that is a cuboid: its specular paths have a closed form, to any order.
+
+use crate::surfaces::Surfaces;
+use crate::vector::{Vec3, dot, scale, sub};
+use sabine_acoustics::{Contribution, NamedMaterial, PathSet, Reflection};
+use std::collections::HashMap;
+
+/// Two directions are parallel or at right angles if the sine or cosine between them is below this.
+const STRAIGHT: f64 = 1e-6;
+/// A face is whole if its area is that of the cuboid's to this share.
+const WHOLE: f64 = 1e-6;
+
+/// Six whole faces at right angles, each of one material, and nothing else.
+#[derive(Clone, Debug)]
+pub(crate) struct Cuboid {
+    axes: [Vec3; 3],
+    low_m: [f64; 3],
+    high_m: [f64; 3],
+    /// Of the faces low x, high x, low y, high y, low z, high z.
+    materials: [u32; 6],
+}
+
+impl Cuboid {
+    /// The cuboid that these triangles make, if they do.
+    pub fn find(surfaces: &Surfaces) -> Option<Self> {
+        if surfaces.planes.len() != 6 {
+            return None;
+        }
+        let mut axes: Vec<Vec3> = Vec::new();
+        // Axis and level of each plane.
+        let mut levels: Vec<(usize, f64)> = Vec::new();
+        for plane in &surfaces.planes {
+            let parallel =
+                axes.iter().position(|a| dot(*a, plane.normal).abs() > 1.0 - STRAIGHT * STRAIGHT * 0.5);
+            let axis = match parallel {
+                Some(axis) => axis,
+                None if axes.iter().all(|a| dot(*a, plane.normal).abs() < STRAIGHT) => {
+                    axes.push(plane.normal);
+                    axes.len() - 1
+                }
+                None => return None,
+            };
+            levels.push((axis, plane.offset_m * dot(axes[axis], plane.normal).signum()));
+        }
+        let axes: [Vec3; 3] = axes.try_into().ok()?;
+        let (mut low_m, mut high_m) = ([0.0; 3], [0.0; 3]);
+        let mut faces = [0usize; 6];
+        for axis in 0..3 {
+            let mut own: Vec<(f64, usize)> =
+                levels.iter().enumerate().filter(|(_, l)| l.0 == axis).map(|(p, l)| (l.1, p)).collect();
+            own.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let [(low, first), (high, second)] = own[..] else { return None };
+            (low_m[axis], high_m[axis]) = (low, high);
+            (faces[2 * axis], faces[2 * axis + 1]) = (first, second);
+        }
+        let side = |k: usize| high_m[k] - low_m[k];
+        let mut materials = [0; 6];
+        for (face, &plane) in faces.iter().enumerate() {
+            let own = || {
+                surfaces.triangles.iter().filter(move |t| !t.is_degenerate() && t.plane as usize == plane)
+            };
+            materials[face] = own().next()?.material;
+            if own().any(|t| t.material != materials[face]) {
+                return None;
+            }
+            let wanted = side((face / 2 + 1) % 3) * side((face / 2 + 2) % 3);
+            if (own().map(|t| t.area_m2).sum::<f64>() / wanted - 1.0).abs() > WHOLE {
+                return None;
+            }
+        }
+        Some(Self { axes, low_m, high_m, materials })
+    }
+
+    /// Adds the direct path and those specular paths that carry most energy in the octave in which they carry most, `most` at
+    /// most and none longer than the set looks for (Allen and Berkley, JASA 65, 1979).
+    pub fn add_paths(
+        &self,
+        paths: &mut PathSet,
+        source: Vec3,
+        receiver: Vec3,
+        most: usize,
+        materials: &[NamedMaterial],
+    ) {
+        let max_length_m = paths.max_length_m();
+        let local = |p: Vec3| -> Vec3 { std::array::from_fn(|k| dot(self.axes[k], p)) };
+        let room =
+            |v: Vec3| -> Vec3 { std::array::from_fn(|i| (0..3).map(|k| v[k] * self.axes[k][i]).sum()) };
+        let (from, to) = (local(source), local(receiver));
+        // What each face leaves of the specular energy, by octave; a black face leaves next to nothing.
+        let bands = materials.first().map_or(0, |m| m.material.bands().len());
+        let left: Vec<[f64; 6]> = (0..bands)
+            .map(|band| {
+                self.materials.map(|m| {
+                    let m = &materials[m as usize].material;
+                    let (a, s) = (m.absorption().values()[band], m.scattering().values()[band]);
+                    ((1.0 - a) * (1.0 - s)).max(1e-9).ln()
+                })
+            })
+            .collect();
+        // Image number n along an axis: its distance from the receiver, and its reflections at the low and high faces.
+        let along = |axis: usize, n: i64| {
+            let side = self.high_m[axis] - self.low_m[axis];
+            let inside = from[axis] - self.low_m[axis];
+            let seen = if n.rem_euclid(2) == 0 { inside } else { side - inside };
+            self.low_m[axis] + n as f64 * side + seen - to[axis]
+        };
+        let hits = |n: i64| {
+            let (more, fewer) = (n.unsigned_abs().div_ceil(2) as u32, n.unsigned_abs() as u32 / 2);
+            if n > 0 { (fewer, more) } else { (more, fewer) }
+        };
+        let faces_of = |numbers: [i64; 3]| {
+            let mut faces = [0u32; 6];
+            for (a, n) in numbers.into_iter().enumerate() {
+                (faces[2 * a], faces[2 * a + 1]) = hits(n);
+            }
+            faces
+        };
+        let reach: [i64; 3] = std::array::from_fn(|k| {
+            (max_length_m / (self.high_m[k] - self.low_m[k])).ceil() as i64 + 1
+        });
+        let mut found: Vec<(f32, [i64; 3])> = Vec::new();
+        for i in -reach[0]..=reach[0] {
+            let x = along(0, i);
+            for j in -reach[1]..=reach[1] {
+                let flat = x * x + along(1, j).powi(2);
+                if flat > max_length_m * max_length_m {
+                    continue;
+                }
+                for k in -reach[2]..=reach[2] {
+                    let squared = flat + along(2, k).powi(2);
+                    if squared > max_length_m * max_length_m {
+                        continue;
+                    }
+                    let faces = faces_of([i, j, k]);
+                    let kept = left
+                        .iter()
+                        .map(|l| l.iter().zip(faces).map(|(l, n)| l * f64::from(n)).sum::<f64>())
+                        .fold(f64::NEG_INFINITY, f64::max);
+                    found.push(((kept - squared.ln()) as f32, [i, j, k]));
+                }
+            }
+        }
+        // The strongest; ties by number, so that the choice does not depend on how they were sorted.
+        let order = |a: &(f32, [i64; 3]), b: &(f32, [i64; 3])| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
+        if found.len() > most {
+            found.select_nth_unstable_by(most, order);
+            found.truncate(most);
+        }
+        found.sort_by(order);
+        let mut chains: HashMap<[u32; 6], u32> = HashMap::from([([0; 6], PathSet::DIRECT)]);
+        for (_, numbers) in found {
+            let to_image: Vec3 = std::array::from_fn(|k| along(k, numbers[k]));
+            let length_m = dot(to_image, to_image).sqrt();
+            let arrival = scale(to_image, 1.0 / length_m);
+            // Each reflection turns one component around.
+            let departure = std::array::from_fn(|a| {
+                if numbers[a].rem_euclid(2) == 0 { -arrival[a] } else { arrival[a] }
+            });
+            let chain = self.chain(paths, &mut chains, faces_of(numbers));
+            paths.push(Contribution {
+                length_m,
+                log_weight: -2.0 * length_m.ln(),
+                chain,
+                tail: PathSet::DIRECT,
+                departure: room(departure),
+                arrival: room(arrival),
+                batch: None,
+            });
+        }
+    }
+
+    /// The chain with so many reflections at each face. Their order has no bearing on energy: that with one reflection less at
+    /// the last face that has any goes before.
+    fn chain(&self, paths: &mut PathSet, known: &mut HashMap<[u32; 6], u32>, faces: [u32; 6]) -> u32 {
+        let mut missing: Vec<usize> = Vec::new();
+        let mut shorter = faces;
+        let mut chain = loop {
+            if let Some(&chain) = known.get(&shorter) {
+                break chain;
+            }
+            let last = (0..6).rfind(|&f| shorter[f] > 0).unwrap_or(0);
+            missing.push(last);
+            shorter[last] -= 1;
+        };
+        for face in missing.into_iter().rev() {
+            chain = paths.reflect(chain, self.materials[face], Reflection::Specular);
+            shorter[face] += 1;
+            known.insert(shorter, chain);
+        }
+        chain
+    }
+
+    /// Whether a point is inside.
+    pub fn holds(&self, point: Vec3) -> bool {
+        (0..3).all(|k| {
+            let at = dot(self.axes[k], point);
+            at > self.low_m[k] && at < self.high_m[k]
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)] // a panic is how a test fails
+    use super::*;
+    use sabine_acoustics::{Air, Material, OctaveBands, Scene};
+
+    fn bands() -> OctaveBands {
+        OctaveBands::new(1000.0, 1000.0).unwrap()
+    }
+
+    fn scene(turn: f64) -> Scene {
+        let material = |a: f64| Material::uniform(bands(), a, 0.0).unwrap();
+        let upright = Scene::shoebox(
+            [4.0, 5.0, 3.0],
+            [0.1, 0.2, 0.3, 0.15, 0.05, 0.4].map(material),
+        )
+        .unwrap();
+        let (s, c) = turn.sin_cos();
+        let vertices =
+            upright.vertices().iter().map(|v| [c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]]).collect();
+        Scene::new(vertices, upright.triangles().to_vec(), upright.materials().to_vec()).unwrap()
+    }
+
+    #[test]
+    fn a_turned_box_has_the_paths_of_the_upright_one() {
+        let ends = [[1.0, 2.0, 1.2], [2.5, 3.5, 1.7]];
+        let energies = |turn: f64| {
+            let scene = scene(turn);
+            let (s, c) = turn.sin_cos();
+            let turned = ends.map(|v: Vec3| [c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]]);
+            let cuboid = Cuboid::find(&Surfaces::new(&scene).unwrap()).unwrap();
+            assert!(turned.iter().all(|e| cuboid.holds(*e)));
+            let mut paths = PathSet::new(6, 60.0);
+            cuboid.add_paths(&mut paths, turned[0], turned[1], 2000, scene.materials());
+            let materials: Vec<Material> = scene.materials().iter().map(|m| m.material.clone()).collect();
+            let mut all: Vec<f32> = paths.energies(&materials, &Air::default()).unwrap().remove(0);
+            all.sort_by(f32::total_cmp);
+            all
+        };
+        let (upright, turned) = (energies(0.0), energies(0.7));
+        assert_eq!(upright.len(), turned.len());
+        for (a, b) in upright.iter().zip(&turned) {
+            assert!((a / b - 1.0).abs() < 1e-4, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_cuboid_is_left_alone() {
+        let whole = scene(0.0);
+        let part = Scene::new(
+            whole.vertices().to_vec(),
+            whole.triangles()[1..].to_vec(),
+            whole.materials().to_vec(),
+        )
+        .unwrap();
+        assert!(Cuboid::find(&Surfaces::new(&part).unwrap()).is_none());
+        let mut vertices = whole.vertices().to_vec();
+        vertices[0][0] += 0.1;
+        let skew = Scene::new(vertices, whole.triangles().to_vec(), whole.materials().to_vec()).unwrap();
+        assert!(Cuboid::find(&Surfaces::new(&skew).unwrap()).is_none());
+    }
+
+    #[test]
+    fn turning_back_is_part_of_a_path() {
+        // Two reflections at opposite faces: the path leaves towards the first.
+        let scene = scene(0.0);
+        let cuboid = Cuboid::find(&Surfaces::new(&scene).unwrap()).unwrap();
+        let mut paths = PathSet::new(6, 60.0);
+        let (from, to) = ([1.0, 2.0, 1.5], [3.0, 2.0, 1.5]);
+        cuboid.add_paths(&mut paths, from, to, 30, scene.materials());
+        assert_eq!(paths.len(), 30);
+        let low_x = (0..30).find(|&i| (f64::from(paths.lengths_m()[i]) - 4.0).abs() < 1e-6 && paths.departure(i)[0] < -0.99);
+        let behind = low_x.unwrap();
+        // Off the wall behind the source and back past it.
+        assert!(paths.arrival(behind)[0] < -0.99, "{:?}", paths.arrival(behind));
+        assert!(sub(paths.departure(behind), [-1.0, 0.0, 0.0]).iter().all(|x| x.abs() < 1e-3));
+    }
+}
