@@ -5,6 +5,8 @@ use crate::findings::Findings;
 use sabine::diagnose::HeldOut;
 use sabine_examples::Page;
 
+/// An interval over fewer positions says little.
+const FEW: usize = 4;
 /// What positions are predicted by, in the order of the figures.
 const PREDICTIONS: [&str; 3] = ["Materials refitted only", "With what was found", "Free, unnamed correction"];
 
@@ -27,6 +29,11 @@ pub fn section(page: &mut Page, findings: &Findings) {
         },
         held.receivers.join(", ")
     ));
+    if held.receivers.len() < FEW {
+        page.paragraph(
+            "These are few positions: what is gained at them need not be gained elsewhere, and the intervals below are not to be relied on. Four or more would tell.",
+        );
+    }
     // Without a cause the second would repeat the first.
     let shown: &[usize] = if findings.causes.is_empty() { &[0, 2] } else { &[0, 1, 2] };
     page.markup(&held_out_bars(held, shown));

@@ -15,8 +15,9 @@ mod words;
 use clap::Parser;
 use findings::Findings;
 use sabine::acoustics::MeasuredRoom;
-use sabine::diagnose::{DiagnoseConfig, Diagnoser, Effect, Error, catalogue};
+use sabine::diagnose::{DiagnoseConfig, Diagnoser, catalogue};
 use sabine_examples::{Bar, OutputFolder};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -69,15 +70,21 @@ fn run(arguments: &Arguments) -> Result<(), Anything> {
     if let Some(rays) = arguments.rays {
         config.rays = rays;
     }
-    let effects = chosen(&arguments.effects)?;
+    let tried = match &arguments.effects {
+        ids if ids.is_empty() => catalogue().len(),
+        ids => ids.iter().collect::<BTreeSet<_>>().len(),
+    };
     // What a name must reach: the odds that are asked for, and the number that was tried.
-    let threshold_nats = config.naming_nats + (effects.len().max(1) as f64).ln();
+    let threshold_nats = config.naming_nats + (tried as f64).ln();
+    let mut diagnoser = Diagnoser::new(config)?;
+    if !arguments.effects.is_empty() {
+        diagnoser = diagnoser.with_only(&arguments.effects)?;
+    }
     // A folder that cannot be written to should not cost the user a computation first.
     let mut out = OutputFolder::create(&arguments.out)?;
     let room = MeasuredRoom::read(path)?;
     let bar = Bar::new();
-    let diagnosis =
-        Diagnoser::new(config)?.with_effects(effects).diagnose(&room, &arguments.hold_out, &bar)?;
+    let diagnosis = diagnoser.diagnose(&room, &arguments.hold_out, &bar)?;
     bar.finish();
 
     let mut receivers: Vec<usize> = room.responses().iter().map(|r| r.receiver).collect();
@@ -92,15 +99,6 @@ fn run(arguments: &Arguments) -> Result<(), Anything> {
     out.finish()?;
     print_findings(&findings, &arguments.out);
     Ok(())
-}
-
-/// The effects of these names, or the whole catalogue.
-fn chosen(ids: &[String]) -> Result<Vec<Box<dyn Effect>>, Error> {
-    let all = catalogue();
-    if let Some(id) = ids.iter().find(|id| !all.iter().any(|e| e.id() == *id)) {
-        return Err(Error::UnknownEffect { id: id.clone() });
-    }
-    Ok(all.into_iter().filter(|e| ids.is_empty() || ids.iter().any(|id| id == e.id())).collect())
 }
 
 fn print_findings(findings: &Findings, out: &Path) {

@@ -27,7 +27,7 @@ pub fn html(findings: &Findings) -> Result<String> {
     let mut page = Page::new("What the simulation gets wrong");
     page.markup(bars::STYLE);
     page.paragraph(&format!(
-        "The room {}, simulated and compared with {} measured response{} at {} microphone position{}.",
+        "The room \"{}\", simulated and compared with {} measured response{} at {} microphone position{}.",
         std::path::Path::new(&findings.room)
             .file_name()
             .map_or(findings.room.clone(), |n| n.to_string_lossy().into_owned()),

@@ -3,6 +3,9 @@
 use crate::findings::Findings;
 use sabine::diagnose::{Cause, Verdict};
 
+/// Below this probability chance is not believed, as by default in the diagnosis.
+const UNLIKELY: f64 = 0.01;
+
 /// What an effect is called.
 pub fn effect(id: &str) -> String {
     let known = match id {
@@ -87,12 +90,16 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
             p_value(fit.p_value)
         )),
         Verdict::Explained => {
-            told.push(format!(
-                "Chance does not explain what was measured ({}).",
-                p_value(fit.p_value)
-            ));
+            told.push(if fit.p_value < UNLIKELY {
+                format!("Chance does not explain what was measured ({}).", p_value(fit.p_value))
+            } else {
+                format!(
+                    "As a whole the misfit could be chance ({}), but with the following in the model the measurement becomes far more probable.",
+                    p_value(fit.p_value)
+                )
+            });
             told.extend(findings.causes.iter().map(|c| c.explanation.clone()));
-            told.push(if fit.p_value_explained > 0.05 {
+            told.push(if fit.p_value_explained >= UNLIKELY {
                 "With that in the model, what is left is no more than chance.".to_owned()
             } else {
                 format!(
@@ -113,7 +120,12 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
             told.push(format!("Each of these would look the same here: {}.", names.join("; ")));
         }
         _ => {
-            told.push(format!("Chance does not explain what was measured ({}).", p_value(fit.p_value_explained)));
+            told.push(if fit.p_value_explained < UNLIKELY {
+                let chance = p_value(fit.p_value_explained);
+                format!("Chance does not explain what was measured ({chance}).")
+            } else {
+                "A correction without a name explains it far better than any cause that was tried.".to_owned()
+            });
             if !findings.causes.is_empty() {
                 let names: Vec<String> = findings.causes.iter().map(named).collect();
                 told.push(format!("This was found, and does not suffice: {}.", names.join("; ")));
@@ -129,7 +141,11 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
 }
 
 fn p_value(p: f64) -> String {
-    if p < 1e-3 { "less than 1 chance in 1000".to_owned() } else { format!("probability {p:.2}") }
+    if p < 1e-3 {
+        "less than 1 chance in 1000".to_owned()
+    } else {
+        format!("a misfit as large comes by chance with probability {p:.2}")
+    }
 }
 
 /// Where the mean residual stands out most.
