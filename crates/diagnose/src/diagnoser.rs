@@ -10,7 +10,7 @@ use crate::lack_of_fit;
 use crate::prediction::{Compared, Errors, compare, decay_db};
 use crate::search::{self, EffectScore, Search, State};
 use crate::workbench::{Workbench, dispersion};
-use crate::{DiagnoseConfig, Error, ExtendedModel, catalogue, extension};
+use crate::{DiagnoseConfig, Error, catalogue, extension};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;

@@ -3,7 +3,7 @@
 //! In each time bin the measured energy E is Gamma distributed about the predicted M with shape 1 / (relative variance), as
 //! the energy of band-limited noise is (Kuttruff, Room Acoustics, 6th ed., 3.5), and the prediction's own Monte-Carlo error makes it wider.
 
-use crate::effect::{Case, Nuisance, Parameter};
+use crate::effect::{Case, Nuisance, Parameter, Stage};
 use crate::gauss_newton::{Maximum, Model, Prior, Slopes, maximise};
 use crate::measured::Measured;
 use crate::traced_pair::BandState;
@@ -151,17 +151,32 @@ impl<'a> EnergyModel<'a> {
         self.effects.iter().find(|p| p.order == order).map_or(self.priors.len(), |p| p.first)
     }
 
-    pub fn common_gain_index(&self) -> Option<usize> {
-        self.common_gain
-    }
-
-    fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
-        for placed in &self.effects {
-            let own = &values[placed.first..placed.first + placed.parameters.len()];
-            placed.case.energy(own, view, ln_energy);
+    /// From the octave's own energy to what its filter passes: effects up to the microphone act on the octave and on what
+    /// leaks in from its neighbours, each as it is; the rest on their sum.
+    fn apply(&self, values: &[f64], view: &BandView<'_>, gain_db: f64, ln_energy: &mut [f64]) {
+        let effects = |early: bool, view: &BandView<'_>, ln_energy: &mut [f64]| {
+            for placed in self.effects.iter().filter(|p| (p.case.stage() <= Stage::Transducer) == early) {
+                let own = &values[placed.first..placed.first + placed.parameters.len()];
+                placed.case.energy(own, view, ln_energy);
+            }
+        };
+        effects(true, view, ln_energy);
+        let mut sums: Vec<f64> = ln_energy.iter().map(|l| view.state.own_share * l.exp()).collect();
+        for (band, share, leak) in &view.state.leaks {
+            let mut leak: Vec<f64> =
+                leak[..sums.len()].iter().map(|l| l + gain_db * LN_PER_DB).collect();
+            let reference = self.data.reference[*band];
+            effects(true, &BandView { band: *band, reference, ..*view }, &mut leak);
+            sums.iter_mut().zip(&leak).for_each(|(s, l)| *s += share * l.exp());
         }
+        ln_energy.iter_mut().zip(&sums).for_each(|(l, s)| *l = s.max(1e-300).ln());
+        effects(false, view, ln_energy);
         let silence = (SILENCE * view.reference).ln();
         ln_energy.iter_mut().for_each(|l| *l = l.max(silence));
+    }
+
+    fn gain_db(&self, values: &[f64], pair: usize) -> f64 {
+        values[self.first_gain + self.assignment[pair]] + self.common_gain.map_or(0.0, |index| values[index])
     }
 
     /// Energy of the paths in one band at these materials and gains, before any effect, and the change of its logarithm with
@@ -173,9 +188,7 @@ impl<'a> EnergyModel<'a> {
         let shift: Vec<f64> = (0..m)
             .map(|k| ((1.0 - values[k * bands + band]) / (1.0 - self.data.absorption[k][band])).ln())
             .collect();
-        let response = self.assignment[pair];
-        let gain_db =
-            values[self.first_gain + response] + self.common_gain.map_or(0.0, |index| values[index]);
+        let gain_db = self.gain_db(values, pair);
         let mut ln_energy = Vec::with_capacity(count);
         let mut slopes = Vec::with_capacity(count * m);
         let mut moved = vec![0.0; m];
@@ -192,11 +205,8 @@ impl<'a> EnergyModel<'a> {
             }
             let sum = energy.ln();
             moved.iter_mut().for_each(|n| *n /= energy);
-            // What leaks in from other octaves does not change with this octave's absorption.
-            let with_leak = (sum.exp() + state.leak[bin]).ln();
-            let own = (sum - with_leak).exp();
-            ln_energy.push(with_leak + gain_db * LN_PER_DB);
-            slopes.extend((0..m).map(|k| -own * moved[k] / (1.0 - values[k * bands + band])));
+            ln_energy.push(sum + gain_db * LN_PER_DB);
+            slopes.extend((0..m).map(|k| -moved[k] / (1.0 - values[k * bands + band])));
         }
         (ln_energy, slopes)
     }
@@ -223,7 +233,7 @@ impl<'a> EnergyModel<'a> {
     /// Logarithm of the predicted energy in the bins of a pair and band, as many as are compared.
     pub fn predicted(&self, values: &[f64], pair: usize, band: usize, count: usize) -> Vec<f64> {
         let (mut ln_energy, _) = self.paths(values, pair, band, count);
-        self.apply(values, &self.view(pair, band), &mut ln_energy);
+        self.apply(values, &self.view(pair, band), self.gain_db(values, pair), &mut ln_energy);
         ln_energy
     }
 
@@ -265,7 +275,8 @@ impl<'a> EnergyModel<'a> {
         let view = self.view(pair, band);
         let (paths, path_slopes) = self.paths(values, pair, band, count);
         let mut predicted = paths.clone();
-        self.apply(values, &view, &mut predicted);
+        let gain_db = self.gain_db(values, pair);
+        self.apply(values, &view, gain_db, &mut predicted);
         let silence = SILENCE * self.data.reference[band];
         let dispersion = self.data.dispersion[band];
         let shape = |bin: usize| 1.0 / (self.data.states[pair][band].variance[bin] * dispersion);
@@ -280,7 +291,7 @@ impl<'a> EnergyModel<'a> {
 
         // Columns that matter in this band, and the change of the predicted logarithm with each.
         let mut columns: Vec<usize> = (0..m).map(|k| k * bands + band).collect();
-        let through = self.through(values, &view, &paths);
+        let through = self.through(values, &view, gain_db, &paths);
         let mut rows: Vec<Vec<f64>> =
             (0..m).map(|k| (0..count).map(|bin| path_slopes[bin * m + k] * through[bin]).collect()).collect();
         let gain: Vec<f64> = through.iter().map(|t| t * LN_PER_DB).collect();
@@ -294,7 +305,7 @@ impl<'a> EnergyModel<'a> {
             for (i, p) in placed.parameters.iter().enumerate() {
                 if p.band.is_none_or(|own| own == band) {
                     columns.push(placed.first + i);
-                    rows.push(self.difference(values, placed.first + i, &view, &paths));
+                    rows.push(self.difference(values, placed.first + i, &view, gain_db, &paths));
                 }
             }
         }
@@ -320,27 +331,31 @@ impl<'a> EnergyModel<'a> {
     }
 
     /// How much of a change of the paths' energy comes through the effects.
-    fn through(&self, values: &[f64], view: &BandView<'_>, paths: &[f64]) -> Vec<f64> {
-        if self.effects.is_empty() {
-            return vec![1.0; paths.len()];
-        }
+    fn through(&self, values: &[f64], view: &BandView<'_>, gain_db: f64, paths: &[f64]) -> Vec<f64> {
         let at = |offset: f64| {
             let mut moved: Vec<f64> = paths.iter().map(|p| p + offset).collect();
-            self.apply(values, view, &mut moved);
+            self.apply(values, view, gain_db, &mut moved);
             moved
         };
         at(STEP).iter().zip(at(-STEP)).map(|(up, down)| (up - down) / (2.0 * STEP)).collect()
     }
 
     /// Change of the predicted logarithm with a parameter of an effect.
-    fn difference(&self, values: &[f64], index: usize, view: &BandView<'_>, paths: &[f64]) -> Vec<f64> {
+    fn difference(
+        &self,
+        values: &[f64],
+        index: usize,
+        view: &BandView<'_>,
+        gain_db: f64,
+        paths: &[f64],
+    ) -> Vec<f64> {
         let prior = self.priors[index];
         let step = STEP * prior.sd;
         let at = |offset: f64| {
             let mut moved = values.to_vec();
             moved[index] = (moved[index] + offset).clamp(prior.low, prior.high);
             let mut ln_energy = paths.to_vec();
-            self.apply(&moved, view, &mut ln_energy);
+            self.apply(&moved, view, gain_db, &mut ln_energy);
             (moved[index], ln_energy)
         };
         let ((high, up), (low, down)) = (at(step), at(-step));
@@ -348,17 +363,6 @@ impl<'a> EnergyModel<'a> {
             return vec![0.0; paths.len()];
         }
         up.iter().zip(down).map(|(u, d)| (u - d) / (high - low)).collect()
-    }
-
-    /// Log-likelihood of each pair alone.
-    pub fn by_pair(&self, values: &[f64]) -> Vec<f64> {
-        (0..self.assignment.len())
-            .map(|pair| {
-                (0..self.data.survey.bands.len())
-                    .map(|band| self.band_likelihood(values, pair, band, None))
-                    .sum()
-            })
-            .collect()
     }
 }
 

@@ -39,8 +39,6 @@ pub(crate) struct Arrival {
 /// Paths of one pair with what does not change from fit to fit.
 pub(crate) struct TracedPair {
     paths: PathSet,
-    pub source: usize,
-    pub receiver: usize,
     pub air: Air,
     pub speed_m_s: f64,
     /// Time of flight of the direct sound, or of the shortest path where that is blocked.
@@ -59,8 +57,10 @@ pub(crate) struct TracedPair {
 pub(crate) struct BandState {
     pub bins: Bins,
     pub ln_energy: Vec<f64>,
-    /// Energy that the octave filter lets in from the neighbouring octaves.
-    pub leak: Vec<f64>,
+    /// Share of the octave's own energy that its filter takes.
+    pub own_share: f64,
+    /// What it lets in of neighbouring octaves: their index, share, and the logarithm of their energy in these bins.
+    pub leaks: Vec<(usize, f64, Vec<f64>)>,
     /// Groups of paths with like hits: those of bin k are `groups[k]..groups[k + 1]`.
     pub groups: Vec<usize>,
     /// Energy of each group.
@@ -92,7 +92,7 @@ impl BandState {
 
 impl TracedPair {
     /// `stated` are the materials as far as they are known: they say which paths matter.
-    pub fn new(paths: PathSet, ends: [usize; 2], air: Air, stated: &[Material]) -> Result<Self, Error> {
+    pub fn new(paths: PathSet, air: Air, stated: &[Material]) -> Result<Self, Error> {
         let speed_m_s = air.speed_of_sound_m_s();
         let shortest = paths.lengths_m().iter().copied().fold(f32::INFINITY, f32::min);
         let direct = (0..paths.len()).find(|&i| paths.is_direct(i)).map(|i| paths.lengths_m()[i]);
@@ -108,11 +108,10 @@ impl TracedPair {
         let departures = (0..paths.len()).map(|i| paths.departure(i).map(|x| x as f32)).collect();
         let times_s: Vec<f32> =
             paths.lengths_m().iter().map(|l| (f64::from(*l) / speed_m_s - direct_s) as f32).collect();
-        let [source, receiver] = ends;
         let energies = paths.energies(stated, &air)?;
         let weights: Vec<f32> = (0..paths.len()).map(|i| energies.iter().map(|e| e[i]).sum()).collect();
         let groups = hit_groups::group(&times_s, &weights, &hits, materials);
-        Ok(Self { paths, source, receiver, air, speed_m_s, direct_s, hits, departures, times_s, groups })
+        Ok(Self { paths, air, speed_m_s, direct_s, hits, departures, times_s, groups })
     }
 
     /// The exact paths, the shortest first.
@@ -151,13 +150,13 @@ impl TracedPair {
             .map(|(band, e)| self.band(band, e, Bins::new(bands, band), &kernels[band], duration_s))
             .collect();
         for (band, state) in states.iter_mut().enumerate() {
-            let shares = &kernels[band].shares;
-            let mut others = vec![0.0f32; self.paths.len()];
-            for (b, e) in energies.iter().enumerate().filter(|(b, _)| *b != band && shares[*b] > LEAST_LEAK) {
-                let share = shares[b] as f32;
-                others.iter_mut().zip(e).for_each(|(o, e)| *o += share * e);
+            for (b, &share) in kernels[band].shares.iter().enumerate() {
+                if b != band && share > LEAST_LEAK {
+                    let sums = self.sums(&energies[b], state.bins, &kernels[band], duration_s);
+                    let floor = NOTHING * sums.iter().copied().fold(0.0, f64::max).max(1e-30);
+                    state.leaks.push((b, share, sums.iter().map(|e| e.max(floor).ln()).collect()));
+                }
             }
-            state.leak = self.sums(&others, state.bins, &kernels[band], duration_s);
         }
         if scattering {
             let mut table: Vec<Vec<Vec<f64>>> = vec![Vec::new(); bands.len()];
@@ -176,11 +175,7 @@ impl TracedPair {
                         Some(e) => {
                             let sums = self.sums(&e[band], state.bins, &kernels[band], duration_s);
                             let floor = NOTHING * sums.iter().copied().fold(0.0, f64::max);
-                            let own = kernels[band].shares[band].ln();
-                            sums.iter()
-                                .zip(&state.ln_energy)
-                                .map(|(s, l)| own + s.max(floor).ln() - l)
-                                .collect()
+                            sums.iter().zip(&state.ln_energy).map(|(s, l)| s.max(floor).ln() - l).collect()
                         }
                     });
                 }
@@ -331,7 +326,8 @@ impl TracedPair {
         let mut state = BandState {
             bins,
             ln_energy: Vec::with_capacity(count),
-            leak: Vec::new(),
+            own_share: kernel.shares[band],
+            leaks: Vec::new(),
             groups: vec![0],
             group_energy: Vec::new(),
             group_hits: Vec::new(),
@@ -341,20 +337,19 @@ impl TracedPair {
             variance: Vec::with_capacity(count),
             scattering: Vec::new(),
         };
-        let own_share = kernel.shares[band];
         for bin in 0..count {
             let s = &sums[bin * COLUMNS..(bin + 1) * COLUMNS];
             let e = s[0].max(floor);
-            state.ln_energy.push((own_share * e).ln());
+            state.ln_energy.push(e.ln());
             state.time_s.push(if s[0] > floor { s[1] / e } else { bins.centre_s(bin) });
             state.departure.push(std::array::from_fn(|k| s[2 + k] / e));
             state.departure_products.push(std::array::from_fn(|k| s[5 + k] / e));
             for row in rows[bin].values().filter(|r| r[0] > 0.0) {
-                state.group_energy.push(own_share * row[0]);
+                state.group_energy.push(row[0]);
                 state.group_hits.extend(row[1..].iter().map(|h| h / row[0]));
             }
             if s[0] <= floor {
-                state.group_energy.push(own_share * floor);
+                state.group_energy.push(floor);
                 state.group_hits.extend(std::iter::repeat_n(0.0, m));
             }
             state.groups.push(state.group_energy.len());

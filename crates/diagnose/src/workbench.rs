@@ -56,8 +56,6 @@ pub(crate) struct Workbench {
     pub reference: Vec<f64>,
     pub dispersion: Vec<f64>,
     pub notes: Vec<String>,
-    /// Index in the room file of each response.
-    pub entries: Vec<usize>,
     traced_s: f64,
     pub seconds: BTreeMap<&'static str, f64>,
 }
@@ -72,7 +70,7 @@ impl Workbench {
         }
         let bands = room.bands();
         let mut notes = Vec::new();
-        let (mut measured, mut responses, mut entries) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut measured, mut responses) = (Vec::new(), Vec::new());
         let mut kernels: BTreeMap<u32, Vec<BandKernel>> = BTreeMap::new();
         let mut samples: Vec<ImpulseResponse> = Vec::new();
         for (i, entry) in room.responses().iter().enumerate() {
@@ -102,7 +100,6 @@ impl Workbench {
                         direct_s: found.direct_s,
                     });
                     measured.push(found);
-                    entries.push(i);
                     samples.push(response);
                 }
                 Err(reason) => notes.push(format!("The response {name} is left out: {reason}.")),
@@ -165,7 +162,6 @@ impl Workbench {
             arrivals: Vec::new(),
             reference: Vec::new(),
             notes,
-            entries,
             traced_s,
             seconds: BTreeMap::from([("trace", started.elapsed().as_secs_f64())]),
         };
@@ -487,7 +483,7 @@ fn trace(
         report(observer, "tracing", i as u64, survey.responses.len() as u64)?;
         let (source, receiver) = (&room.sources()[response.source], &room.receivers()[response.receiver]);
         let paths = tracer.trace_prepared(&prepared, source, receiver, &response.air, &())?;
-        found.push(TracedPair::new(paths, [response.source, response.receiver], response.air, materials)?);
+        found.push(TracedPair::new(paths, response.air, materials)?);
     }
     Ok(found)
 }
