@@ -113,8 +113,14 @@ fn parameters(page: &mut Page, findings: &Findings) -> Result<()> {
 fn gain_sentence(cause: &Cause) -> String {
     cause.held_out_gain.as_ref().map_or(String::new(), |gain| {
         format!(
-            " At positions that the fit had not seen, decay curves come closer: {:.2} dB off before, {:.2} dB after.",
-            gain.db_rmse_before, gain.db_rmse_after
+            " At positions that the fit had not seen, decay curves {}: {:.2} dB off before, {:.2} dB after.",
+            if gain.db_rmse_after < gain.db_rmse_before {
+                "come closer"
+            } else {
+                "do not come closer, which speaks against it"
+            },
+            gain.db_rmse_before,
+            gain.db_rmse_after
         )
     })
 }
