@@ -133,14 +133,20 @@ fn octave_chart(cause: &Cause) -> Result<Option<String>> {
         return Ok(None);
     }
     let points = found.iter().map(|((_, hz), p)| (*hz, p.value)).collect();
-    let mut series = Series::new("found (90 %)", Look::Dots, 1, points);
-    series.half_widths = found.iter().map(|(_, p)| 0.5 * (p.high - p.low)).collect();
+    let mut series = vec![Series::new("found (90 %)", Look::Dots, 1, points)];
+    // Intervals at a bound are not symmetric about the value.
+    series.extend(found.iter().map(|((_, hz), p)| {
+        let mut interval = Series::new("", Look::Line, 1, vec![(*hz, p.low), (*hz, p.high)]);
+        interval.in_legend = false;
+        interval
+    }));
+    let unit = if first.unit.is_empty() { String::new() } else { format!(" ({})", first.unit) };
     let chart = Chart {
         x_label: "Octave (Hz)".into(),
-        y_label: format!("{} ({})", capital(&stem.replace('_', " ")), first.unit),
+        y_label: capital(&stem.replace('_', " ")) + &unit,
         x: Scale::Octaves(found.iter().map(|((_, hz), _)| *hz).collect()),
         y: None,
-        series: vec![series],
+        series,
         small: false,
     };
     chart.svg().map(Some)
