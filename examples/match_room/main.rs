@@ -6,6 +6,7 @@ mod report;
 
 use clap::Parser;
 use sabine::acoustics::{Channel, MeasuredRoom, SampleFormat, Signal, encode_wav, read_audio};
+use sabine::diagnose::ExtendedModel;
 use sabine::{MatchConfig, MatchInput, MatchSummary, Recording, RoomMatch, match_room, materials_toml};
 use sabine_examples::{Bar, OutputFolder};
 use std::error::Error;
@@ -21,6 +22,10 @@ struct Arguments {
     /// Folder with room.toml and its mesh [default: the fixture]
     #[arg(long, value_name = "DIR")]
     room: Option<PathBuf>,
+    /// extended_model.toml of `diagnose`: the simulation starts from its materials, air, dimensions and places. Loudspeaker,
+    /// noise and recorder of that measurement are left out: the speech has its own
+    #[arg(long, value_name = "F.toml")]
+    model: Option<PathBuf>,
     /// Source in the room file [default: its first]
     #[arg(long, value_name = "ID")]
     source: Option<String>,
@@ -67,7 +72,10 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error + Send + Sync>> {
     let channel = arguments.channel.map_or(Channel::Mono, Channel::Index);
     let speech = read_audio(&speech_path, channel)?;
     let dry = read_audio(&dry_path, channel)?;
-    let room = MeasuredRoom::read(&room_path)?;
+    let mut room = MeasuredRoom::read(&room_path)?;
+    if let Some(model) = &arguments.model {
+        room = ExtendedModel::read(model)?.room(&room)?.measured_room(&room)?;
+    }
     let first = |ids: Vec<&str>| ids.first().map(ToString::to_string).unwrap_or_default();
     let source =
         arguments.source.clone().unwrap_or_else(|| first(room.sources().iter().map(|s| &*s.id).collect()));

@@ -10,6 +10,7 @@ use sabine::acoustics::{
     Conditions, DiffuseRoom, Directivity, MeasuredRoom, NoReading, Orientation, PathParameters, PathSet,
     PerBand, Propagator, Reading, Receiver, SampleFormat, Signal, Source, encode_wav, write_atomically,
 };
+use sabine::diagnose::ExtendedModel;
 use sabine::propagate::{
     AmbisonicRenderer, MeshReport, PathTracer, PressureRenderer, RenderConfig, TracerConfig,
 };
@@ -33,6 +34,10 @@ struct Arguments {
     /// Folder with room.toml and its mesh [default: the fixture]
     #[arg(long, value_name = "DIR")]
     room: Option<PathBuf>,
+    /// extended_model.toml of `diagnose`: the room, the sources' pattern and impulse_response.wav are as it says; ambisonics,
+    /// plan and parameters are those of the room, without loudspeaker response, noise and recorder
+    #[arg(long, value_name = "F.toml")]
+    model: Option<PathBuf>,
     /// Source in the room file [default: its first]
     #[arg(long, value_name = "ID")]
     source: Option<String>,
@@ -49,7 +54,7 @@ struct Arguments {
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     duration: Option<f64>,
     /// How the source radiates, along its orientation in the room file or else towards the receiver
-    #[arg(long, value_enum, default_value = "omni")]
+    #[arg(long, value_enum, default_value = "omni", conflicts_with = "model")]
     pattern: Pattern,
     /// Add sound diffracted over edges to receivers in a shadow
     #[arg(long)]
@@ -108,7 +113,10 @@ fn run(arguments: &Arguments) -> Result<(), Anything> {
     let out = arguments.out.as_deref().map(OutputFolder::create).transpose()?;
     let fixture = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures/room"));
     let room_path = arguments.room.as_deref().unwrap_or(fixture);
-    let room = MeasuredRoom::read(room_path)?;
+    let stated = MeasuredRoom::read(room_path)?;
+    let model = arguments.model.as_ref();
+    let extended = model.map(|path| ExtendedModel::read(path)?.room(&stated)).transpose()?;
+    let room = extended.as_ref().map_or_else(|| Ok(stated.clone()), |model| model.measured_room(&stated))?;
     let source = chosen(arguments.source.as_deref(), room.sources(), |id| room.source(id), "source")?;
     let receiver =
         chosen(arguments.receiver.as_deref(), room.receivers(), |id| room.receiver(id), "receiver")?;
@@ -120,7 +128,10 @@ fn run(arguments: &Arguments) -> Result<(), Anything> {
     let materials: Vec<_> = room.scene().materials().iter().map(|named| named.material.clone()).collect();
     let air = room.air();
     let pattern = pattern(arguments.pattern)?;
-    let mut conditions = Conditions::new(&materials, &air);
+    let mut conditions = match (&extended, room.sources().iter().position(|s| s.id == source.id)) {
+        (Some(model), Some(index)) => model.conditions(&materials, index),
+        _ => Conditions::new(&materials, &air),
+    };
     let towards = |from: [f64; 3], to: [f64; 3]| Orientation::towards([0, 1, 2].map(|i| to[i] - from[i]));
     if let Some(pattern) = &pattern {
         let axis =
@@ -135,7 +146,10 @@ fn run(arguments: &Arguments) -> Result<(), Anything> {
     let trace_s = start.elapsed().as_secs_f64();
     bar.finish();
     let start = Instant::now();
-    let response = mono.render_under(&paths, &conditions)?;
+    let mut response = mono.render_under(&paths, &conditions)?;
+    if let Some(model) = &extended {
+        response = model.finish(&source.id, &receiver.id, response, arguments.seed)?;
+    }
     let directional = ambisonic.render(&paths, &conditions, facing)?;
     let render_s = start.elapsed().as_secs_f64();
 
@@ -146,6 +160,7 @@ fn run(arguments: &Arguments) -> Result<(), Anything> {
     println!("{} paths; traced in {trace_s:.2} s, rendered in {render_s:.2} s", paths.len());
     let mut result = as_json(&parameters);
     result["room"] = json!(room_path.display().to_string());
+    result["model"] = json!(model.map(|path| path.display().to_string()));
     result["source"] = json!(source.id);
     result["receiver"] = json!(receiver.id);
     result["contributions"] = json!(paths.len());

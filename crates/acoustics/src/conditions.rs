@@ -18,8 +18,10 @@ use crate::{Air, Directivity, Error, Material, OctaveBands, Orientation};
 pub struct Conditions<'a> {
     /// A material for each that the paths know, in the same order.
     pub materials: &'a [Material],
-    /// The air: attenuation and speed of sound.
+    /// The air: speed of sound, and attenuation unless another air is named for it.
     pub air: &'a Air,
+    /// The air that attenuates, where what is known of it was found apart from the speed of sound; `None` is [`Conditions::air`].
+    pub attenuation: Option<&'a Air>,
     /// How the source radiates and where it faces; `None` is omnidirectional.
     pub source: Option<(&'a Directivity, Orientation)>,
     /// How the receiver hears and where it faces; `None` is omnidirectional.
@@ -29,7 +31,13 @@ pub struct Conditions<'a> {
 impl<'a> Conditions<'a> {
     /// Omnidirectional source and receiver between these surfaces.
     pub fn new(materials: &'a [Material], air: &'a Air) -> Self {
-        Self { materials, air, source: None, receiver: None }
+        Self { materials, air, attenuation: None, source: None, receiver: None }
+    }
+
+    /// The same with sound attenuated as by another air; the speed of sound stays.
+    #[must_use]
+    pub fn with_attenuation(self, air: &'a Air) -> Self {
+        Self { attenuation: Some(air), ..self }
     }
 
     /// The same with a directional source. Energies are then relative to the direct sound on its axis at 1 m.

@@ -1,6 +1,7 @@
 //! A room as it was measured: mesh, materials as far as they are known, places and responses, from a folder.
 
 mod file;
+mod other_model;
 mod write;
 
 pub use write::{NewResponse, NewRoom};

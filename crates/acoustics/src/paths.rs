@@ -417,10 +417,10 @@ impl PathSet {
     /// # Errors
     /// As [`PathSet::log_reflectance`]; [`Error::BandMismatch`] for a directivity on other bands than the materials.
     pub fn energies_under(&self, conditions: &Conditions) -> Result<Vec<Vec<f32>>, Error> {
-        let Conditions { materials, air, .. } = *conditions;
+        let Conditions { materials, air, attenuation, .. } = *conditions;
         let bands = self.check_materials(materials)?;
         conditions.check_bands(bands)?;
-        let exponents = air.energy_exponent_per_m(bands);
+        let exponents = attenuation.unwrap_or(air).energy_exponent_per_m(bands);
         let groups: Vec<usize> = (0..bands.len()).step_by(LANES).collect();
         let mut energies: Vec<Vec<f32>> = groups
             .into_par_iter()
@@ -592,6 +592,18 @@ mod tests {
         assert!((f64::from(found) / expected - 1.0).abs() < 1e-6);
         assert_eq!(&paths.hit_counts()[ab as usize * 2..], &[1, 1]);
         assert_eq!(paths.last_reflection(ab), Some((a, 1, Reflection::Scattered)));
+    }
+
+    #[test]
+    fn attenuation_may_come_from_another_air() {
+        let mut paths = PathSet::new(1, 100.0);
+        paths.push(path(50.0, 0.0, PathSet::DIRECT, None));
+        let bands = OctaveBands::new(8000.0, 8000.0).unwrap();
+        let wall = [Material::uniform(bands, 0.1, 0.1).unwrap()];
+        let (air, dry) = (Air::default(), Air::new(20.0, 10.0, 101.325).unwrap());
+        let found = paths.energies_under(&Conditions::new(&wall, &air).with_attenuation(&dry)).unwrap()[0][0];
+        let expected = 10f64.powf(-5.0 * dry.attenuation_db_per_m(bands.exact_hz(0)));
+        assert!((f64::from(found) / expected - 1.0).abs() < 1e-5);
     }
 
     #[test]

@@ -2,11 +2,11 @@
 
 use crate::ExtendedModel;
 use sabine_acoustics::{OctaveBands, PerBand};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// The answer in one word.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Verdict {
@@ -32,7 +32,7 @@ impl fmt::Display for Verdict {
 }
 
 /// Whether chance explains what is left.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct LackOfFit {
     /// Probability of a misfit at least as large by chance, under the baseline, from simulated measurements.
@@ -48,7 +48,7 @@ pub struct LackOfFit {
 }
 
 /// A parameter of a named cause.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct FoundParameter {
     /// Name.
@@ -64,7 +64,7 @@ pub struct FoundParameter {
 }
 
 /// What is gained at positions that the fit has not seen.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct HeldOutGain {
     /// Mean gain of the logarithm of the predictive density, per compared bin.
@@ -80,7 +80,7 @@ pub struct HeldOutGain {
 }
 
 /// A named cause.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Cause {
     /// Identifier in the catalogue.
@@ -100,7 +100,7 @@ pub struct Cause {
 }
 
 /// How much speaks for one effect of the catalogue.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct CandidateScore {
     /// Identifier.
@@ -114,7 +114,7 @@ pub struct CandidateScore {
 }
 
 /// Whether these positions can tell two effects apart, known before the residuals are looked at.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Isolability {
     /// Identifiers of the two.
@@ -128,7 +128,7 @@ pub struct Isolability {
 }
 
 /// A material after the fit.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct FittedMaterial {
     /// Absorption that the room file states (or the stand-in for an unknown one).
@@ -142,7 +142,7 @@ pub struct FittedMaterial {
 }
 
 /// Prediction of positions that were not fitted: baseline, named causes, and the free discrepancy side by side.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct HeldOut {
     /// Receivers, each predicted from the others.
@@ -162,7 +162,7 @@ pub struct HeldOut {
 }
 
 /// Mean residual of one octave at one time, for a map of where it is wrong.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct ResidualCell {
     /// Response, by name; `None` for the mean over all.
@@ -180,7 +180,7 @@ pub struct ResidualCell {
 }
 
 /// Decay curves of one octave of one response.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct DecayCurves {
     /// Response, by name.

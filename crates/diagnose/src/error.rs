@@ -59,4 +59,13 @@ pub enum Error {
         #[source]
         source: Box<toml::de::Error>,
     },
+    /// An extended model does not fit the room, or holds a value out of range.
+    #[error("extended model: {field}: {source}")]
+    InModel {
+        /// The field, as it stands in the file: `absorption.carpet`.
+        field: String,
+        /// What is wrong with it.
+        #[source]
+        source: Box<sabine_acoustics::Error>,
+    },
 }

@@ -1,0 +1,147 @@
+//! What a simulated room gets wrong against measured responses, why, and what mending it gains.
+//!
+//! Without arguments it runs on the fixture of the repository, whose two responses show what can be said with that little.
+
+mod bars;
+mod findings;
+mod held_out;
+mod look_alikes;
+mod report;
+#[cfg(test)]
+mod report_tests;
+mod residual_map;
+mod words;
+
+use clap::Parser;
+use findings::Findings;
+use sabine::acoustics::MeasuredRoom;
+use sabine::diagnose::{DiagnoseConfig, Diagnoser, catalogue};
+use sabine_examples::{Bar, OutputFolder};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Find what a simulation of a room gets wrong against measured responses.
+#[derive(Parser)]
+struct Arguments {
+    /// Folder with room.toml, its mesh and measured responses [default: the fixture]
+    #[arg(long, value_name = "DIR")]
+    room: Option<PathBuf>,
+    /// Receivers that are never fitted, only predicted [default: each is held out in turn]
+    #[arg(long, value_name = "ID,...", value_delimiter = ',')]
+    hold_out: Vec<String>,
+    /// Causes to try, by their names in the catalogue [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    effects: Vec<String>,
+    /// Rays for each source-receiver pair [default: 4000]
+    #[arg(long)]
+    rays: Option<usize>,
+    /// Seed of rays and simulated measurements
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Go on although more than one ray in a thousand escapes through holes of the mesh
+    #[arg(long)]
+    allow_leaks: bool,
+    /// Folder for diagnosis.json, report.html and extended_model.toml
+    #[arg(long, value_name = "DIR", default_value = "out/diagnose")]
+    out: PathBuf,
+}
+
+type Anything = Box<dyn std::error::Error + Send + Sync>;
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), Anything> {
+    let fixture = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures/room"));
+    let path = arguments.room.as_deref().unwrap_or(fixture);
+    let mut config = DiagnoseConfig {
+        seed: arguments.seed,
+        allow_leaks: arguments.allow_leaks,
+        ..DiagnoseConfig::default()
+    };
+    if let Some(rays) = arguments.rays {
+        config.rays = rays;
+    }
+    let tried = match &arguments.effects {
+        ids if ids.is_empty() => catalogue().len(),
+        ids => ids.iter().collect::<BTreeSet<_>>().len(),
+    };
+    // What a name must reach: the odds that are asked for, and the number that was tried.
+    let threshold_nats = config.naming_nats + (tried as f64).ln();
+    let mut diagnoser = Diagnoser::new(config)?;
+    if !arguments.effects.is_empty() {
+        diagnoser = diagnoser.with_only(&arguments.effects)?;
+    }
+    // A folder that cannot be written to should not cost the user a computation first.
+    let mut out = OutputFolder::create(&arguments.out)?;
+    let room = MeasuredRoom::read(path)?;
+    let bar = Bar::new();
+    let diagnosis = diagnoser.diagnose(&room, &arguments.hold_out, &bar)?;
+    bar.finish();
+
+    let mut receivers: Vec<usize> = room.responses().iter().map(|r| r.receiver).collect();
+    receivers.sort_unstable();
+    receivers.dedup();
+    let name = path.display().to_string();
+    let model = diagnosis.model.to_toml()?;
+    let findings = Findings::new(diagnosis, name, room.responses().len(), receivers.len(), threshold_nats);
+    out.write("diagnosis.json", findings.json()?.as_bytes())?;
+    out.write("report.html", report::html(&findings)?.as_bytes())?;
+    out.write("extended_model.toml", model.as_bytes())?;
+    out.finish()?;
+    print_findings(&findings, &arguments.out);
+    Ok(())
+}
+
+fn print_findings(findings: &Findings, out: &Path) {
+    println!("verdict: {}", findings.verdict);
+    println!("{}", words::headline(findings));
+    for line in words::meaning(findings) {
+        println!("  {line}");
+    }
+    for cause in &findings.causes {
+        println!(
+            "{} (probability {:.3})",
+            words::effect_of(&cause.effect, cause.subject.as_deref()),
+            cause.probability
+        );
+        for p in &cause.parameters {
+            let told = |value: f64| words::number(value, p.high - p.low);
+            println!(
+                "  {:<28} {:>8} {:<6} 90 %: {} to {}",
+                words::parameter(&p.name),
+                told(p.value),
+                p.unit,
+                told(p.low),
+                told(p.high)
+            );
+        }
+        if let Some(gain) = &cause.held_out_gain {
+            println!(
+                "  decay curves at positions not seen: {:.2} dB off before, {:.2} dB after",
+                gain.db_rmse_before, gain.db_rmse_after
+            );
+        }
+    }
+    if !findings.alternatives.is_empty() {
+        println!("one of: {}", findings.alternatives.join(", "));
+    }
+    for measurement in &findings.would_decide {
+        println!("would decide: {measurement}");
+    }
+    if findings.held_out.is_none() {
+        println!("note: too few positions to hold any out; gains are those of the data that were fitted");
+    }
+    for note in &findings.notes {
+        println!("note: {note}");
+    }
+    println!("{:.1} s; look at {}", findings.total_s(), out.join("report.html").display());
+}
