@@ -210,6 +210,9 @@ impl Diagnoser {
                 unseated.join(" and ")
             ));
         }
+        if !(base.energy.settled && state.energy.settled && state.arrivals.settled) {
+            notes.push("A fit had not come to rest after its last step: take its figures with caution.".into());
+        }
         if verdict == Verdict::Explained && lack_after.p_value < self.config.significance {
             notes.push("A significant misfit is left that none of the named causes explains.".into());
         }
@@ -303,6 +306,26 @@ impl Diagnoser {
             if !rivals.is_empty() {
                 named.rivals = std::iter::once(best.id).chain(rivals.iter().map(|r| r.id)).collect();
                 break;
+            }
+            let moved: Vec<(Nuisance, [f64; 3])> = {
+                let search = Search::new(bench, cases, self.effects.len(), used.to_vec());
+                let state = search.state(&named.chosen, None)?;
+                let offset = |first: usize| std::array::from_fn(|k| state.arrivals.values[first + k]);
+                cases[best.best]
+                    .2
+                    .widens()
+                    .into_iter()
+                    .filter_map(|(place, _)| match place {
+                        Nuisance::SourcePosition(i) => Some((place, offset(3 * i))),
+                        Nuisance::ReceiverPosition(i) => {
+                            Some((place, offset(3 * (bench.survey.sources.len() + i))))
+                        }
+                        _ => None,
+                    })
+                    .collect()
+            };
+            for (place, offset_m) in moved {
+                bench.move_place(place, offset_m)?;
             }
             let chosen: Vec<&dyn Case> = named
                 .chosen

@@ -1,4 +1,61 @@
-//! draft
+//! Given measured responses, says what a simulation of the room gets wrong, names the cause, extends the model, and measures
+//! the gain at positions that it has not seen.
+//!
+//! # Where it stands
+//! At the end of the workspace, after `acoustics` (rooms, responses), `propagate` (paths) and `optimize`. [`Diagnoser`] takes a
+//! [`MeasuredRoom`](sabine_acoustics::MeasuredRoom) and returns a [`Diagnosis`]: a [`Verdict`], the [`Cause`]s with parameters and 90 %
+//! intervals, what cannot be told apart and which measurement would decide, and an [`ExtendedModel`] that renders.
+//!
+//! # How
+//! Decays are compared as energy in octaves and time bins, relative to the direct sound; each bin with the spread that interference of
+//! the traced paths and their Monte-Carlo error give it. Arrival times of the direct sound and of early reflections are compared
+//! by themselves. Absorption stays free within its stated uncertainty beside every cause, gains, latencies and places within
+//! theirs: otherwise a cause is credited with what absorption could have explained. Each cause is weighed by its evidence, all
+//! parameters integrated out, against every other and against a smooth discrepancy without a name; details at [`Diagnoser`], the
+//! reasoning in `docs/explanation/diagnosis.md`.
+//!
+//! # Does not
+//! - see what is not in its [`catalogue`]: then the verdict is [`Verdict::Unexplained`] and the residuals show where it sits.
+//! - diffract, solve waves, or find missing surfaces: the six effects of the catalogue that need it are not built.
+//! - change scattering, geometry or air to make a fit look better: only what is named changes.
+//! - tell apart what the data cannot: a sampling clock and a temperature scale all times alike, and come out as a set.
+//!
+//! # Example
+//! A latency of 5 ms that the room file denies, hidden by the laboratory of the tests and found:
+//! ```
+//! use sabine_diagnose::{DiagnoseConfig, Diagnoser, Verdict};
+//! use sabine_testkit::{Hidden, LabConfig, Laboratory};
+//! let lab = Laboratory::new(LabConfig { seed: 3, receivers: 4, ..LabConfig::default() })?;
+//! let folder = tempfile::tempdir()?;
+//! let room = lab.write(&[Hidden::TimeZero { latency_s: 5e-3 }], &folder.path().join("room"), None)?;
+//! let config = DiagnoseConfig { rays: 500, simulations: 10, ..DiagnoseConfig::default() };
+//! let only = ["time_zero".to_owned(), "position_error".to_owned()];
+//! let found = Diagnoser::new(config)?.with_only(&only)?.diagnose(&room, &[], &())?;
+//! assert_eq!(found.verdict, Verdict::Explained);
+//! assert_eq!(found.causes[0].effect, "time_zero");
+//! let latency = &found.causes[0].parameters[0];
+//! assert!((latency.value - 5.0).abs() < 0.05 && latency.unit == "ms");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Units
+//! Energies relative to the direct sound at 1 m, seconds, metres, dB; evidence in nats (3 nats are odds of 20 to 1).
+//!
+//! # Accuracy
+//! | claim | test |
+//! |---|---|
+//! | hidden effects are named, null rooms are not | `tests/hidden_effects.rs` |
+//! | evidence and bounds of the fit against closed forms | unit tests of the fit |
+//! | spread, groups of paths, octave shares against closed forms | unit tests of their modules |
+//! | rendering from the extended model against closed forms | `tests/rendering.rs` |
+//!
+//! `docs/validation/diagnose.md` has the figures, `cargo run --release --example effect_atlas` makes them.
+//!
+//! # References
+//! - D. J. C. MacKay: Information Theory, Inference, and Learning Algorithms, 2003, chapters 27 and 28 (evidence, Laplace).
+//! - H. Kuttruff: Room Acoustics, 6th edition, 2017 (statistics of responses).
+//! - J. B. Allen, D. A. Berkley: Image method for efficiently simulating small-room acoustics. JASA 65, 1979.
+
 mod arrival_model;
 mod bins;
 mod config;

@@ -2,7 +2,7 @@
 
 use crate::arrival_model::{self, ArrivalData};
 use crate::discrepancy::FreeDiscrepancy;
-use crate::effect::Case;
+use crate::effect::{Case, Nuisance};
 use crate::energy_model::{self, ABSORPTION, Before, BinResidual, EnergyData, EnergyModel};
 use crate::gauss_newton::{Maximum, Prior};
 use crate::kernel::BandKernel;
@@ -12,9 +12,9 @@ use crate::traced_pair::{Arrival, BandState, CELL_S, TracedPair, scattering_more
 use crate::{DiagnoseConfig, Error};
 use rayon::prelude::*;
 use sabine_acoustics::{
-    ImpulseResponse, Material, MaterialPrior, MeasuredRoom, Observer, PerBand, Scene, report,
+    ImpulseResponse, Material, MaterialPrior, MeasuredRoom, Observer, PerBand, Receiver, Scene, Source, report,
 };
-use sabine_propagate::PathTracer;
+use sabine_propagate::{PathTracer, PreparedScene};
 use std::collections::BTreeMap;
 
 /// Extra scattering of the bands of the traced scene, in turn: its paths then serve any scattering.
@@ -57,6 +57,10 @@ pub(crate) struct Workbench {
     pub dispersion: Vec<f64>,
     pub notes: Vec<String>,
     traced_s: f64,
+    tracer: PathTracer,
+    prepared: PreparedScene,
+    sources: Vec<Source>,
+    receivers: Vec<Receiver>,
     pub seconds: BTreeMap<&'static str, f64>,
 }
 
@@ -140,7 +144,8 @@ impl Workbench {
         };
         let priors: Vec<Vec<Prior>> = room.priors().iter().map(absorption_priors).collect();
         let traced_s = traced_s(&survey, &measured, config.range_db);
-        let pairs = trace(room, &survey, &materials, config, traced_s, observer)?;
+        let (tracer, prepared) = prepare(room, &survey, &materials, config, traced_s)?;
+        let pairs = trace(room, &survey, &materials, (&tracer, &prepared), observer)?;
         let absorption = materials
             .iter()
             .map(|m| m.absorption().values().iter().map(|a| a.clamp(ABSORPTION.0, ABSORPTION.1)).collect())
@@ -163,6 +168,10 @@ impl Workbench {
             reference: Vec::new(),
             notes,
             traced_s,
+            tracer,
+            prepared,
+            sources: room.sources().to_vec(),
+            receivers: room.receivers().to_vec(),
             seconds: BTreeMap::from([("trace", started.elapsed().as_secs_f64())]),
         };
         bench.expand(false)?;
@@ -367,6 +376,34 @@ impl Workbench {
         EnergyModel::new(&data, cases, &used).residuals(values, pairs.iter().copied())
     }
 
+    /// Traces the pairs of a source or receiver anew from where it was found to stand: levels of early reflections change with it.
+    /// Arrival times stay relative to the stated place.
+    pub fn move_place(&mut self, place: Nuisance, offset_m: [f64; 3]) -> Result<(), Error> {
+        let moved = |position: [f64; 3]| std::array::from_fn(|k| position[k] + offset_m[k]);
+        match place {
+            Nuisance::SourcePosition(i) => self.sources[i].position_m = moved(self.survey.sources[i].position_m),
+            Nuisance::ReceiverPosition(i) => {
+                self.receivers[i].position_m = moved(self.survey.receivers[i].position_m);
+            }
+            Nuisance::Absorption(_) | Nuisance::ResponseGain(_) => return Ok(()),
+        }
+        for (pair, response) in self.survey.responses.iter().enumerate() {
+            let concerned = place == Nuisance::SourcePosition(response.source)
+                || place == Nuisance::ReceiverPosition(response.receiver);
+            let ends = (&self.sources[response.source], &self.receivers[response.receiver]);
+            if concerned {
+                // A place outside the room is none: the stated one is as good.
+                if let Ok(paths) =
+                    self.tracer.trace_prepared(&self.prepared, ends.0, ends.1, &response.air, &())
+                {
+                    self.pairs[pair] = TracedPair::new(paths, response.air, &self.materials)?;
+                    self.direct_s[pair] = self.pairs[pair].direct_s;
+                }
+            }
+        }
+        self.expand(true)
+    }
+
     /// Sets the dispersion of each band to what the bins still scatter once anything smooth has been taken out.
     pub fn calibrate_dispersion(&mut self, cases: &[&dyn Case], used: &[bool]) -> Result<(), Error> {
         let free = self.free_discrepancy();
@@ -449,14 +486,14 @@ fn traced_s(survey: &Survey, measured: &[Measured], range_db: f64) -> f64 {
     longest.min(LONGEST_S)
 }
 
-fn trace(
+/// The tracer, and the scene with scattering spread over the bands.
+fn prepare(
     room: &MeasuredRoom,
     survey: &Survey,
     materials: &[Material],
     config: &DiagnoseConfig,
     traced_s: f64,
-    observer: &dyn Observer,
-) -> Result<Vec<TracedPair>, Error> {
+) -> Result<(PathTracer, PreparedScene), Error> {
     let bands = survey.bands;
     let spread: Vec<Material> = materials
         .iter()
@@ -478,11 +515,21 @@ fn trace(
     if !config.allow_leaks {
         prepared.check_leaks(&scene, room.sources()[survey.responses[0].source].position_m)?;
     }
+    Ok((tracer, prepared))
+}
+
+fn trace(
+    room: &MeasuredRoom,
+    survey: &Survey,
+    materials: &[Material],
+    (tracer, prepared): (&PathTracer, &PreparedScene),
+    observer: &dyn Observer,
+) -> Result<Vec<TracedPair>, Error> {
     let mut found: Vec<TracedPair> = Vec::new();
     for (i, response) in survey.responses.iter().enumerate() {
         report(observer, "tracing", i as u64, survey.responses.len() as u64)?;
         let (source, receiver) = (&room.sources()[response.source], &room.receivers()[response.receiver]);
-        let paths = tracer.trace_prepared(&prepared, source, receiver, &response.air, &())?;
+        let paths = tracer.trace_prepared(prepared, source, receiver, &response.air, &())?;
         found.push(TracedPair::new(paths, response.air, materials)?);
     }
     Ok(found)

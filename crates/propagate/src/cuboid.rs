@@ -1,7 +1,9 @@
 //! A room that is a cuboid: its specular paths have a closed form, to any order.
 
+use crate::random::generator;
 use crate::surfaces::Surfaces;
 use crate::vector::{Vec3, dot, scale};
+use rand::Rng;
 use sabine_acoustics::{Contribution, NamedMaterial, PathSet, Reflection};
 use std::collections::HashMap;
 
@@ -71,8 +73,9 @@ impl Cuboid {
         Some(Self { axes, low_m, high_m, materials })
     }
 
-    /// Adds the direct path and those specular paths that carry most energy in the octave in which they carry most, `most` at
-    /// most and none longer than the set looks for (Allen and Berkley, JASA 65, 1979).
+    /// Adds the direct path and specular paths of any order, none longer than the set looks for (Allen and Berkley, JASA 65,
+    /// 1979): all of them if there are not more than about `most`, else a random choice that favours those that carry much energy in
+    /// the octave in which they carry most, each with the weight of those that it stands for.
     pub fn add_paths(
         &self,
         paths: &mut PathSet,
@@ -80,6 +83,7 @@ impl Cuboid {
         receiver: Vec3,
         most: usize,
         materials: &[NamedMaterial],
+        seed: u64,
     ) {
         let max_length_m = paths.max_length_m();
         let local = |p: Vec3| -> Vec3 { std::array::from_fn(|k| dot(self.axes[k], p)) };
@@ -140,15 +144,19 @@ impl Cuboid {
                 }
             }
         }
-        // The strongest; ties by number, so that the choice does not depend on how they were sorted.
-        let order = |a: &(f32, [i64; 3]), b: &(f32, [i64; 3])| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
-        if found.len() > most {
-            found.select_nth_unstable_by(most, order);
-            found.truncate(most);
-        }
-        found.sort_by(order);
+        // Chances in proportion to amplitude, so that late arrivals, many and weak, keep some: one over the chance makes up for
+        // those that are dropped, and sums of energy stay right in the mean.
+        let chance = chance_unit(&found, most);
+        found.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let mut chains: HashMap<[u32; 6], u32> = HashMap::from([([0; 6], PathSet::DIRECT)]);
-        for (_, numbers) in found {
+        for (ln_energy, numbers) in found {
+            let kept = ((0.5 * f64::from(ln_energy)).exp() * chance).min(1.0);
+            let place = numbers.map(|n| n as u64).iter().fold(seed, |sum, n| {
+                (sum ^ n.wrapping_mul(0x9E37_79B9_7F4A_7C15)).rotate_left(23).wrapping_mul(0xD6E8_FEB8_6659_FD93)
+            });
+            if kept < 1.0 && generator(seed, place).random::<f64>() >= kept {
+                continue;
+            }
             let to_image: Vec3 = std::array::from_fn(|k| along(k, numbers[k]));
             let length_m = dot(to_image, to_image).sqrt();
             let arrival = scale(to_image, 1.0 / length_m);
@@ -159,7 +167,7 @@ impl Cuboid {
             let chain = self.chain(paths, &mut chains, faces_of(numbers));
             paths.push(Contribution {
                 length_m,
-                log_weight: -2.0 * length_m.ln(),
+                log_weight: -2.0 * length_m.ln() - kept.ln(),
                 chain,
                 tail: PathSet::DIRECT,
                 departure: room(departure),
@@ -189,6 +197,25 @@ impl Cuboid {
         }
         chain
     }
+}
+
+/// The factor by which amplitudes become chances of which about `most` come true, 1 being the largest chance.
+fn chance_unit(found: &[(f32, [i64; 3])], most: usize) -> f64 {
+    if found.len() <= most {
+        return f64::INFINITY;
+    }
+    let amplitudes: Vec<f64> = found.iter().map(|f| (0.5 * f64::from(f.0)).exp()).collect();
+    let expected = |unit: f64| amplitudes.iter().map(|a| (a * unit).min(1.0)).sum::<f64>();
+    let mut low = most as f64 / amplitudes.iter().sum::<f64>();
+    let mut high = low;
+    while expected(high) < most as f64 {
+        high *= 2.0;
+    }
+    for _ in 0..20 {
+        let middle = (low * high).sqrt();
+        if expected(middle) < most as f64 { low = middle } else { high = middle }
+    }
+    low
 }
 
 #[cfg(test)]
@@ -224,7 +251,7 @@ mod tests {
             let turned = ends.map(|v: Vec3| [c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]]);
             let cuboid = Cuboid::find(&Surfaces::new(&scene).unwrap()).unwrap();
             let mut paths = PathSet::new(6, 60.0);
-            cuboid.add_paths(&mut paths, turned[0], turned[1], 2000, scene.materials());
+            cuboid.add_paths(&mut paths, turned[0], turned[1], 5000, scene.materials(), 1);
             let materials: Vec<Material> = scene.materials().iter().map(|m| m.material.clone()).collect();
             let mut all: Vec<f32> = paths.energies(&materials, &Air::default()).unwrap().remove(0);
             all.sort_by(f32::total_cmp);
@@ -260,12 +287,37 @@ mod tests {
         let cuboid = Cuboid::find(&Surfaces::new(&scene).unwrap()).unwrap();
         let mut paths = PathSet::new(6, 60.0);
         let (from, to) = ([1.0, 2.0, 1.5], [3.0, 2.0, 1.5]);
-        cuboid.add_paths(&mut paths, from, to, 30, scene.materials());
-        assert_eq!(paths.len(), 30);
-        let low_x = (0..30).find(|&i| (f64::from(paths.lengths_m()[i]) - 4.0).abs() < 1e-6 && paths.departure(i)[0] < -0.99);
+        cuboid.add_paths(&mut paths, from, to, 100_000, scene.materials(), 1);
+        let low_x = (0..paths.len()).find(|&i| (f64::from(paths.lengths_m()[i]) - 4.0).abs() < 1e-6 && paths.departure(i)[0] < -0.99);
         let behind = low_x.unwrap();
         // Off the wall behind the source and back past it.
         assert!(paths.arrival(behind)[0] < -0.99, "{:?}", paths.arrival(behind));
         assert!(sub(paths.departure(behind), [-1.0, 0.0, 0.0]).iter().all(|x| x.abs() < 1e-3));
+    }
+
+    #[test]
+    fn a_choice_of_paths_keeps_the_energy_over_time() {
+        let scene = scene(0.0);
+        let cuboid = Cuboid::find(&Surfaces::new(&scene).unwrap()).unwrap();
+        let materials: Vec<Material> = scene.materials().iter().map(|m| m.material.clone()).collect();
+        let by_time = |most: usize, seed: u64| -> Vec<f64> {
+            let mut paths = PathSet::new(6, 120.0);
+            cuboid.add_paths(&mut paths, [1.0, 2.0, 1.2], [2.5, 3.5, 1.7], most, scene.materials(), seed);
+            assert!(paths.len() < 2 * most);
+            let energies = paths.energies(&materials, &Air::default()).unwrap().remove(0);
+            let mut sums = vec![0.0; 8];
+            for (e, length) in energies.iter().zip(paths.lengths_m()) {
+                sums[(length / 15.001) as usize] += f64::from(*e);
+            }
+            sums
+        };
+        let all = by_time(1_000_000, 0);
+        let mut mean = vec![0.0; 8];
+        for seed in 0..10 {
+            by_time(8000, seed).iter().zip(&mut mean).for_each(|(e, m)| *m += 0.1 * e);
+        }
+        for (slot, (mean, all)) in mean.iter().zip(&all).enumerate() {
+            assert!((mean / all - 1.0).abs() < 0.03, "slot {slot}: {mean} {all}");
+        }
     }
 }

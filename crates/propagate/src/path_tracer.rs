@@ -30,9 +30,10 @@ pub struct TracerConfig {
     /// Specular paths of up to so many reflections (0 to 10) are found exactly, by image sources.
     pub image_order: usize,
     /// Where the mesh is a cuboid (six whole faces at right angles, each of one material, nothing inside), specular paths have
-    /// a closed form. If this is above zero, so many of any order are found exactly, those that carry most energy with the
-    /// scene's materials in the octave in which they carry most, instead of those up to `image_order`; rays then count none that
-    /// is specular throughout. 0 to 10 million; 200,000 serve most rooms. Worth it where little is scattered.
+    /// a closed form. If this is above zero, about so many of any order are taken from it instead of those up to `image_order`: all
+    /// of them, or a random choice that favours those that carry most with the scene's materials, each standing for others like it;
+    /// rays then count none that is specular throughout. 0 to 10 million; 200,000 serve most rooms. Worth it where little is
+    /// scattered.
     pub cuboid_paths: usize,
     /// Radius of the spheres about both ends that count rays whose last reflection is specular and beyond
     /// [`TracerConfig::image_order`],
@@ -152,7 +153,7 @@ impl PathTracer {
         report(observer, "image sources", 0, 1)?;
         match &scene.cuboid {
             Some(cuboid) if self.config.cuboid_paths > 0 => {
-                cuboid.add_paths(&mut paths, from, to, self.config.cuboid_paths, &scene.named);
+                cuboid.add_paths(&mut paths, from, to, self.config.cuboid_paths, &scene.named, seed);
             }
             _ => add_exact_paths(&mut paths, &scene.mesh, from, to, order, rays.min(1 << 17), seed),
         }
