@@ -307,11 +307,11 @@ impl Diagnoser {
                 named.rivals = std::iter::once(best.id).chain(rivals.iter().map(|r| r.id)).collect();
                 break;
             }
-            let moved: Vec<(Nuisance, [f64; 3])> = {
+            let (moved, absorption) = {
                 let search = Search::new(bench, cases, self.effects.len(), used.to_vec());
                 let state = search.state(&named.chosen, None)?;
                 let offset = |first: usize| std::array::from_fn(|k| state.arrivals.values[first + k]);
-                cases[best.best]
+                let moved: Vec<(Nuisance, [f64; 3])> = cases[best.best]
                     .2
                     .widens()
                     .into_iter()
@@ -322,8 +322,13 @@ impl Diagnoser {
                         }
                         _ => None,
                     })
-                    .collect()
+                    .collect();
+                (moved, state.energy.values)
             };
+            // With the cause at work the materials are others: what is compared, and with which spread, follows them.
+            if cases[best.best].2.evidence() != Evidence::Arrivals {
+                bench.expand_about(&absorption)?;
+            }
             for (place, offset_m) in moved {
                 bench.move_place(place, offset_m)?;
             }

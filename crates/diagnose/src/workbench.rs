@@ -213,6 +213,15 @@ impl Workbench {
         Ok(())
     }
 
+    /// Expands about fitted absorption.
+    pub fn expand_about(&mut self, values: &[f64]) -> Result<(), Error> {
+        let bands = self.survey.bands.len();
+        for (m, material) in self.absorption.iter_mut().enumerate() {
+            material.copy_from_slice(&values[m * bands..(m + 1) * bands]);
+        }
+        self.expand(true)
+    }
+
     /// Fits the baseline, expanding about it anew until it stays.
     fn settle(&mut self, observer: &dyn Observer) -> Result<(), Error> {
         let started = std::time::Instant::now();

@@ -1,0 +1,100 @@
+//! Effects hidden in the responses of laboratory rooms must be found, and none where there is none.
+//!
+//! The rooms and their physics are those of `sabine_testkit`, which shares no code with the tracer or the diagnosis.
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
+use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, Verdict};
+use sabine_testkit::{Hidden, LabConfig, Laboratory};
+
+fn lab(seed: u64) -> Laboratory {
+    Laboratory::new(LabConfig { seed, receivers: 8, ..LabConfig::default() }).unwrap()
+}
+
+fn diagnose(lab: &Laboratory, hidden: &[Hidden]) -> Diagnosis {
+    let folder = tempfile::tempdir().unwrap();
+    let room = lab.write(hidden, &folder.path().join("room"), None).unwrap();
+    let config = DiagnoseConfig { rays: 2000, ..DiagnoseConfig::default() };
+    Diagnoser::new(config).unwrap().diagnose(&room, &[], &()).unwrap()
+}
+
+/// The one cause that is named, with a gain at positions not seen.
+fn only_cause(found: &Diagnosis, effect: &str) -> sabine_diagnose::Cause {
+    let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
+    assert_eq!(found.verdict, Verdict::Explained, "{named:?} {:?}", found.lack_of_fit);
+    assert_eq!(named, [effect]);
+    let cause = found.causes[0].clone();
+    let gain = cause.held_out_gain.clone().unwrap();
+    assert!(gain.low > 0.0, "{gain:?}");
+    cause
+}
+
+fn holds(cause: &sabine_diagnose::Cause, parameter: &str, truth: f64) {
+    let p = cause.parameters.iter().find(|p| p.name == parameter).unwrap();
+    assert!(p.low <= truth && truth <= p.high, "{truth} is not within {p:?}");
+}
+
+#[test]
+fn a_room_without_effects_is_adequate() {
+    for seed in [501, 502] {
+        let found = diagnose(&lab(seed), &[]);
+        assert_eq!(found.verdict, Verdict::Adequate, "{:?} {:?}", found.candidates.first(), found.lack_of_fit);
+        assert!(found.causes.is_empty());
+    }
+}
+
+#[test]
+fn a_latency_is_found() {
+    let found = diagnose(&lab(511), &[Hidden::TimeZero { latency_s: 4e-3 }]);
+    holds(&only_cause(&found, "time_zero"), "latency", 4.0);
+}
+
+#[test]
+fn another_temperature_is_found() {
+    let lab = lab(512);
+    let found = diagnose(&lab, &[Hidden::SoundSpeed { temperature_offset_k: 8.0 }]);
+    let cause = only_cause(&found, "sound_speed");
+    let p = &cause.parameters[0];
+    // The laboratory jitters places by 5 mm: the interval may miss by little.
+    assert!((p.value - lab.air().temperature_c() - 8.0).abs() < 0.8, "{p:?}");
+}
+
+#[test]
+fn a_source_that_stands_elsewhere_is_found() {
+    let lab = lab(513);
+    let hidden = Hidden::random("position_error", 1.0, &lab, 513).unwrap();
+    let Hidden::PositionError { index, end, offset_m } = hidden else { panic!("{hidden:?}") };
+    let found = diagnose(&lab, &[Hidden::PositionError { end, index, offset_m }]);
+    let cause = only_cause(&found, "position_error");
+    for (p, truth) in cause.parameters.iter().zip(offset_m) {
+        assert!((p.value - truth).abs() < 0.03, "{p:?} {truth}");
+    }
+}
+
+#[test]
+fn a_room_of_other_size_is_found() {
+    let found = diagnose(&lab(514), &[Hidden::RoomDimensions { scale: [1.03, 1.0, 0.975] }]);
+    let cause = only_cause(&found, "room_dimensions");
+    for (name, truth) in [("scale_x", 3.0), ("scale_z", -2.5)] {
+        let p = cause.parameters.iter().find(|p| p.name == name).unwrap();
+        assert!((p.value - truth).abs() < 0.4, "{p:?}");
+    }
+}
+
+#[test]
+fn a_cut_end_is_found() {
+    let lab = lab(515);
+    let hidden = Hidden::random("truncation", 1.0, &lab, 515).unwrap();
+    let Hidden::Truncation { end_s, .. } = hidden else { panic!("{hidden:?}") };
+    let found = diagnose(&lab, &[hidden]);
+    let cause = only_cause(&found, "truncation");
+    assert!((cause.parameters[0].value - end_s).abs() < 0.005, "{:?} {end_s}", cause.parameters[0]);
+}
+
+#[test]
+fn a_clock_and_a_temperature_cannot_be_told_apart() {
+    let found = diagnose(&lab(516), &[Hidden::TimeZero { latency_s: 4e-3 }]);
+    let twins = found.isolability.iter().find(|i| i.effects == ["sound_speed", "sampling_clock"]).unwrap();
+    assert!(twins.cosine > 0.99 && !twins.separable && twins.would_decide.contains("loopback"));
+    let strangers = found.isolability.iter().find(|i| i.effects == ["time_zero", "sound_speed"]);
+    assert!(strangers.or(found.isolability.last()).is_some_and(|i| i.cosine < 0.99));
+}
