@@ -54,7 +54,7 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), AnyError> {
-    let all = Hidden::CATALOGUE.iter().chain(Hidden::OUTSIDE).map(ToString::to_string);
+    let all = Hidden::CATALOGUE.iter().chain(Hidden::OUTSIDE.iter()).map(ToString::to_string);
     let effects: Vec<String> = if arguments.effects.is_empty() {
         all.chain(["none".to_owned()]).collect()
     } else {
@@ -78,7 +78,8 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
                         o.strength,
                         o.answer,
                         o.seconds,
-                        o.gain_low.map_or(String::new(), |g| format!(", held-out gain above {g:.4} nats a bin"))
+                        o.gain_low
+                            .map_or(String::new(), |g| format!(", held-out gain above {g:.4} nats a bin"))
                     );
                 }
             }
@@ -97,7 +98,8 @@ fn one(
     folder: &std::path::Path,
 ) -> Result<Outcome, AnyError> {
     let lab = Laboratory::new(LabConfig { seed, receivers: arguments.receivers, ..LabConfig::default() })?;
-    let hidden = if effect == "none" { Vec::new() } else { vec![Hidden::random(effect, strength, &lab, seed)?] };
+    let hidden =
+        if effect == "none" { Vec::new() } else { vec![Hidden::random(effect, strength, &lab, seed)?] };
     let place = folder.join(format!("{effect}_{strength}_{seed}"));
     let room = lab.write(&hidden, &place, None)?;
     let started = std::time::Instant::now();

@@ -130,8 +130,7 @@ impl<'a> ArrivalModel<'a> {
         };
         let (source, receiver) = (self.source_index(response.source), self.receiver_index(response.receiver));
         let latency = self.latency_index(self.assignment[pair]);
-        let mut time_s =
-            arrival.length_m / speed + values[latency] + self.effect_delay_s(values, &view);
+        let mut time_s = arrival.length_m / speed + values[latency] + self.effect_delay_s(values, &view);
         let mut found = Vec::new();
         for k in 0..3 {
             let (s, r) = (-arrival.departure[k] / speed, -arrival.arrival[k] / speed);
@@ -194,9 +193,7 @@ impl<'a> ArrivalModel<'a> {
             let densities: Vec<f64> = later
                 .iter()
                 .zip(&times)
-                .map(|(a, (t, _))| {
-                    (1.0 - STRAY_SHARE) * a.energy.sqrt() / amplitude * normal(peak - t, sd)
-                })
+                .map(|(a, (t, _))| (1.0 - STRAY_SHARE) * a.energy.sqrt() / amplitude * normal(peak - t, sd))
                 .collect();
             let total = densities.iter().sum::<f64>() + STRAY_SHARE / PEAKS_S;
             value += total.ln();

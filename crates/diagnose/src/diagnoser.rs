@@ -132,7 +132,11 @@ impl Diagnoser {
 
         let started = Instant::now();
         let verdict = if state.chosen.is_empty() {
-            if lack_before.p_value < self.config.significance { Verdict::Unexplained } else { Verdict::Adequate }
+            if lack_before.p_value < self.config.significance {
+                Verdict::Unexplained
+            } else {
+                Verdict::Adequate
+            }
         } else if beaten {
             Verdict::Unexplained
         } else if !found.rivals.is_empty() {
@@ -178,7 +182,7 @@ impl Diagnoser {
             }
         }
         let isolability = isolability(&bench, &search.candidates)?;
-        let candidates = self.candidate_scores(&search, &base, &state, &found, observer)?;
+        let candidates = self.candidate_scores(&search, &state, &found, observer)?;
         let cases_now = search.cases_of(&state.chosen, Evidence::Energy);
         let (residuals, dispersion_now) = residual_map(&bench, &base, &cases_now, &state);
         let decays = match &held_out {
@@ -198,7 +202,8 @@ impl Diagnoser {
         }
         if bench.survey.responses.len() == 1 {
             notes.push(
-                "One response only: what is the same at every position cannot be told from what is not.".into(),
+                "One response only: what is the same at every position cannot be told from what is not."
+                    .into(),
             );
         }
         if held_out.is_none() {
@@ -211,7 +216,9 @@ impl Diagnoser {
             ));
         }
         if !(base.energy.settled && state.energy.settled && state.arrivals.settled) {
-            notes.push("A fit had not come to rest after its last step: take its figures with caution.".into());
+            notes.push(
+                "A fit had not come to rest after its last step: take its figures with caution.".into(),
+            );
         }
         if verdict == Verdict::Explained && lack_after.p_value < self.config.significance {
             notes.push("A significant misfit is left that none of the named causes explains.".into());
@@ -220,7 +227,9 @@ impl Diagnoser {
             notes.push("Where the direct line is blocked, arrival times are not compared.".into());
         }
         if baseline_dispersion.iter().any(|d| *d > 3.0) && verdict == Verdict::Unexplained {
-            notes.push("The responses scatter far more than this room would: are they of another room?".into());
+            notes.push(
+                "The responses scatter far more than this room would: are they of another room?".into(),
+            );
         }
         let materials = (0..bench.survey.materials.len())
             .map(|m| {
@@ -267,10 +276,10 @@ impl Diagnoser {
     }
 
     /// Greedy naming, the dispersion estimated anew after each name, and a backward check.
-    fn name<'a>(
+    fn name(
         &self,
         bench: &mut Workbench,
-        cases: &'a [(usize, &'static str, Box<dyn Case>)],
+        cases: &[(usize, &'static str, Box<dyn Case>)],
         used: &[bool],
         observer: &dyn Observer,
     ) -> Result<Named, Error> {
@@ -285,7 +294,8 @@ impl Diagnoser {
                     .into_iter()
                     .filter(|s| {
                         named.chosen.iter().all(|&c| {
-                            search.candidates[c].effect != s.effect || search.candidates[c].case.subject().is_some()
+                            search.candidates[c].effect != s.effect
+                                || search.candidates[c].case.subject().is_some()
                         })
                     })
                     .collect();
@@ -349,7 +359,6 @@ impl Diagnoser {
     fn candidate_scores(
         &self,
         search: &Search<'_>,
-        base: &State,
         state: &State,
         named: &Named,
         observer: &dyn Observer,
@@ -359,7 +368,6 @@ impl Diagnoser {
         } else {
             Some(search.by_effect(&search.scores(state, observer)?))
         };
-        let _ = base;
         Ok(named
             .first
             .iter()
@@ -505,7 +513,8 @@ impl Folds {
             .map(|group| {
                 let out = |r: usize| if never { held.contains(&r) } else { group.contains(&r) };
                 let used = responses.iter().map(|r| !out(r.receiver)).collect();
-                let pairs = (0..responses.len()).filter(|&p| group.contains(&responses[p].receiver)).collect();
+                let pairs =
+                    (0..responses.len()).filter(|&p| group.contains(&responses[p].receiver)).collect();
                 (used, pairs)
             })
             .collect();
@@ -562,25 +571,29 @@ fn predict(
             let mut whole = used.clone();
             pairs.iter().for_each(|&p| whole[p] = true);
             // The logarithm of the predictive density is what the evidence grows by when the new positions come in.
-            let predictive = |chosen: &[usize], free: Option<&dyn Case>| -> Result<(f64, Vec<Compared>), Error> {
-                let mut cases = search.cases_of(chosen, Evidence::Energy);
-                cases.extend(free);
-                let arrivals = search.cases_of(chosen, Evidence::Arrivals);
-                let firsts: &[usize] = if *chosen == *state.chosen { &state.energy_firsts } else { &[] };
-                let before = Before { values: &state.energy.values, firsts };
-                let fitted = bench.fit_energy(&cases, used, Some(before))?.0;
-                let with = bench.fit_energy(&cases, &whole, Some(before))?.0;
-                let energy = with.log_evidence - fitted.log_evidence;
-                let times = bench.fit_arrivals(&arrivals, &whole)?.0.log_evidence
-                    - bench.fit_arrivals(&arrivals, used)?.0.log_evidence;
-                let all = search.all_cases(chosen);
-                let signs = bench.polarity(&all, &whole) - bench.polarity(&all, used);
-                Ok((energy + times + signs, compare(bench, &cases, &fitted.values, pairs)))
-            };
+            let predictive =
+                |chosen: &[usize], free: Option<&dyn Case>| -> Result<(f64, Vec<Compared>), Error> {
+                    let mut cases = search.cases_of(chosen, Evidence::Energy);
+                    cases.extend(free);
+                    let arrivals = search.cases_of(chosen, Evidence::Arrivals);
+                    let firsts: &[usize] = if *chosen == *state.chosen { &state.energy_firsts } else { &[] };
+                    let before = Before { values: &state.energy.values, firsts };
+                    let fitted = bench.fit_energy(&cases, used, Some(before))?.0;
+                    let with = bench.fit_energy(&cases, &whole, Some(before))?.0;
+                    let energy = with.log_evidence - fitted.log_evidence;
+                    let times = bench.fit_arrivals(&arrivals, &whole)?.0.log_evidence
+                        - bench.fit_arrivals(&arrivals, used)?.0.log_evidence;
+                    let all = search.all_cases(chosen);
+                    let signs = bench.polarity(&all, &whole) - bench.polarity(&all, used);
+                    Ok((energy + times + signs, compare(bench, &cases, &fitted.values, pairs)))
+                };
             let (base, before) = predictive(&[], None)?;
             let (free, discrepant) = predictive(&[], Some(&free))?;
-            let (named, after) =
-                if state.chosen.is_empty() { (base, compare_again(&before)) } else { predictive(&state.chosen, None)? };
+            let (named, after) = if state.chosen.is_empty() {
+                (base, compare_again(&before))
+            } else {
+                predictive(&state.chosen, None)?
+            };
             let mut each = Vec::new();
             let mut without_each = Vec::new();
             for &c in &state.chosen {

@@ -165,8 +165,7 @@ impl<'a> EnergyModel<'a> {
         effects(true, view, ln_energy);
         let mut sums: Vec<f64> = ln_energy.iter().map(|l| view.state.own_share * l.exp()).collect();
         for (band, share, leak) in &view.state.leaks {
-            let mut leak: Vec<f64> =
-                leak[..sums.len()].iter().map(|l| l + gain_db * LN_PER_DB).collect();
+            let mut leak: Vec<f64> = leak[..sums.len()].iter().map(|l| l + gain_db * LN_PER_DB).collect();
             let reference = self.data.reference[*band];
             effects(true, &BandView { band: *band, reference, ..*view }, &mut leak);
             sums.iter_mut().zip(&leak).for_each(|(s, l)| *s += share * l.exp());
@@ -263,13 +262,7 @@ impl<'a> EnergyModel<'a> {
     }
 
     /// Log-likelihood of one pair and band.
-    fn band_likelihood(
-        &self,
-        values: &[f64],
-        pair: usize,
-        band: usize,
-        slopes: Option<&mut Slopes>,
-    ) -> f64 {
+    fn band_likelihood(&self, values: &[f64], pair: usize, band: usize, slopes: Option<&mut Slopes>) -> f64 {
         let Some(energies) = self.compared(pair, band) else { return 0.0 };
         let count = energies.len();
         let bands = self.data.survey.bands.len();
@@ -284,11 +277,8 @@ impl<'a> EnergyModel<'a> {
         let shape = |bin: usize| 1.0 / (self.data.states[pair][band].variance[bin] * dispersion);
         let ln_ratio: Vec<f64> =
             energies.iter().zip(&predicted).map(|(e, p)| e.max(silence).ln() - p).collect();
-        let value = ln_ratio
-            .iter()
-            .enumerate()
-            .map(|(bin, z)| shape(bin) * (z - z.min(30.0).exp() + 1.0))
-            .sum();
+        let value =
+            ln_ratio.iter().enumerate().map(|(bin, z)| shape(bin) * (z - z.min(30.0).exp() + 1.0)).sum();
         let Some(slopes) = slopes else { return value };
 
         // Columns that matter in this band, and the change of the predicted logarithm with each.

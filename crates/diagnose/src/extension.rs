@@ -77,7 +77,9 @@ pub(crate) fn extended_model(bench: &Workbench, search: &Search<'_>, state: &Sta
                     energy_per_s: per_band(&|b| {
                         level_per_s(bench, b) * 10f64.powf((values[0] + values[1] * octaves(b)) / 10.0)
                     }),
-                    decay_time_s: per_band(&|b| (values[2] * (values[3] * octaves(b)).exp()).clamp(0.1, 20.0)),
+                    decay_time_s: per_band(&|b| {
+                        (values[2] * (values[3] * octaves(b)).exp()).clamp(0.1, 20.0)
+                    }),
                     gradient_db_per_m: [values[4], values[5], values[6]],
                     centre_m: std::array::from_fn(|k| {
                         survey.receivers.iter().map(|r| r.position_m[k]).sum::<f64>() / receivers
@@ -95,8 +97,7 @@ pub(crate) fn extended_model(bench: &Workbench, search: &Search<'_>, state: &Sta
             }
             "time_zero" => model.latency_s = Some(1e-3 * values[0]),
             "position_error" => {
-                let offset: Vec<f64> =
-                    parameters(search, state, candidate).iter().map(|p| p.value).collect();
+                let offset: Vec<f64> = parameters(search, state, candidate).iter().map(|p| p.value).collect();
                 for (nuisance, _) in case.widens() {
                     let place = match nuisance {
                         Nuisance::SourcePosition(i) => &survey.sources[i],

@@ -59,9 +59,8 @@ const GAIN_NATS: f64 = 0.02;
 pub(crate) fn maximise(model: &dyn Model, start: &[f64], what: &'static str) -> Result<Maximum, Error> {
     let priors = model.priors();
     let n = priors.len();
-    let penalty = |x: &[f64]| -> f64 {
-        x.iter().zip(priors).map(|(x, p)| -0.5 * ((x - p.mean) / p.sd).powi(2)).sum()
-    };
+    let penalty =
+        |x: &[f64]| -> f64 { x.iter().zip(priors).map(|(x, p)| -0.5 * ((x - p.mean) / p.sd).powi(2)).sum() };
     let mut x: Vec<f64> = start.iter().zip(priors).map(|(x, p)| x.clamp(p.low, p.high)).collect();
     let mut slopes = Slopes { gradient: DVector::zeros(n), information: DMatrix::zeros(n, n) };
     let mut damping = 1e-3;
@@ -70,10 +69,7 @@ pub(crate) fn maximise(model: &dyn Model, start: &[f64], what: &'static str) -> 
     for _ in 0..MOST_STEPS {
         let value = likelihood + penalty(&x);
         let gradient = &slopes.gradient
-            + DVector::from_iterator(
-                n,
-                x.iter().zip(priors).map(|(x, p)| (p.mean - x) / (p.sd * p.sd)),
-            );
+            + DVector::from_iterator(n, x.iter().zip(priors).map(|(x, p)| (p.mean - x) / (p.sd * p.sd)));
         let held: Vec<bool> = (0..n)
             .map(|i| {
                 (x[i] <= priors[i].low && gradient[i] < 0.0) || (x[i] >= priors[i].high && gradient[i] > 0.0)

@@ -41,7 +41,8 @@ fn split(members: Vec<u32>, weights: &[f32], hits: &[f32], materials: usize) -> 
     };
     let mut parts = vec![measured(members)];
     while parts.len() < MOST {
-        let largest = parts.iter().enumerate().max_by(|a, b| a.1.1.gain.total_cmp(&b.1.1.gain)).map(|(i, _)| i);
+        let largest =
+            parts.iter().enumerate().max_by(|a, b| a.1.1.gain.total_cmp(&b.1.1.gain)).map(|(i, _)| i);
         let Some(index) = largest.filter(|&i| parts[i].1.variance > ALIKE * ALIKE) else { break };
         let (part, Spread { material, mean, .. }) = parts.swap_remove(index);
         let (low, high): (Vec<u32>, Vec<u32>) =
@@ -124,7 +125,8 @@ mod tests {
                         return 0.0;
                     }
                     let n = [0, 1].map(|k| {
-                        own.iter().map(|&i| f64::from(weights[i] * hits[2 * i + k])).sum::<f64>() / e * shift[k]
+                        own.iter().map(|&i| f64::from(weights[i] * hits[2 * i + k])).sum::<f64>() / e
+                            * shift[k]
                     });
                     e * (n[0] + n[1]).exp()
                 })

@@ -13,7 +13,10 @@ use nalgebra::{DMatrix, DVector};
 const TWINS: f64 = 0.95;
 
 /// The angle between each two effects that bear on the same data.
-pub(crate) fn isolability(bench: &Workbench, candidates: &[Candidate<'_>]) -> Result<Vec<Isolability>, Error> {
+pub(crate) fn isolability(
+    bench: &Workbench,
+    candidates: &[Candidate<'_>],
+) -> Result<Vec<Isolability>, Error> {
     let mut found = Vec::new();
     for evidence in [Evidence::Energy, Evidence::Arrivals] {
         // One case stands for its effect.

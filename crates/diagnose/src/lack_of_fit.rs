@@ -54,9 +54,8 @@ pub(crate) fn test(
 
 /// A measurement as the fitted model expects it.
 fn simulate(bench: &Workbench, cases: &[&dyn Case], values: &[f64], number: u64) -> Vec<Measured> {
-    let mut random = Pcg64Mcg::seed_from_u64(
-        bench.config.seed ^ (number + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15),
-    );
+    let mut random =
+        Pcg64Mcg::seed_from_u64(bench.config.seed ^ (number + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
     let all: Vec<usize> = (0..bench.pairs.len()).collect();
     let mut measured = bench.measured.clone();
     let assignment = bench.assignment(cases);
@@ -82,7 +81,8 @@ pub(crate) fn odd_bins(residuals: &[BinResidual], bands: usize) -> usize {
         .map(|band| {
             let own: Vec<&BinResidual> = residuals.iter().filter(|r| r.band == band).collect();
             // Half of the squares of normal deviates lie below 0.455.
-            let usual = crate::workbench::median(own.iter().map(|r| deviate(r, 1.0).powi(2)).collect()) / 0.455;
+            let usual =
+                crate::workbench::median(own.iter().map(|r| deviate(r, 1.0).powi(2)).collect()) / 0.455;
             own.iter().filter(|r| deviate(r, usual.max(1.0)).abs() > ODD_SD).count()
         })
         .sum()

@@ -81,7 +81,9 @@ impl Measured {
         let n = self.pulse.len() as i64;
         let at = |lag: i64| -> f64 {
             (0..n)
-                .filter_map(|i| other.pulse.get(usize::try_from(i + lag).ok()?).map(|o| o * self.pulse[i as usize]))
+                .filter_map(|i| {
+                    other.pulse.get(usize::try_from(i + lag).ok()?).map(|o| o * self.pulse[i as usize])
+                })
                 .sum::<f64>()
                 / scale
         };
@@ -116,7 +118,9 @@ fn smoothed_energy(samples: &[f32], rate: f64) -> Vec<f64> {
             weights
                 .iter()
                 .enumerate()
-                .filter_map(|(j, w)| samples.get((i + j).checked_sub(half)?).map(|&x| w * f64::from(x).powi(2)))
+                .filter_map(|(j, w)| {
+                    samples.get((i + j).checked_sub(half)?).map(|&x| w * f64::from(x).powi(2))
+                })
                 .sum()
         })
         .collect()

@@ -137,8 +137,15 @@ mod tests {
     #[test]
     fn an_exponential_has_its_slope_and_its_error() {
         let times_s: Vec<f64> = (0..60).map(|k| 0.01 * f64::from(k)).collect();
-        let decay = |t60_s: f64| -> Vec<f64> { times_s.iter().map(|t| 10f64.powf(-6.0 * t / t60_s)).collect() };
-        let c = Compared { pair: 0, band: 0, measured: decay(0.5), predicted: decay(0.5), times_s: times_s.clone() };
+        let decay =
+            |t60_s: f64| -> Vec<f64> { times_s.iter().map(|t| 10f64.powf(-6.0 * t / t60_s)).collect() };
+        let c = Compared {
+            pair: 0,
+            band: 0,
+            measured: decay(0.5),
+            predicted: decay(0.5),
+            times_s: times_s.clone(),
+        };
         let same = Errors::of(&[c]);
         assert!(same.db_rmse < 1e-9 && same.t20_jnd < 1e-9 && same.c50_jnd < 1e-9);
         let c = Compared { pair: 0, band: 0, measured: decay(0.5), predicted: decay(0.55), times_s };

@@ -1,10 +1,10 @@
 //! Which causes the data speak for.
 
+use crate::Error;
 use crate::effect::{Case, Effect, Evidence};
 use crate::energy_model::Before;
 use crate::gauss_newton::Maximum;
 use crate::workbench::Workbench;
-use crate::Error;
 use rayon::prelude::*;
 use sabine_acoustics::{Observer, report};
 
@@ -79,7 +79,12 @@ pub(crate) struct EffectScore {
 }
 
 impl<'a> Search<'a> {
-    pub fn new(bench: &'a Workbench, cases: &'a [(usize, &'static str, Box<dyn Case>)], effects: usize, used: Vec<bool>) -> Self {
+    pub fn new(
+        bench: &'a Workbench,
+        cases: &'a [(usize, &'static str, Box<dyn Case>)],
+        effects: usize,
+        used: Vec<bool>,
+    ) -> Self {
         let candidates =
             cases.iter().map(|(effect, id, case)| Candidate { effect: *effect, id, case: &**case }).collect();
         Self { bench, candidates, effects, used }
@@ -255,7 +260,10 @@ impl<'a> Search<'a> {
 }
 
 /// All cases of some effects.
-pub(crate) fn cases(effects: &[Box<dyn Effect>], survey: &crate::Survey) -> Vec<(usize, &'static str, Box<dyn Case>)> {
+pub(crate) fn cases(
+    effects: &[Box<dyn Effect>],
+    survey: &crate::Survey,
+) -> Vec<(usize, &'static str, Box<dyn Case>)> {
     effects
         .iter()
         .enumerate()

@@ -191,13 +191,7 @@ impl TracedPair {
     }
 
     /// The bins that a path's energy falls into, with its share of each.
-    fn shares(
-        time_s: f64,
-        bins: Bins,
-        kernel: &BandKernel,
-        count: usize,
-        mut give: impl FnMut(usize, f64),
-    ) {
+    fn shares(time_s: f64, bins: Bins, kernel: &BandKernel, count: usize, mut give: impl FnMut(usize, f64)) {
         let reach = kernel.reach_s().min(2.0 * bins.width_s);
         let first = bins.count(time_s - reach).min(count);
         let mut before = kernel.before(bins.edge_s(first) - time_s);

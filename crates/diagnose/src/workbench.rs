@@ -12,7 +12,8 @@ use crate::traced_pair::{Arrival, BandState, CELL_S, TracedPair, scattering_more
 use crate::{DiagnoseConfig, Error};
 use rayon::prelude::*;
 use sabine_acoustics::{
-    ImpulseResponse, Material, MaterialPrior, MeasuredRoom, Observer, PerBand, Receiver, Scene, Source, report,
+    ImpulseResponse, Material, MaterialPrior, MeasuredRoom, Observer, PerBand, Receiver, Scene, Source,
+    report,
 };
 use sabine_propagate::{PathTracer, PreparedScene};
 use std::collections::BTreeMap;
@@ -118,10 +119,8 @@ impl Workbench {
         let corner = |fold: fn(f64, f64) -> f64, from: f64| {
             std::array::from_fn(|k| vertices.iter().map(|v| v[k]).fold(from, fold))
         };
-        let materials: Vec<Material> =
-            room.scene().materials().iter().map(|m| m.material.clone()).collect();
-        let scatterings: Vec<f64> =
-            materials.iter().flat_map(|m| m.scattering().values().to_vec()).collect();
+        let materials: Vec<Material> = room.scene().materials().iter().map(|m| m.material.clone()).collect();
+        let scatterings: Vec<f64> = materials.iter().flat_map(|m| m.scattering().values().to_vec()).collect();
         let survey = Survey {
             bands,
             air: room.air(),
@@ -195,8 +194,11 @@ impl Workbench {
         let one = |pair: &TracedPair| pair.expand(&materials, &self.kernels, self.traced_s, scattering);
         self.states = self.pairs.par_iter().map(one).collect::<Result<_, _>>()?;
         let bands = self.survey.bands.len();
-        self.ends =
-            self.states.iter().map(|s| s.iter().map(|b| range_end(b, self.config.range_db)).collect()).collect();
+        self.ends = self
+            .states
+            .iter()
+            .map(|s| s.iter().map(|b| range_end(b, self.config.range_db)).collect())
+            .collect();
         self.reference = (0..bands)
             .map(|band| {
                 let early: Vec<f64> = self
@@ -301,8 +303,8 @@ impl Workbench {
             .filter_map(|(i, x)| {
                 let turned = cases.iter().filter(|c| c.inverted() == Some(i)).count() % 2 == 1;
                 let off = (if turned { -x.as_ref()? } else { *x.as_ref()? }) - typical;
-                let density = (-0.5 * (off / LIKENESS_SD).powi(2)).exp()
-                    / (LIKENESS_SD * std::f64::consts::TAU.sqrt());
+                let density =
+                    (-0.5 * (off / LIKENESS_SD).powi(2)).exp() / (LIKENESS_SD * std::f64::consts::TAU.sqrt());
                 Some(((1.0 - ODD_PULSE_SHARE) * density + ODD_PULSE_SHARE * 0.5).ln())
             })
             .sum()
@@ -390,7 +392,9 @@ impl Workbench {
     pub fn move_place(&mut self, place: Nuisance, offset_m: [f64; 3]) -> Result<(), Error> {
         let moved = |position: [f64; 3]| std::array::from_fn(|k| position[k] + offset_m[k]);
         match place {
-            Nuisance::SourcePosition(i) => self.sources[i].position_m = moved(self.survey.sources[i].position_m),
+            Nuisance::SourcePosition(i) => {
+                self.sources[i].position_m = moved(self.survey.sources[i].position_m)
+            }
             Nuisance::ReceiverPosition(i) => {
                 self.receivers[i].position_m = moved(self.survey.receivers[i].position_m);
             }
@@ -421,7 +425,8 @@ impl Workbench {
         let (found, _) = self.fit_energy(&all, used, None)?;
         let pairs: Vec<usize> = (0..used.len()).filter(|&p| used[p]).collect();
         let residuals = self.residuals(&all, &found.values, &pairs);
-        self.dispersion = dispersion(&residuals, self.survey.bands.len()).iter().map(|d| d.max(1.0)).collect();
+        self.dispersion =
+            dispersion(&residuals, self.survey.bands.len()).iter().map(|d| d.max(1.0)).collect();
         Ok(())
     }
 }

@@ -37,7 +37,13 @@ fn holds(cause: &sabine_diagnose::Cause, parameter: &str, truth: f64) {
 fn a_room_without_effects_is_adequate() {
     for seed in [501, 502] {
         let found = diagnose(&lab(seed), &[]);
-        assert_eq!(found.verdict, Verdict::Adequate, "{:?} {:?}", found.candidates.first(), found.lack_of_fit);
+        assert_eq!(
+            found.verdict,
+            Verdict::Adequate,
+            "{:?} {:?}",
+            found.candidates.first(),
+            found.lack_of_fit
+        );
         assert!(found.causes.is_empty());
     }
 }

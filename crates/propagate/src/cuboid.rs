@@ -58,9 +58,8 @@ impl Cuboid {
         let side = |k: usize| high_m[k] - low_m[k];
         let mut materials = [0; 6];
         for (face, &plane) in faces.iter().enumerate() {
-            let own = || {
-                surfaces.triangles.iter().filter(move |t| !t.is_degenerate() && t.plane as usize == plane)
-            };
+            let own =
+                || surfaces.triangles.iter().filter(move |t| !t.is_degenerate() && t.plane as usize == plane);
             materials[face] = own().next()?.material;
             if own().any(|t| t.material != materials[face]) {
                 return None;
@@ -119,9 +118,8 @@ impl Cuboid {
             }
             faces
         };
-        let reach: [i64; 3] = std::array::from_fn(|k| {
-            (max_length_m / (self.high_m[k] - self.low_m[k])).ceil() as i64 + 1
-        });
+        let reach: [i64; 3] =
+            std::array::from_fn(|k| (max_length_m / (self.high_m[k] - self.low_m[k])).ceil() as i64 + 1);
         let mut found: Vec<(f32, [i64; 3])> = Vec::new();
         for i in -reach[0]..=reach[0] {
             let x = along(0, i);
@@ -152,7 +150,9 @@ impl Cuboid {
         for (ln_energy, numbers) in found {
             let kept = ((0.5 * f64::from(ln_energy)).exp() * chance).min(1.0);
             let place = numbers.map(|n| n as u64).iter().fold(seed, |sum, n| {
-                (sum ^ n.wrapping_mul(0x9E37_79B9_7F4A_7C15)).rotate_left(23).wrapping_mul(0xD6E8_FEB8_6659_FD93)
+                (sum ^ n.wrapping_mul(0x9E37_79B9_7F4A_7C15))
+                    .rotate_left(23)
+                    .wrapping_mul(0xD6E8_FEB8_6659_FD93)
             });
             if kept < 1.0 && generator(seed, place).random::<f64>() >= kept {
                 continue;
@@ -161,9 +161,8 @@ impl Cuboid {
             let length_m = dot(to_image, to_image).sqrt();
             let arrival = scale(to_image, 1.0 / length_m);
             // Each reflection turns one component around.
-            let departure = std::array::from_fn(|a| {
-                if numbers[a].rem_euclid(2) == 0 { -arrival[a] } else { arrival[a] }
-            });
+            let departure =
+                std::array::from_fn(|a| if numbers[a].rem_euclid(2) == 0 { -arrival[a] } else { arrival[a] });
             let chain = self.chain(paths, &mut chains, faces_of(numbers));
             paths.push(Contribution {
                 length_m,
@@ -231,11 +230,8 @@ mod tests {
 
     fn scene(turn: f64) -> Scene {
         let material = |a: f64| Material::uniform(bands(), a, 0.0).unwrap();
-        let upright = Scene::shoebox(
-            [4.0, 5.0, 3.0],
-            [0.1, 0.2, 0.3, 0.15, 0.05, 0.4].map(material),
-        )
-        .unwrap();
+        let upright =
+            Scene::shoebox([4.0, 5.0, 3.0], [0.1, 0.2, 0.3, 0.15, 0.05, 0.4].map(material)).unwrap();
         let (s, c) = turn.sin_cos();
         let vertices =
             upright.vertices().iter().map(|v| [c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]]).collect();
@@ -288,7 +284,8 @@ mod tests {
         let mut paths = PathSet::new(6, 60.0);
         let (from, to) = ([1.0, 2.0, 1.5], [3.0, 2.0, 1.5]);
         cuboid.add_paths(&mut paths, from, to, 100_000, scene.materials(), 1);
-        let low_x = (0..paths.len()).find(|&i| (f64::from(paths.lengths_m()[i]) - 4.0).abs() < 1e-6 && paths.departure(i)[0] < -0.99);
+        let low_x = (0..paths.len())
+            .find(|&i| (f64::from(paths.lengths_m()[i]) - 4.0).abs() < 1e-6 && paths.departure(i)[0] < -0.99);
         let behind = low_x.unwrap();
         // Off the wall behind the source and back past it.
         assert!(paths.arrival(behind)[0] < -0.99, "{:?}", paths.arrival(behind));

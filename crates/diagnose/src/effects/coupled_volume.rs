@@ -64,8 +64,7 @@ impl Case for CoupledVolume {
                 values[4 + k] * (position[k] - mean)
             })
             .sum();
-        let level = view.reference_energy()
-            * 10f64.powf((values[0] + values[1] * octaves + place_db) / 10.0);
+        let level = view.reference_energy() * 10f64.powf((values[0] + values[1] * octaves + place_db) / 10.0);
         let decay_s = (values[2] * (values[3] * octaves).exp()).clamp(0.1, 20.0);
         for (bin, l) in ln_energy.iter_mut().enumerate() {
             let time_s = view.after_direct_s(bin).max(0.0);

@@ -33,11 +33,9 @@ impl Case for RoomDimensions {
 
     fn parameters(&self, _: &Survey) -> Vec<Parameter> {
         let axes = ["x", "y", "z"];
-        let scale = axes.map(|a| {
-            Parameter::new(format!("scale_{a}"), "%", 0.0, 2.0, (-15.0, 15.0)).typically(1.0)
-        });
-        let shift =
-            axes.map(|a| Parameter::new(format!("shift_{a}"), "m", 0.0, 0.05, (-0.5, 0.5)));
+        let scale =
+            axes.map(|a| Parameter::new(format!("scale_{a}"), "%", 0.0, 2.0, (-15.0, 15.0)).typically(1.0));
+        let shift = axes.map(|a| Parameter::new(format!("shift_{a}"), "m", 0.0, 0.05, (-0.5, 0.5)));
         scale.into_iter().chain(shift).collect()
     }
 

@@ -33,9 +33,7 @@ impl Case for SoundSpeed {
 
     fn parameters(&self, survey: &Survey) -> Vec<Parameter> {
         let stated = survey.air().temperature_c();
-        vec![
-            Parameter::new("temperature", "deg C", stated, 5.0, (-20.0, 50.0)).typically(stated + 3.0),
-        ]
+        vec![Parameter::new("temperature", "deg C", stated, 5.0, (-20.0, 50.0)).typically(stated + 3.0)]
     }
 
     fn delay_s(&self, values: &[f64], arrival: &ArrivalView<'_>) -> f64 {

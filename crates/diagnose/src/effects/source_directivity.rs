@@ -76,11 +76,12 @@ impl Case for SourceDirectivity {
             return;
         }
         let source = view.pair().source;
-        let axis = survey.sources()[source].axis.filter(|_| Self::axes_are_stated(survey)).unwrap_or_else(|| {
-            let own = &values[2 + 3 * source..5 + 3 * source];
-            let length = own.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-6);
-            [own[0] / length, own[1] / length, own[2] / length]
-        });
+        let axis =
+            survey.sources()[source].axis.filter(|_| Self::axes_are_stated(survey)).unwrap_or_else(|| {
+                let own = &values[2 + 3 * source..5 + 3 * source];
+                let length = own.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-6);
+                [own[0] / length, own[1] / length, own[2] / length]
+            });
         let q = 1.0 - d;
         let power = q * q + d * d / 3.0;
         for (bin, l) in ln_energy.iter_mut().enumerate() {
@@ -88,8 +89,7 @@ impl Case for SourceDirectivity {
             let along: f64 = mean.iter().zip(axis).map(|(m, a)| m * a).sum();
             let [x, y, z] = axis;
             let [xx, yy, zz, xy, xz, yz] = products;
-            let squared =
-                x * x * xx + y * y * yy + z * z * zz + 2.0 * (x * y * xy + x * z * xz + y * z * yz);
+            let squared = x * x * xx + y * y * yy + z * z * zz + 2.0 * (x * y * xy + x * z * xz + y * z * yz);
             let gain = (q * q + 2.0 * q * d * along + d * d * squared) / power;
             *l += gain.max(1e-4).ln();
         }
