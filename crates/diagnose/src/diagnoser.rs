@@ -317,7 +317,7 @@ impl Diagnoser {
                 named.rivals = std::iter::once(best.id).chain(rivals.iter().map(|r| r.id)).collect();
                 break;
             }
-            let (moved, absorption) = {
+            let (moved, warmer_k, absorption) = {
                 let search = Search::new(bench, cases, self.effects.len(), used.to_vec());
                 let state = search.state(&named.chosen, None)?;
                 let offset = |first: usize| std::array::from_fn(|k| state.arrivals.values[first + k]);
@@ -333,11 +333,18 @@ impl Diagnoser {
                         _ => None,
                     })
                     .collect();
-                (moved, state.energy.values)
+                let (maximum, first) = place_of(&search, &state, best.best);
+                let case = &cases[best.best].2;
+                let own = maximum.values.get(first..first + case.parameters(&bench.survey).len());
+                let warmer_k = own.map_or(0.0, |values| case.warmer_by_k(values, &bench.survey));
+                (moved, warmer_k, state.energy.values)
             };
             // With the cause at work the materials are others: what is compared, and with which spread, follows them.
             if cases[best.best].2.evidence() != Evidence::Arrivals {
                 bench.expand_about(&absorption)?;
+            }
+            if warmer_k != 0.0 {
+                bench.warm(warmer_k)?;
             }
             for (place, offset_m) in moved {
                 bench.move_place(place, offset_m)?;

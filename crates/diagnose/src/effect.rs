@@ -137,6 +137,11 @@ pub trait Case: Send + Sync {
         0.0
     }
 
+    /// Kelvin by which the air is warmer than stated: once the case is named, paths are taken at that temperature.
+    fn warmer_by_k(&self, _values: &[f64], _survey: &Survey) -> f64 {
+        0.0
+    }
+
     /// Priors that it widens, with their new standard deviation.
     fn widens(&self) -> Vec<(Nuisance, f64)> {
         Vec::new()

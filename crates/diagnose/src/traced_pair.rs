@@ -117,6 +117,15 @@ impl TracedPair {
         Ok(Self { paths, air, speed_m_s, direct_s, hits, departures, times_s, groups })
     }
 
+    /// The same paths in other air.
+    pub fn set_air(&mut self, air: Air) {
+        let slower = self.speed_m_s / air.speed_of_sound_m_s();
+        self.air = air;
+        self.speed_m_s = air.speed_of_sound_m_s();
+        self.direct_s *= slower;
+        self.times_s.iter_mut().for_each(|t| *t *= slower as f32);
+    }
+
     /// The exact paths, the shortest first.
     pub fn arrivals(&self, materials: &[Material], within_s: f64) -> Result<Vec<Arrival>, Error> {
         let energies = self.paths.energies(materials, &self.air)?;

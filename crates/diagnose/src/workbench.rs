@@ -12,7 +12,7 @@ use crate::traced_pair::{Arrival, BandState, CELL_S, TracedPair, scattering_more
 use crate::{DiagnoseConfig, Error};
 use rayon::prelude::*;
 use sabine_acoustics::{
-    ImpulseResponse, Material, MaterialPrior, MeasuredRoom, Observer, PerBand, Receiver, Scene, Source,
+    Air, ImpulseResponse, Material, MaterialPrior, MeasuredRoom, Observer, PerBand, Receiver, Scene, Source,
     report,
 };
 use sabine_propagate::{PathTracer, PreparedScene};
@@ -37,7 +37,7 @@ const SETTLED: f64 = 0.1;
 /// Likeness of direct pulses about its typical value: one standard deviation.
 const LIKENESS_SD: f64 = 0.2;
 /// Share of pulses whose likeness says nothing.
-const ODD_PULSE_SHARE: f64 = 1e-3;
+const ODD_PULSE_SHARE: f64 = 1e-6;
 
 pub(crate) struct Workbench {
     pub survey: Survey,
@@ -413,6 +413,18 @@ impl Workbench {
                     self.direct_s[pair] = self.pairs[pair].direct_s;
                 }
             }
+        }
+        self.expand(true)
+    }
+
+    /// Takes all paths at another temperature. Arrival times stay relative to the stated one.
+    pub fn warm(&mut self, kelvin: f64) -> Result<(), Error> {
+        for (pair, traced) in self.pairs.iter_mut().enumerate() {
+            let stated = self.survey.responses[pair].air;
+            let temperature_c = (stated.temperature_c() + kelvin).clamp(-40.0, 60.0);
+            let air = Air::new(temperature_c, stated.relative_humidity_percent(), stated.pressure_kpa())?;
+            traced.set_air(air);
+            self.direct_s[pair] = traced.direct_s;
         }
         self.expand(true)
     }

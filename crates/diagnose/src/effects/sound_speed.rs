@@ -3,7 +3,7 @@
 use crate::{ArrivalView, Case, Effect, Evidence, Parameter, Survey};
 use sabine_acoustics::Air;
 
-/// Another temperature: all arrival times scale. Its small effect on attenuation is left to `air_absorption`.
+/// Another temperature: all arrival times scale; once it is named, decays are taken at that temperature too.
 ///
 /// Mark: arrivals are late or early in proportion to their path, direct sound and reflections alike. Mimicked by: a sampling
 /// clock that is off, which scales the times just so; a thermometer or a loopback click tells them apart.
@@ -34,6 +34,10 @@ impl Case for SoundSpeed {
     fn parameters(&self, survey: &Survey) -> Vec<Parameter> {
         let stated = survey.air().temperature_c();
         vec![Parameter::new("temperature", "deg C", stated, 5.0, (-20.0, 50.0)).typically(stated + 3.0)]
+    }
+
+    fn warmer_by_k(&self, values: &[f64], survey: &Survey) -> f64 {
+        values[0] - survey.air().temperature_c()
     }
 
     fn delay_s(&self, values: &[f64], arrival: &ArrivalView<'_>) -> f64 {
