@@ -26,6 +26,8 @@ const FOLDS: usize = 4;
 const BOOTSTRAP: usize = 2000;
 /// Evidence by which the unnamed discrepancy must beat all named causes to unseat them, in nats.
 const UNSEAT_NATS: f64 = 5.0;
+/// Dispersion from which nothing is named: measured variance over that expected, causes and smooth discrepancy taken out.
+const HOPELESS: f64 = 100.0;
 
 /// Says what is wrong with a simulated room, given what was measured in it.
 ///
@@ -131,7 +133,11 @@ impl Diagnoser {
         let testing_s = started.elapsed().as_secs_f64();
 
         let started = Instant::now();
-        let verdict = if state.chosen.is_empty() {
+        // Where bins scatter a hundred times as far as they may, the baseline itself has not been met: no name can be trusted.
+        let hopeless = bench.dispersion.iter().any(|d| *d > HOPELESS);
+        let verdict = if hopeless {
+            Verdict::Unexplained
+        } else if state.chosen.is_empty() {
             if lack_before.p_value < self.config.significance {
                 Verdict::Unexplained
             } else {
@@ -209,7 +215,13 @@ impl Diagnoser {
         if held_out.is_none() {
             notes.push("Too few receivers to hold any out: no gain at new positions can be given.".into());
         }
-        if !unseated.is_empty() {
+        if hopeless {
+            notes.push(
+                "The simulation could not be fitted to these responses at all: stated materials, places or mesh may be far off. No \
+                 cause is named."
+                    .into(),
+            );
+        } else if !unseated.is_empty() {
             notes.push(format!(
                 "{} would help, but a smooth discrepancy without a name explains more: the cause is not in the catalogue.",
                 unseated.join(" and ")
