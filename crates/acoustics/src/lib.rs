@@ -44,13 +44,10 @@
 //!   the reason ([`NoReading`]) why there is none.
 //! - Theory, kept apart from measurement: [`DiffuseRoom`] (Sabine, Eyring, Millington, Fitzroy, Arau-Puchades, critical
 //!   distance, mean free path), [`schroeder_frequency_hz`], [`Air`] (ISO 9613-1).
-//! - Rooms: [`Scene`], [`Material`], [`material_library`], [`MeasuredRoom`], [`Source`], [`Receiver`].
 //! - Between tracing and everything after it: [`PathSet`], [`Conditions`] (what may change without tracing again: materials,
 //!   air, [`Directivity`] and [`Orientation`] of source and receiver), [`EnergyResponse`] (energy, **not** to be convolved),
-//!   [`PathParameters`] with Monte-Carlo standard errors.
-//! - Between tracing and everything after it: [`PathSet`], [`EnergyResponse`] (energy, **not** to be convolved), [`EdgeDiffraction`].
+//!   [`PathParameters`] with Monte-Carlo standard errors; [`EdgeDiffraction`].
 //! - Rooms: [`Scene`], [`Mesh`] (OBJ, glTF), [`Material`], [`material_library`], [`MeasuredRoom`], [`Source`], [`Receiver`].
-//! - Between tracing and everything after it: [`PathSet`], [`EnergyResponse`] (energy, **not** to be convolved).
 //! - Seams: [`FeatureExtractor`], [`RoomEstimator`], [`Augment`], [`RayScene`], [`Propagator`], [`Objective`].
 //!
 //! # Does not
