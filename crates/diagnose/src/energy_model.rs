@@ -21,6 +21,8 @@ const FREE_GAIN_DB: f64 = 40.0;
 const STEP: f64 = 1e-4;
 /// Starts that are followed to their top.
 const MOST_STARTS: usize = 2;
+/// Bins in which unknown gains are first read.
+const EARLY_BINS: usize = 8;
 /// Bounds of absorption.
 pub(crate) const ABSORPTION: (f64, f64) = (0.002, 0.98);
 
@@ -137,6 +139,31 @@ impl<'a> EnergyModel<'a> {
             x[..n].copy_from_slice(&before[..n]);
         }
         x
+    }
+
+    /// Unknown gains begin where early energies meet: from tens of decibels off, steps would be many.
+    fn start_gains(&self, values: &mut [f64]) {
+        let off_db = |pair: usize| {
+            let ratios: Vec<f64> = (0..self.data.survey.bands.len())
+                .filter_map(|band| {
+                    let energies = self.compared(pair, band)?;
+                    let count = energies.len().min(EARLY_BINS);
+                    let measured: f64 = energies[..count].iter().sum();
+                    let predicted: f64 =
+                        self.data.states[pair][band].ln_energy[..count].iter().map(|l| l.exp()).sum();
+                    (measured > 0.0 && predicted > 0.0).then(|| (measured / predicted).ln() / LN_PER_DB)
+                })
+                .collect();
+            crate::workbench::median(ratios)
+        };
+        let pairs: Vec<usize> = (0..self.assignment.len()).filter(|&p| self.used[p]).collect();
+        if let Some(index) = self.common_gain {
+            values[index] = crate::workbench::median(pairs.iter().map(|&p| off_db(p)).collect());
+        } else if self.data.survey.measurement.levels == Levels::PerResponse {
+            for pair in pairs {
+                values[self.first_gain + self.assignment[pair]] = off_db(pair);
+            }
+        }
     }
 
     /// Parameters before those of the effects.
@@ -389,7 +416,11 @@ pub(crate) fn fit(
     before: Option<Before<'_>>,
 ) -> Result<(Maximum, Vec<usize>), Error> {
     let model = EnergyModel::new(data, cases, used);
-    let mut starts: Vec<Vec<f64>> = vec![model.start(before.map(|b| b.values))];
+    let mut first_start = model.start(before.map(|b| b.values));
+    if before.is_none() {
+        model.start_gains(&mut first_start);
+    }
+    let mut starts: Vec<Vec<f64>> = vec![first_start];
     for (order, case) in cases.iter().enumerate() {
         let first = model.first_of(order);
         let count = case.parameters(data.survey).len();
