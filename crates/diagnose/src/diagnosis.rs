@@ -109,6 +109,8 @@ pub struct CandidateScore {
     pub subject: Option<String>,
     /// Evidence beside the baseline, corrected for the number of its cases, in nats.
     pub nats: f64,
+    /// Size found beside the baseline in units of its standard deviation, materials and everything else left free (d').
+    pub d_prime: f64,
     /// The same beside all named causes; `None` for those.
     pub nats_beside_causes: Option<f64>,
 }

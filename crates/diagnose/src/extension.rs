@@ -1,8 +1,9 @@
 //! Turns named causes into a model that renders.
 
-use crate::diagnoser::{parameters, place_of};
+use crate::TransducerResponse;
 use crate::effect::{Evidence, Nuisance};
 use crate::extended_model::{CoupledDecay, Dimensions, ExtendedModel};
+use crate::found_parameters::{parameters, place_of};
 use crate::search::{Search, State};
 use crate::traced_pair::scattering_more;
 use crate::workbench::Workbench;
@@ -40,7 +41,7 @@ pub(crate) fn extended_model(bench: &Workbench, search: &Search<'_>, state: &Sta
         };
         let octaves = |b: usize| survey.octaves_from_1khz(b);
         match id {
-            "transducer_response" => model.gain_db = values,
+            "transducer_response" => model.gain_db = TransducerResponse::gains_db(&values, survey),
             "air_absorption" => model.relative_humidity_percent = Some(values[0]),
             "source_directivity" => {
                 let share = |b: usize| (values[0] + values[1] * octaves(b)).clamp(DIRECTED.0, DIRECTED.1);

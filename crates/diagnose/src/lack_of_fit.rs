@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 /// A bin is odd if its energy is as improbable as a normal deviate beyond this.
 const ODD_SD: f64 = 4.5;
-/// Odd bins that come by chance, on the average: measured on null rooms of the laboratory.
+/// Odd bins that are put down to chance, on the average: normal deviates would give 0.02 among 3000 bins, pulses that meet more.
 const ODD_BY_CHANCE: f64 = 1.5;
 
 /// The two ways in which a fit can lack.

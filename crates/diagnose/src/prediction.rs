@@ -6,6 +6,7 @@ use crate::workbench::Workbench;
 use sabine_acoustics::Levels;
 
 /// Measured and predicted energies of the compared bins of one pair and band.
+#[derive(Clone)]
 pub(crate) struct Compared {
     pub pair: usize,
     pub band: usize,

@@ -1,7 +1,7 @@
 //! Which causes the data speak for.
 
 use crate::Error;
-use crate::effect::{Case, Effect, Evidence};
+use crate::effect::{Case, Effect, Evidence, Nuisance};
 use crate::energy_model::Before;
 use crate::gauss_newton::Maximum;
 use crate::workbench::Workbench;
@@ -28,6 +28,8 @@ pub(crate) struct Score {
     pub candidate: usize,
     /// Evidence that it adds, in nats.
     pub nats: f64,
+    /// Its size in units of its standard deviation, everything else left free.
+    pub d_prime: f64,
 }
 
 /// The present state: chosen candidates and the evidence of each part.
@@ -76,6 +78,8 @@ pub(crate) struct EffectScore {
     pub best: usize,
     /// Log odds against its absence, corrected for the number of cases, in nats.
     pub nats: f64,
+    /// Size of the best case in units of its standard deviation.
+    pub d_prime: f64,
 }
 
 impl<'a> Search<'a> {
@@ -180,9 +184,31 @@ impl<'a> Search<'a> {
                 let next = self.with(state, candidate)?;
                 let behind = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
                 report(observer, "candidates", behind, total)?;
-                Ok(Score { candidate, nats: next.log_evidence() - state.log_evidence() })
+                Ok(Score {
+                    candidate,
+                    nats: next.log_evidence() - state.log_evidence(),
+                    d_prime: self.d_prime(state, &next, candidate),
+                })
             })
             .collect()
+    }
+
+    /// Twice the gain in likelihood is noncentral chi-squared: its mean is the squared size of the effect in standard deviations,
+    /// and one for each free parameter (Wilks 1938; Wald 1943).
+    fn d_prime(&self, state: &State, next: &State, candidate: usize) -> f64 {
+        let likelihood = |s: &State| s.energy.log_likelihood + s.arrivals.log_likelihood + s.polarity;
+        let case = self.candidates[candidate].case;
+        let widened: usize = case
+            .widens()
+            .iter()
+            .map(|(nuisance, _)| match nuisance {
+                Nuisance::Absorption(_) => self.bench.survey.bands.len(),
+                Nuisance::SourcePosition(_) | Nuisance::ReceiverPosition(_) => 3,
+                Nuisance::ResponseGain(_) => 1,
+            })
+            .sum();
+        let free = case.parameters(&self.bench.survey).len() + widened;
+        (2.0 * (likelihood(next) - likelihood(state)) - free as f64).max(0.0).sqrt()
     }
 
     /// Evidence by effect, the strongest first. An effect with many cases pays for their number.
@@ -199,6 +225,7 @@ impl<'a> Search<'a> {
                 id: self.candidates[best.candidate].id,
                 best: best.candidate,
                 nats: best.nats + sum.ln() - (count as f64).ln(),
+                d_prime: best.d_prime,
             });
         }
         found.sort_by(|a, b| b.nats.total_cmp(&a.nats));

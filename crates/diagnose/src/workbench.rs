@@ -8,39 +8,27 @@ use crate::gauss_newton::{Maximum, Prior};
 use crate::kernel::BandKernel;
 use crate::measured::{Measured, PEAKS_S};
 use crate::survey::{Place, Survey, SurveyedResponse};
-use crate::traced_pair::{Arrival, BandState, CELL_S, TracedPair, scattering_more};
+use crate::traced_pair::{Arrival, BandState, CELL_S, TracedPair};
+use crate::traced_room::{prepare, trace, traced_s};
 use crate::{DiagnoseConfig, Error};
 use rayon::prelude::*;
 use sabine_acoustics::{
-    Air, ImpulseResponse, Material, MaterialPrior, MeasuredRoom, Observer, PerBand, Receiver, Scene, Source,
-    report,
+    Air, ImpulseResponse, Material, MaterialPrior, MeasuredRoom, Observer, PerBand, Receiver, Source, report,
 };
 use sabine_propagate::{PathTracer, PreparedScene};
 use std::collections::BTreeMap;
 
-/// Extra scattering of the bands of the traced scene, in turn: its paths then serve any scattering.
-const TRACED_SCATTERING: [f64; 4] = [0.0, 0.12, 0.4, 0.85];
-/// Share of the stated absorption at which images are chosen.
-const CAUTION: f64 = 0.7;
-/// Longest time that is traced after the direct sound, in seconds.
-const LONGEST_S: f64 = 2.5;
-/// Shortest.
-const SHORTEST_S: f64 = 0.2;
-/// Decay beyond the compared range that is still traced, in dB.
-const MARGIN_DB: f64 = 12.0;
 /// Early time over which the reference energy is the mean, in seconds after the direct sound.
 const REFERENCE_S: f64 = 0.05;
 /// Rounds of expansion and fit of the baseline.
 const ROUNDS: usize = 4;
 /// Change of absorption (share of its prior's standard deviation) below which no further round is needed.
 const SETTLED: f64 = 0.1;
-/// Likeness of direct pulses about its typical value: one standard deviation.
-const LIKENESS_SD: f64 = 0.2;
-/// Share of pulses whose likeness says nothing.
-const ODD_PULSE_SHARE: f64 = 1e-6;
 
 pub(crate) struct Workbench {
     pub survey: Survey,
+    /// Responses that may be fitted: those of receivers that are not held out.
+    pub fitted: Vec<bool>,
     pub config: DiagnoseConfig,
     pub measured: Vec<Measured>,
     pub materials: Vec<Material>,
@@ -66,7 +54,13 @@ pub(crate) struct Workbench {
 }
 
 impl Workbench {
-    pub fn new(room: &MeasuredRoom, config: &DiagnoseConfig, observer: &dyn Observer) -> Result<Self, Error> {
+    /// Reads and traces everything, and fits the baseline to all responses but those of the receivers `held`.
+    pub fn new(
+        room: &MeasuredRoom,
+        held: &[usize],
+        config: &DiagnoseConfig,
+        observer: &dyn Observer,
+    ) -> Result<Self, Error> {
         let started = std::time::Instant::now();
         config.check()?;
         let total = room.responses().len();
@@ -149,7 +143,12 @@ impl Workbench {
             .iter()
             .map(|m| m.absorption().values().iter().map(|a| a.clamp(ABSORPTION.0, ABSORPTION.1)).collect())
             .collect();
+        let fitted: Vec<bool> = survey.responses.iter().map(|r| !held.contains(&r.receiver)).collect();
+        if !fitted.contains(&true) {
+            return Err(Error::NothingToCompare { responses: total });
+        }
         let mut bench = Self {
+            fitted,
             direct_s: pairs.iter().map(|p| p.direct_s).collect(),
             speed_m_s: pairs.iter().map(|p| p.speed_m_s).collect(),
             dispersion: vec![1.0; bands.len()],
@@ -227,7 +226,7 @@ impl Workbench {
     /// Fits the baseline, expanding about it anew until it stays.
     fn settle(&mut self, observer: &dyn Observer) -> Result<(), Error> {
         let started = std::time::Instant::now();
-        let used = vec![true; self.pairs.len()];
+        let used = self.fitted.clone();
         for round in 0..ROUNDS {
             report(observer, "baseline", round as u64, ROUNDS as u64)?;
             let found = self.fit_energy(&[], &used, None)?;
@@ -290,62 +289,6 @@ impl Workbench {
 
     pub fn fit_arrivals(&self, cases: &[&dyn Case], used: &[bool]) -> Result<(Maximum, Vec<usize>), Error> {
         arrival_model::fit(&self.arrival_data(), cases, used)
-    }
-
-    /// Log-likelihood of the signs of the direct sounds.
-    pub fn polarity(&self, cases: &[&dyn Case], used: &[bool]) -> f64 {
-        let likeness = self.signs();
-        let typical = median(likeness.iter().flatten().map(|x| x.abs()).collect());
-        likeness
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| used[*i])
-            .filter_map(|(i, x)| {
-                let turned = cases.iter().filter(|c| c.inverted() == Some(i)).count() % 2 == 1;
-                let off = (if turned { -x.as_ref()? } else { *x.as_ref()? }) - typical;
-                let density =
-                    (-0.5 * (off / LIKENESS_SD).powi(2)).exp() / (LIKENESS_SD * std::f64::consts::TAU.sqrt());
-                Some(((1.0 - ODD_PULSE_SHARE) * density + ODD_PULSE_SHARE * 0.5).ln())
-            })
-            .sum()
-    }
-
-    /// Likeness of each direct pulse to the others, positive for the sign of the majority.
-    fn signs(&self) -> Vec<Option<f64>> {
-        let n = self.measured.len();
-        if n < 3 {
-            return vec![None; n];
-        }
-        let likeness: Vec<Vec<f64>> = self
-            .measured
-            .iter()
-            .map(|a| self.measured.iter().map(|b| a.pulse_likeness(b).unwrap_or(0.0)).collect())
-            .collect();
-        // Signs that agree best: the leading eigenvector by repeated multiplication, from the one most like all others.
-        let first = (0..n)
-            .max_by(|&a, &b| {
-                let sum = |i: usize| likeness[i].iter().map(|x| x.abs()).sum::<f64>();
-                sum(a).total_cmp(&sum(b))
-            })
-            .unwrap_or(0);
-        let mut signs: Vec<f64> = likeness[first].clone();
-        for _ in 0..50 {
-            let next: Vec<f64> =
-                likeness.iter().map(|row| row.iter().zip(&signs).map(|(a, b)| a * b).sum()).collect();
-            let norm = next.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-12);
-            signs = next.into_iter().map(|x| x / norm).collect();
-        }
-        let positive = signs.iter().filter(|s| **s > 0.0).count();
-        let majority = if 2 * positive >= n { 1.0 } else { -1.0 };
-        (0..n)
-            .map(|i| {
-                let others: Vec<f64> = (0..n)
-                    .filter(|&j| j != i && likeness[i][j] != 0.0)
-                    .map(|j| likeness[i][j] * (majority * signs[j]).signum())
-                    .collect();
-                (!others.is_empty()).then(|| median(others))
-            })
-            .collect()
     }
 
     pub fn free_discrepancy(&self) -> FreeDiscrepancy {
@@ -443,7 +386,7 @@ impl Workbench {
     }
 }
 
-/// Mean squared standardised residual of each band, large ones trimmed: a single odd bin must not stand for all.
+/// Mean squared standardised residual of each band; what a bin measures above the prediction counts up to e^5 times.
 pub(crate) fn dispersion(residuals: &[BinResidual], bands: usize) -> Vec<f64> {
     (0..bands)
         .map(|band| {
@@ -490,73 +433,4 @@ fn range_end(state: &BandState, range_db: f64) -> usize {
         left -= e;
     }
     energies.len()
-}
-
-/// How long paths must be followed after the direct sound: until the slowest measured decay is through.
-fn traced_s(survey: &Survey, measured: &[Measured], range_db: f64) -> f64 {
-    let mut longest = SHORTEST_S;
-    for m in measured {
-        for (band, energies) in m.energies.iter().enumerate() {
-            let Some(energies) = energies else { continue };
-            let bins = crate::bins::Bins::new(survey.bands, band);
-            let total: f64 = energies.iter().sum();
-            let floor = total * 10f64.powf(-(range_db + MARGIN_DB) / 10.0);
-            let mut left = total;
-            let end = energies.iter().position(|e| {
-                left -= e;
-                left < floor
-            });
-            longest = longest.max(bins.edge_s(end.unwrap_or(energies.len())));
-        }
-    }
-    longest.min(LONGEST_S)
-}
-
-/// The tracer, and the scene with scattering spread over the bands.
-fn prepare(
-    room: &MeasuredRoom,
-    survey: &Survey,
-    materials: &[Material],
-    config: &DiagnoseConfig,
-    traced_s: f64,
-) -> Result<(PathTracer, PreparedScene), Error> {
-    let bands = survey.bands;
-    let spread: Vec<Material> = materials
-        .iter()
-        .map(|m| {
-            let columns: Vec<Material> =
-                TRACED_SCATTERING.iter().map(|&extra| scattering_more(m, extra)).collect::<Result<_, _>>()?;
-            let scattering = PerBand::from_fn(bands, |b| columns[b % columns.len()].scattering().values()[b]);
-            // Absorption only says which images of a cuboid matter: less than stated, for it may be fitted so.
-            let absorption = PerBand::from_fn(bands, |b| CAUTION * m.absorption().values()[b]);
-            Material::new(absorption, scattering)
-        })
-        .collect::<Result<_, sabine_acoustics::Error>>()?;
-    let scene: Scene = room.scene().with_materials(spread)?;
-    // The pairs differ in length by metres: the longest direct path sets the duration.
-    let slowest = survey.responses.iter().map(|r| r.air.speed_of_sound_m_s()).fold(f64::INFINITY, f64::min);
-    let diagonal: f64 = (0..3).map(|k| (survey.box_m[1][k] - survey.box_m[0][k]).powi(2)).sum::<f64>().sqrt();
-    let tracer = PathTracer::new(config.tracer(traced_s + diagonal / slowest + 0.05))?;
-    let prepared = tracer.prepare(&scene)?;
-    if !config.allow_leaks {
-        prepared.check_leaks(&scene, room.sources()[survey.responses[0].source].position_m)?;
-    }
-    Ok((tracer, prepared))
-}
-
-fn trace(
-    room: &MeasuredRoom,
-    survey: &Survey,
-    materials: &[Material],
-    (tracer, prepared): (&PathTracer, &PreparedScene),
-    observer: &dyn Observer,
-) -> Result<Vec<TracedPair>, Error> {
-    let mut found: Vec<TracedPair> = Vec::new();
-    for (i, response) in survey.responses.iter().enumerate() {
-        report(observer, "tracing", i as u64, survey.responses.len() as u64)?;
-        let (source, receiver) = (&room.sources()[response.source], &room.receivers()[response.receiver]);
-        let paths = tracer.trace_prepared(prepared, source, receiver, &response.air, &())?;
-        found.push(TracedPair::new(paths, response.air, materials)?);
-    }
-    Ok(found)
 }

@@ -1,0 +1,75 @@
+//! What was found of a cause, with its intervals.
+
+use crate::diagnosis::FoundParameter;
+use crate::effect::{Evidence, Nuisance};
+use crate::gauss_newton::Maximum;
+use crate::search::{Search, State};
+
+/// Half the width of a 90 % interval in standard deviations.
+const HALF_90: f64 = 1.645;
+
+/// Fitted parameters of a chosen candidate, what it frees among what every fit leaves open included.
+pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -> Vec<FoundParameter> {
+    let bench = search.bench;
+    let case = search.candidates[candidate].case;
+    let mut found = Vec::new();
+    let mut push = |name: String, value: f64, sd: f64, bounds: (f64, f64), unit: &str| {
+        found.push(FoundParameter {
+            name,
+            value,
+            low: (value - HALF_90 * sd).max(bounds.0),
+            high: (value + HALF_90 * sd).min(bounds.1),
+            unit: unit.to_owned(),
+        });
+    };
+    let (maximum, first) = place_of(search, state, candidate);
+    for (i, p) in case.parameters(&bench.survey).into_iter().enumerate() {
+        push(p.name, maximum.values[first + i], maximum.sd(first + i), p.bounds, p.unit);
+    }
+    let bands = bench.survey.bands;
+    let open = (f64::NEG_INFINITY, f64::INFINITY);
+    for (nuisance, _) in case.widens() {
+        match nuisance {
+            Nuisance::Absorption(m) => {
+                for b in 0..bands.len() {
+                    let i = m * bands.len() + b;
+                    let name = format!("absorption_{}_hz", bands.nominal_hz(b));
+                    push(name, state.energy.values[i], state.energy.sd(i), (0.0, 1.0), "");
+                }
+            }
+            Nuisance::SourcePosition(_) | Nuisance::ReceiverPosition(_) => {
+                let first = match nuisance {
+                    Nuisance::SourcePosition(i) => 3 * i,
+                    Nuisance::ReceiverPosition(i) => 3 * (bench.survey.sources.len() + i),
+                    _ => continue,
+                };
+                for (k, axis) in ["x", "y", "z"].iter().enumerate() {
+                    let (value, sd) = (state.arrivals.values[first + k], state.arrivals.sd(first + k));
+                    push(format!("offset_{axis}"), value, sd, open, "m");
+                }
+            }
+            Nuisance::ResponseGain(r) => {
+                let i = state.energy_gain(search, r);
+                push("gain".into(), state.energy.values[i], state.energy.sd(i), open, "dB");
+            }
+        }
+    }
+    found
+}
+
+/// The fit that holds the parameters of a candidate, and where they start.
+pub(crate) fn place_of<'s>(search: &Search<'_>, state: &'s State, candidate: usize) -> (&'s Maximum, usize) {
+    let part = search.candidates[candidate].case.evidence();
+    let same = |e: Evidence| e == part || e == Evidence::Assignment;
+    let order = state
+        .chosen
+        .iter()
+        .filter(|&&c| same(search.candidates[c].case.evidence()))
+        .position(|&c| c == candidate)
+        .unwrap_or(0);
+    if part == Evidence::Arrivals {
+        (&state.arrivals, state.arrival_firsts[order])
+    } else {
+        (&state.energy, state.energy_firsts.get(order).copied().unwrap_or(0))
+    }
+}

@@ -1,0 +1,219 @@
+//! Positions that are left out and predicted.
+
+use crate::Error;
+use crate::diagnosis::{DecayCurves, HeldOut, HeldOutGain};
+use crate::effect::{Case, Evidence};
+use crate::energy_model::Before;
+use crate::prediction::{Compared, Errors, compare, decay_db};
+use crate::search::{Search, State};
+use crate::workbench::Workbench;
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
+use sabine_acoustics::{Observer, report};
+
+/// Groups of receivers that are left out in turn, at most.
+const FOLDS: usize = 4;
+/// Draws of the bootstrap over positions.
+const BOOTSTRAP: usize = 2000;
+
+/// Receivers that are predicted from others.
+pub(crate) struct Folds {
+    /// Pairs fitted, and pairs predicted.
+    splits: Vec<(Vec<bool>, Vec<usize>)>,
+    receivers: Vec<usize>,
+}
+
+impl Folds {
+    pub fn new(bench: &Workbench, held: &[usize]) -> Self {
+        let responses = &bench.survey.responses;
+        let mut receivers: Vec<usize> = responses.iter().map(|r| r.receiver).collect();
+        receivers.sort_unstable();
+        receivers.dedup();
+        let never = !held.is_empty();
+        let groups: Vec<Vec<usize>> = if never {
+            held.iter().map(|&r| vec![r]).collect()
+        } else if receivers.len() < 2 {
+            Vec::new()
+        } else {
+            let count = receivers.len().min(FOLDS);
+            (0..count).map(|g| receivers.iter().copied().skip(g).step_by(count).collect()).collect()
+        };
+        let splits = groups
+            .iter()
+            .map(|group| {
+                let out = |r: usize| if never { held.contains(&r) } else { group.contains(&r) };
+                let used = responses.iter().map(|r| !out(r.receiver)).collect();
+                let pairs =
+                    (0..responses.len()).filter(|&p| group.contains(&responses[p].receiver)).collect();
+                (used, pairs)
+            })
+            .collect();
+        Self { splits, receivers: groups.into_iter().flatten().collect() }
+    }
+}
+
+/// Gains of one split: of all causes and of the free discrepancy over the baseline, and of each cause over the others; the bins
+/// compared; and what was predicted in each case.
+struct SplitGain {
+    named: f64,
+    free: f64,
+    each: Vec<f64>,
+    bins: f64,
+    predicted: [Vec<Compared>; 3],
+    without_each: Vec<Vec<Compared>>,
+}
+
+/// What comes of predicting the receivers that were left out: nothing where none could be.
+#[derive(Default)]
+pub(crate) struct Predicted {
+    pub held_out: Option<HeldOut>,
+    /// Of each cause.
+    pub gains: Vec<HeldOutGain>,
+    pub decays: Vec<DecayCurves>,
+}
+
+/// Predicts the receivers that were left out.
+pub(crate) fn predict(
+    search: &Search<'_>,
+    state: &State,
+    folds: &Folds,
+    held: &[usize],
+    observer: &dyn Observer,
+) -> Result<Predicted, Error> {
+    let bench = search.bench;
+    if folds.splits.is_empty() {
+        return Ok(Predicted::default());
+    }
+    let free = bench.free_discrepancy();
+    let total = folds.splits.len() as u64;
+    let done = std::sync::atomic::AtomicU64::new(0);
+    let splits: Vec<SplitGain> = folds
+        .splits
+        .par_iter()
+        .map(|(used, pairs)| {
+            let behind = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            report(observer, "held-out positions", behind, total)?;
+            let mut whole = used.clone();
+            pairs.iter().for_each(|&p| whole[p] = true);
+            // The logarithm of the predictive density is what the evidence grows by when the new positions come in.
+            let predictive =
+                |chosen: &[usize], free: Option<&dyn Case>| -> Result<(f64, Vec<Compared>), Error> {
+                    let mut cases = search.cases_of(chosen, Evidence::Energy);
+                    cases.extend(free);
+                    let arrivals = search.cases_of(chosen, Evidence::Arrivals);
+                    let firsts: &[usize] = if *chosen == *state.chosen { &state.energy_firsts } else { &[] };
+                    let before = Before { values: &state.energy.values, firsts };
+                    let fitted = bench.fit_energy(&cases, used, Some(before))?.0;
+                    let with = bench.fit_energy(&cases, &whole, Some(before))?.0;
+                    let energy = with.log_evidence - fitted.log_evidence;
+                    let times = bench.fit_arrivals(&arrivals, &whole)?.0.log_evidence
+                        - bench.fit_arrivals(&arrivals, used)?.0.log_evidence;
+                    let all = search.all_cases(chosen);
+                    let signs = bench.polarity(&all, &whole) - bench.polarity(&all, used);
+                    Ok((energy + times + signs, compare(bench, &cases, &fitted.values, pairs)))
+                };
+            let (base, before) = predictive(&[], None)?;
+            let (free, discrepant) = predictive(&[], Some(&free))?;
+            let (named, after) = if state.chosen.is_empty() {
+                (base, before.clone())
+            } else {
+                predictive(&state.chosen, None)?
+            };
+            let mut each = Vec::new();
+            let mut without_each = Vec::new();
+            for &c in &state.chosen {
+                let rest: Vec<usize> = state.chosen.iter().copied().filter(|&o| o != c).collect();
+                let (lacking, predicted) =
+                    if rest.is_empty() { (base, before.clone()) } else { predictive(&rest, None)? };
+                each.push(named - lacking);
+                without_each.push(predicted);
+            }
+            let bins = before.iter().map(|c| c.measured.len() as f64).sum();
+            Ok(SplitGain {
+                named: named - base,
+                free: free - base,
+                each,
+                bins,
+                predicted: [before, after, discrepant],
+                without_each,
+            })
+        })
+        .collect::<Result<_, Error>>()?;
+    let bins: f64 = splits.iter().map(|s| s.bins).sum();
+    let mean = |gain: &dyn Fn(&SplitGain) -> f64| splits.iter().map(gain).sum::<f64>() / bins;
+    let interval = |gain: &dyn Fn(&SplitGain) -> f64| bootstrap(&splits, gain, bench.config.seed);
+    let errors: Vec<Errors> = (0..3)
+        .map(|k| Errors::of(&splits.iter().flat_map(|s| s.predicted[k].iter().cloned()).collect::<Vec<_>>()))
+        .collect();
+    let three = |value: fn(&Errors) -> f64| [value(&errors[0]), value(&errors[1]), value(&errors[2])];
+    let held_out = HeldOut {
+        receivers: folds.receivers.iter().map(|&r| bench.survey.receivers[r].id.clone()).collect(),
+        never_fitted: !held.is_empty(),
+        db_rmse: three(|e| e.db_rmse),
+        t20_jnd: three(|e| e.t20_jnd),
+        c50_jnd: three(|e| e.c50_jnd),
+        nats_per_bin: [mean(&|s| s.named), mean(&|s| s.free)],
+        nats_interval: [interval(&|s| s.named), interval(&|s| s.free)],
+    };
+    let gains = (0..state.chosen.len())
+        .map(|i| {
+            let [low, high] = interval(&|s| s.each[i]);
+            let before: Vec<Compared> =
+                splits.iter().flat_map(|s| s.without_each[i].iter().cloned()).collect();
+            HeldOutGain {
+                nats_per_bin: mean(&|s| s.each[i]),
+                low,
+                high,
+                db_rmse_before: Errors::of(&before).db_rmse,
+                db_rmse_after: errors[1].db_rmse,
+            }
+        })
+        .collect();
+    let decays =
+        splits.iter().flat_map(|s| decay_curves(bench, &s.predicted[0], &s.predicted[1], true)).collect();
+    Ok(Predicted { held_out: Some(held_out), gains, decays })
+}
+
+/// 90 % interval of the mean gain per bin if other positions had been measured (Efron 1979).
+fn bootstrap(splits: &[SplitGain], gain: &dyn Fn(&SplitGain) -> f64, seed: u64) -> [f64; 2] {
+    let mut random = Pcg64Mcg::seed_from_u64(seed ^ 0xB007);
+    let mut means: Vec<f64> = (0..BOOTSTRAP)
+        .map(|_| {
+            let (mut sum, mut bins) = (0.0, 0.0);
+            for _ in 0..splits.len() {
+                let s = &splits[random.random_range(0..splits.len())];
+                sum += gain(s);
+                bins += s.bins;
+            }
+            sum / bins
+        })
+        .collect();
+    means.sort_by(f64::total_cmp);
+    [means[BOOTSTRAP / 20], means[BOOTSTRAP - 1 - BOOTSTRAP / 20]]
+}
+
+/// Curves of what was measured, and predicted before and after.
+pub(crate) fn decay_curves(
+    bench: &Workbench,
+    before: &[Compared],
+    after: &[Compared],
+    held_out: bool,
+) -> Vec<DecayCurves> {
+    before
+        .iter()
+        .zip(after)
+        .map(|(b, a)| {
+            let total = b.measured.iter().sum::<f64>().max(1e-300);
+            DecayCurves {
+                response: bench.survey.responses[b.pair].name.clone(),
+                band_hz: bench.survey.bands.nominal_hz(b.band),
+                time_s: b.times_s.clone(),
+                measured_db: decay_db(&b.measured, total),
+                before_db: decay_db(&b.predicted, total),
+                after_db: decay_db(&a.predicted, total),
+                held_out,
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,88 @@
+//! The measured room traced: one set of paths for each response, good for any material.
+
+use crate::measured::Measured;
+use crate::survey::Survey;
+use crate::traced_pair::{TracedPair, scattering_more};
+use crate::{DiagnoseConfig, Error};
+use sabine_acoustics::{Material, MeasuredRoom, Observer, PerBand, Scene, report};
+use sabine_propagate::{PathTracer, PreparedScene};
+
+/// Extra scattering of the bands of the traced scene, in turn: its paths then serve any scattering.
+const TRACED_SCATTERING: [f64; 4] = [0.0, 0.12, 0.4, 0.85];
+/// Share of the stated absorption at which images are chosen.
+const CAUTION: f64 = 0.7;
+/// Longest time that is traced after the direct sound, in seconds.
+const LONGEST_S: f64 = 2.5;
+/// Shortest.
+const SHORTEST_S: f64 = 0.2;
+/// Decay beyond the compared range that is still traced, in dB.
+const MARGIN_DB: f64 = 12.0;
+
+/// How long paths must be followed after the direct sound: until the slowest measured decay is through.
+pub(crate) fn traced_s(survey: &Survey, measured: &[Measured], range_db: f64) -> f64 {
+    let mut longest = SHORTEST_S;
+    for m in measured {
+        for (band, energies) in m.energies.iter().enumerate() {
+            let Some(energies) = energies else { continue };
+            let bins = crate::bins::Bins::new(survey.bands, band);
+            let total: f64 = energies.iter().sum();
+            let floor = total * 10f64.powf(-(range_db + MARGIN_DB) / 10.0);
+            let mut left = total;
+            let end = energies.iter().position(|e| {
+                left -= e;
+                left < floor
+            });
+            longest = longest.max(bins.edge_s(end.unwrap_or(energies.len())));
+        }
+    }
+    longest.min(LONGEST_S)
+}
+
+/// The tracer, and the scene with scattering spread over the bands.
+pub(crate) fn prepare(
+    room: &MeasuredRoom,
+    survey: &Survey,
+    materials: &[Material],
+    config: &DiagnoseConfig,
+    traced_s: f64,
+) -> Result<(PathTracer, PreparedScene), Error> {
+    let bands = survey.bands;
+    let spread: Vec<Material> = materials
+        .iter()
+        .map(|m| {
+            let columns: Vec<Material> =
+                TRACED_SCATTERING.iter().map(|&extra| scattering_more(m, extra)).collect::<Result<_, _>>()?;
+            let scattering = PerBand::from_fn(bands, |b| columns[b % columns.len()].scattering().values()[b]);
+            // Absorption only says which images of a cuboid matter: less than stated, for it may be fitted so.
+            let absorption = PerBand::from_fn(bands, |b| CAUTION * m.absorption().values()[b]);
+            Material::new(absorption, scattering)
+        })
+        .collect::<Result<_, sabine_acoustics::Error>>()?;
+    let scene: Scene = room.scene().with_materials(spread)?;
+    // The pairs differ in length by metres: the longest direct path sets the duration.
+    let slowest = survey.responses.iter().map(|r| r.air.speed_of_sound_m_s()).fold(f64::INFINITY, f64::min);
+    let diagonal: f64 = (0..3).map(|k| (survey.box_m[1][k] - survey.box_m[0][k]).powi(2)).sum::<f64>().sqrt();
+    let tracer = PathTracer::new(config.tracer(traced_s + diagonal / slowest + 0.05))?;
+    let prepared = tracer.prepare(&scene)?;
+    if !config.allow_leaks {
+        prepared.check_leaks(&scene, room.sources()[survey.responses[0].source].position_m)?;
+    }
+    Ok((tracer, prepared))
+}
+
+pub(crate) fn trace(
+    room: &MeasuredRoom,
+    survey: &Survey,
+    materials: &[Material],
+    (tracer, prepared): (&PathTracer, &PreparedScene),
+    observer: &dyn Observer,
+) -> Result<Vec<TracedPair>, Error> {
+    let mut found: Vec<TracedPair> = Vec::new();
+    for (i, response) in survey.responses.iter().enumerate() {
+        report(observer, "tracing", i as u64, survey.responses.len() as u64)?;
+        let (source, receiver) = (&room.sources()[response.source], &room.receivers()[response.receiver]);
+        let paths = tracer.trace_prepared(prepared, source, receiver, &response.air, &())?;
+        found.push(TracedPair::new(paths, response.air, materials)?);
+    }
+    Ok(found)
+}

@@ -1,0 +1,129 @@
+//! How well hidden effects are found: laboratory rooms, each with effects of some strength or none, diagnosed blind.
+//!
+//! Prints answers by effect and strength, detection by d', false alarms, coverage and controls with 95 % intervals. With `--record`
+//! every room is written to a CSV file as soon as it is done, and rooms that the file holds are not done again.
+
+mod sham;
+mod tables;
+mod trial;
+
+use clap::Parser;
+use sabine::diagnose::DiagnoseConfig;
+use sabine_testkit::Hidden;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use trial::{Task, Trial};
+
+type AnyError = Box<dyn std::error::Error + Send + Sync>;
+
+/// Hide effects in laboratory rooms and count what is found of them.
+#[derive(Parser)]
+struct Arguments {
+    /// Effects; `a+b` hides two at once [default: the whole catalogue, what is outside it, and none]
+    #[arg(long, value_delimiter = ',', value_name = "ID")]
+    effects: Vec<String>,
+    /// Strengths: 1 is plain, 0.3 slight
+    #[arg(long, value_delimiter = ',', value_name = "X", default_value = "1")]
+    strengths: Vec<f64>,
+    /// Rooms for each effect and strength; 0 prints the tables of the record alone
+    #[arg(long, default_value_t = 3)]
+    rooms: u64,
+    /// Seed of the first room; nothing was tuned on seeds from 1000 on
+    #[arg(long, default_value_t = 1000)]
+    seed: u64,
+    /// Receivers in each room
+    #[arg(long, default_value_t = 12)]
+    receivers: usize,
+    /// Rays for each pair
+    #[arg(long, default_value_t = DiagnoseConfig::default().rays)]
+    rays: usize,
+    /// Effects without meaning beside the catalogue, 0 to 14: a control
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=14))]
+    shams: u64,
+    /// CSV file that trials are added to, and whose trials count in the tables
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), AnyError> {
+    let mut trials = match &arguments.record {
+        Some(path) if path.exists() => read(path)?,
+        _ => Vec::new(),
+    };
+    let folder = std::env::temp_dir().join(format!("sabine_effect_atlas_{}", std::process::id()));
+    for task in tasks(arguments) {
+        if task.is_done(&trials) {
+            continue;
+        }
+        let trial = task.run(&folder).inspect_err(|_| {
+            // The error that counts is the first.
+            let _ = std::fs::remove_dir_all(&folder);
+        })?;
+        eprintln!(
+            "{:22} {:4.2} seed {}: {:?}, {}, d' {:.1}, {:.0} s",
+            trial.hidden,
+            trial.strength,
+            trial.seed,
+            trial.outcome,
+            trial.answer,
+            trial.d_prime.unwrap_or(f64::NAN),
+            trial.seconds
+        );
+        trials.push(trial);
+        if let Some(path) = &arguments.record {
+            write(path, &trials)?;
+        }
+    }
+    tables::print(&trials);
+    Ok(())
+}
+
+fn tasks(arguments: &Arguments) -> Vec<Task> {
+    let all = Hidden::CATALOGUE.iter().chain(Hidden::OUTSIDE.iter()).map(ToString::to_string);
+    let effects: Vec<String> = if arguments.effects.is_empty() {
+        all.chain(["none".to_owned()]).collect()
+    } else {
+        arguments.effects.clone()
+    };
+    let mut tasks = Vec::new();
+    for room in 0..arguments.rooms {
+        for &strength in &arguments.strengths {
+            for effect in &effects {
+                tasks.push(Task {
+                    hidden: effect.split('+').filter(|e| *e != "none").map(str::to_owned).collect(),
+                    strength,
+                    seed: arguments.seed + room,
+                    receivers: arguments.receivers,
+                    rays: arguments.rays,
+                    shams: arguments.shams as usize,
+                });
+            }
+        }
+    }
+    tasks
+}
+
+fn read(path: &PathBuf) -> Result<Vec<Trial>, AnyError> {
+    let mut reader = csv::Reader::from_path(path)?;
+    let trials: Result<Vec<Trial>, csv::Error> = reader.deserialize().collect();
+    trials.map_err(|error| format!("{}: {error}", path.display()).into())
+}
+
+fn write(path: &PathBuf, trials: &[Trial]) -> Result<(), AnyError> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for trial in trials {
+        writer.serialize(trial)?;
+    }
+    let bytes = writer.into_inner()?;
+    Ok(sabine::acoustics::write_atomically(path, |file| std::io::Write::write_all(file, &bytes))?)
+}

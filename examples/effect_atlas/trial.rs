@@ -1,0 +1,234 @@
+//! One laboratory room, diagnosed blind, and its truth beside what was found.
+
+use crate::AnyError;
+use crate::sham::{IDS, Sham};
+use sabine::diagnose::{Cause, DiagnoseConfig, Diagnoser, Diagnosis, Verdict, catalogue};
+use sabine_testkit::{Fault, Hidden, LabConfig, Laboratory};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// What is to be diagnosed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Task {
+    /// Effects to hide; none in a null room.
+    pub hidden: Vec<String>,
+    pub strength: f64,
+    pub seed: u64,
+    pub receivers: usize,
+    pub rays: usize,
+    /// Effects without meaning that stand beside the catalogue.
+    pub shams: usize,
+}
+
+/// How the answer stands to the truth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// Just what was hidden is named; nothing where nothing was hidden; nothing that no catalogue holds.
+    Right,
+    /// The set that is named holds it.
+    Set,
+    /// All that was hidden is named, and more.
+    Extra,
+    /// One of two is named, and nothing else.
+    Part,
+    /// Something else is named.
+    Wrong,
+    /// The room is called adequate though it is not.
+    Missed,
+    /// A misfit without a name, where a name was due.
+    Unnamed,
+}
+
+/// One line of the record.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Trial {
+    pub hidden: String,
+    pub strength: f64,
+    pub seed: u64,
+    pub receivers: usize,
+    pub shams: usize,
+    pub verdict: String,
+    pub answer: String,
+    pub outcome: Outcome,
+    pub p_value: f64,
+    /// Size found of the first hidden effect, in its standard deviations.
+    pub d_prime: Option<f64>,
+    /// Its evidence in nats, corrected for the number of its cases.
+    pub nats: Option<f64>,
+    /// Lower end of the gain of the first cause at positions not seen, in nats per bin.
+    pub gain_low: Option<f64>,
+    /// Parameters of the first hidden effect, named, whose truth is known; and how many of their 90 % intervals hold it.
+    pub intervals: usize,
+    pub covered: usize,
+    /// Mean absolute error of fitted absorption under the baseline and beside the named causes.
+    pub absorption_before: f64,
+    pub absorption_after: f64,
+    pub seconds: f64,
+}
+
+impl Task {
+    /// Name of what is hidden, as the record has it.
+    pub fn name(&self) -> String {
+        if self.hidden.is_empty() { "none".to_owned() } else { self.hidden.join("+") }
+    }
+
+    /// Whether a record holds this task.
+    pub fn is_done(&self, trials: &[Trial]) -> bool {
+        trials.iter().any(|t| {
+            t.hidden == self.name()
+                && t.strength == self.strength
+                && (t.seed, t.receivers, t.shams) == (self.seed, self.receivers, self.shams)
+        })
+    }
+
+    /// Hides, diagnoses and compares. The folder is used for the room and cleared afterwards.
+    pub fn run(&self, folder: &Path) -> Result<Trial, AnyError> {
+        let config = LabConfig { seed: self.seed, receivers: self.receivers, ..LabConfig::default() };
+        let lab = Laboratory::new(config)?;
+        let hidden: Vec<Hidden> = self
+            .hidden
+            .iter()
+            .zip(0..)
+            .map(|(id, k)| Hidden::random(id, self.strength, &lab, self.seed + 7919 * k))
+            .collect::<Result<_, _>>()?;
+        let room = lab.write(&hidden, folder, None)?;
+        let started = std::time::Instant::now();
+        let config = DiagnoseConfig { rays: self.rays, seed: self.seed, ..DiagnoseConfig::default() };
+        let mut effects = catalogue();
+        effects.extend((0..self.shams.min(IDS.len())).map(|n| Box::new(Sham::new(n)) as _));
+        let found = Diagnoser::new(config)?.with_effects(effects).diagnose(&room, &[], &())?;
+        let seconds = started.elapsed().as_secs_f64();
+        std::fs::remove_dir_all(folder)?;
+
+        let first = hidden.first().map(Hidden::id);
+        let own = found.candidates.iter().find(|c| Some(c.effect.as_str()) == first);
+        let cause = found.causes.iter().find(|c| Some(c.effect.as_str()) == first);
+        let truths = match hidden.first() {
+            Some(effect) => true_parameters(effect, &lab)?,
+            None => Vec::new(),
+        };
+        let held = cause.map(|c| within(c, &truths)).unwrap_or_default();
+        let [before, after] = absorption_errors(&found, &lab, &hidden)?;
+        Ok(Trial {
+            hidden: self.name(),
+            strength: self.strength,
+            seed: self.seed,
+            receivers: self.receivers,
+            shams: self.shams,
+            verdict: found.verdict.to_string(),
+            answer: answer(&found),
+            outcome: outcome(&found, &hidden),
+            p_value: found.lack_of_fit.p_value,
+            d_prime: own.map(|c| c.d_prime),
+            nats: own.map(|c| c.nats),
+            gain_low: found.causes.first().and_then(|c| c.held_out_gain.as_ref()).map(|g| g.low),
+            intervals: held.len(),
+            covered: held.iter().filter(|h| **h).count(),
+            absorption_before: before,
+            absorption_after: after,
+            seconds,
+        })
+    }
+}
+
+fn named(found: &Diagnosis) -> Vec<&str> {
+    let mut named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
+    named.sort_unstable();
+    named.dedup();
+    named
+}
+
+fn answer(found: &Diagnosis) -> String {
+    match found.verdict {
+        Verdict::Explained => named(found).join(" + "),
+        Verdict::Ambiguous => {
+            // The last cause stands for the set.
+            let sure = found.causes.iter().rev().skip(1).map(|c| c.effect.clone());
+            sure.chain([found.alternatives.join(" or ")]).collect::<Vec<_>>().join(" + ")
+        }
+        other => other.to_string(),
+    }
+}
+
+fn outcome(found: &Diagnosis, hidden: &[Hidden]) -> Outcome {
+    let mut truth: Vec<&str> = hidden.iter().map(Hidden::id).collect();
+    truth.sort_unstable();
+    let named = named(found);
+    let outside = truth.contains(&"outside");
+    match found.verdict {
+        Verdict::Adequate if truth.is_empty() => Outcome::Right,
+        Verdict::Adequate => Outcome::Missed,
+        Verdict::Unexplained if outside => Outcome::Right,
+        Verdict::Unexplained => Outcome::Unnamed,
+        Verdict::Explained if named == truth => Outcome::Right,
+        Verdict::Ambiguous
+            if truth.iter().all(|t| named.contains(t) || found.alternatives.iter().any(|a| a == t))
+                && !truth.is_empty() =>
+        {
+            Outcome::Set
+        }
+        _ if !truth.is_empty() && truth.iter().all(|t| named.contains(t)) => Outcome::Extra,
+        Verdict::Explained if named.iter().all(|n| truth.contains(n)) => Outcome::Part,
+        _ => Outcome::Wrong,
+    }
+}
+
+/// The truth of those parameters of an effect that the laboratory and the catalogue define alike.
+fn true_parameters(hidden: &Hidden, lab: &Laboratory) -> Result<Vec<(String, f64)>, AnyError> {
+    let bands = lab.truth(&[])?.bands()?;
+    let by_band = |name: &str, values: &[f64]| -> Vec<(String, f64)> {
+        values.iter().enumerate().map(|(b, v)| (format!("{name}_{}_hz", bands.nominal_hz(b)), *v)).collect()
+    };
+    let by_axis = |name: &str, values: [f64; 3]| -> Vec<(String, f64)> {
+        ["x", "y", "z"].iter().zip(values).map(|(axis, v)| (format!("{name}_{axis}"), v)).collect()
+    };
+    Ok(match hidden {
+        Hidden::TransducerResponse { gains_db } => {
+            let off = |b: &usize| (bands.exact_hz(*b) / 1000.0).log2().abs();
+            let middle = (0..bands.len()).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0);
+            let relative: Vec<f64> = gains_db.iter().map(|g| g - gains_db[middle]).collect();
+            by_band("gain", &relative)
+        }
+        Hidden::AirAbsorption { relative_humidity_percent } => {
+            vec![("relative_humidity".into(), *relative_humidity_percent)]
+        }
+        Hidden::SurfaceAbsorption { absorption, .. } => by_band("absorption", absorption),
+        Hidden::Truncation { end_s, .. } => vec![("end".into(), *end_s)],
+        Hidden::SoundSpeed { temperature_offset_k } => {
+            vec![("temperature".into(), lab.air().temperature_c() + temperature_offset_k)]
+        }
+        Hidden::SamplingClock { ppm } => vec![("deviation".into(), *ppm)],
+        Hidden::RoomDimensions { scale } => by_axis("scale", scale.map(|s| 100.0 * (s - 1.0))),
+        Hidden::PositionError { offset_m, .. } => by_axis("offset", *offset_m),
+        Hidden::TimeZero { latency_s } => vec![("latency".into(), 1000.0 * latency_s)],
+        Hidden::ChannelFault { fault: Fault::Gain { gain_db, .. } } => vec![("gain".into(), *gain_db)],
+        _ => Vec::new(),
+    })
+}
+
+/// Whether each interval holds its truth.
+fn within(cause: &Cause, truths: &[(String, f64)]) -> Vec<bool> {
+    truths
+        .iter()
+        .filter_map(|(name, truth)| {
+            let p = cause.parameters.iter().find(|p| p.name == *name)?;
+            Some(p.low <= *truth && *truth <= p.high)
+        })
+        .collect()
+}
+
+/// Mean absolute error over materials and octaves, under the baseline and beside the causes.
+fn absorption_errors(found: &Diagnosis, lab: &Laboratory, hidden: &[Hidden]) -> Result<[f64; 2], AnyError> {
+    let truth = lab.truth(hidden)?;
+    let (mut before, mut after, mut count) = (0.0, 0.0, 0.0);
+    for (name, fitted) in &found.materials {
+        let Some(material) = truth.materials.iter().find(|m| m.name == *name) else { continue };
+        for (b, wanted) in material.absorption.iter().enumerate() {
+            before += (fitted.absorption_before[b] - wanted).abs();
+            after += (fitted.absorption[b] - wanted).abs();
+            count += 1.0;
+        }
+    }
+    Ok([before / f64::max(count, 1.0), after / f64::max(count, 1.0)])
+}
