@@ -7,8 +7,6 @@ mod findings;
 mod held_out;
 mod look_alikes;
 mod report;
-#[cfg(test)]
-mod report_tests;
 mod residual_map;
 mod words;
 

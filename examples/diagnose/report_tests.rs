@@ -11,7 +11,7 @@ fn findings(verdict: &str, changes: &Value) -> Findings {
         json!({ "name": "relative_humidity", "value": 17.0, "low": 15.0, "high": 19.0, "unit": "%" });
     let cause = json!({ "effect": "air_absorption", "subject": null, "explanation": "It was <dry>.",
         "probability": 0.99, "nats": 40.0, "parameters": [humidity], "held_out_gain": gain });
-    let score = |id: &str, nats: f64| json!({ "effect": id, "subject": null, "nats": nats, "nats_beside_causes": -1.0 });
+    let score = |id: &str, nats: f64| json!({ "effect": id, "subject": null, "nats": nats, "d_prime": 4.0, "nats_beside_causes": -1.0 });
     let residual = json!({ "response": null, "band_hz": 4000.0, "time_s": 0.34, "before_db": -4.1,
         "after_db": 0.2, "expected_sd_db": 0.5 });
     let decay = json!({ "response": "s-r", "band_hz": 4000.0, "time_s": [0.0, 0.1], "measured_db": [0.0, -9.0],

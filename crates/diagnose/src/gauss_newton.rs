@@ -36,6 +36,8 @@ pub(crate) trait Model {
 pub(crate) struct Maximum {
     pub values: Vec<f64>,
     pub log_likelihood: f64,
+    /// The same with the priors' penalties, constants left out.
+    pub log_posterior: f64,
     pub covariance: DMatrix<f64>,
     /// Logarithm of the probability of the data, the parameters integrated out (Laplace: MacKay 2003, chapter 27).
     pub log_evidence: f64,
@@ -124,8 +126,15 @@ pub(crate) fn maximise(model: &dyn Model, start: &[f64], what: &'static str) -> 
     let factor = h.cholesky().ok_or(Error::Singular { what })?;
     let half_log_determinant: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
     let log_sd: f64 = priors.iter().map(|p| p.sd.ln()).sum();
-    let log_evidence = likelihood + penalty(&x) - half_log_determinant - log_sd;
-    Ok(Maximum { values: x, log_likelihood: likelihood, covariance: factor.inverse(), log_evidence, settled })
+    let log_posterior = likelihood + penalty(&x);
+    Ok(Maximum {
+        values: x,
+        log_likelihood: likelihood,
+        log_posterior,
+        covariance: factor.inverse(),
+        log_evidence: log_posterior - half_log_determinant - log_sd,
+        settled,
+    })
 }
 
 fn fill(model: &dyn Model, x: &[f64], slopes: &mut Slopes) -> f64 {

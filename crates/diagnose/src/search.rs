@@ -194,9 +194,10 @@ impl<'a> Search<'a> {
     }
 
     /// Twice the gain in likelihood is noncentral chi-squared: its mean is the squared size of the effect in standard deviations,
-    /// and one for each free parameter (Wilks 1938; Wald 1943).
+    /// and one for each free parameter (Wilks 1938; Wald 1943). What is known of materials and places beforehand counts as data: without
+    /// the effect they are strained.
     fn d_prime(&self, state: &State, next: &State, candidate: usize) -> f64 {
-        let likelihood = |s: &State| s.energy.log_likelihood + s.arrivals.log_likelihood + s.polarity;
+        let likelihood = |s: &State| s.energy.log_posterior + s.arrivals.log_posterior + s.polarity;
         let case = self.candidates[candidate].case;
         let widened: usize = case
             .widens()

@@ -45,6 +45,10 @@ fn a_room_without_effects_is_adequate() {
             found.lack_of_fit
         );
         assert!(found.causes.is_empty());
+        // Bins scatter as far as the paths say that they do.
+        for d in &found.lack_of_fit.dispersion {
+            assert!((0.6..1.5).contains(d), "{:?}", found.lack_of_fit.dispersion);
+        }
     }
 }
 
