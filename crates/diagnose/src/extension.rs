@@ -1,12 +1,12 @@
 //! Turns named causes into a model that renders.
 
-use crate::TransducerResponse;
 use crate::effect::{Evidence, Nuisance};
 use crate::extended_model::{CoupledDecay, Dimensions, ExtendedModel};
 use crate::found_parameters::{parameters, place_of};
 use crate::search::{Search, State};
 use crate::traced_pair::scattering_more;
 use crate::workbench::Workbench;
+use crate::{SourceDirectivity, TransducerResponse};
 use std::collections::BTreeMap;
 
 /// Least directed share that is worth a pattern, and the most.
@@ -47,12 +47,7 @@ pub(crate) fn extended_model(bench: &Workbench, search: &Search<'_>, state: &Sta
                 let share = |b: usize| (values[0] + values[1] * octaves(b)).clamp(DIRECTED.0, DIRECTED.1);
                 model.directed_share = per_band(&share);
                 for (i, source) in survey.sources.iter().enumerate() {
-                    let axis = source.axis.or_else(|| {
-                        let own = values.get(2 + 3 * i..5 + 3 * i)?;
-                        let length = own.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-9);
-                        Some([own[0] / length, own[1] / length, own[2] / length])
-                    });
-                    model.axis.extend(axis.map(|a| (source.id.clone(), a)));
+                    model.axis.insert(source.id.clone(), SourceDirectivity::axis(&values, survey, i));
                 }
             }
             "scattering" => {

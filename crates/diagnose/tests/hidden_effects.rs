@@ -130,6 +130,19 @@ fn a_directional_source_is_found() {
 }
 
 #[test]
+fn the_axis_of_a_directional_source_is_found_where_the_room_file_states_none() {
+    let config = LabConfig { seed: 530, receivers: 8, orientation: false, ..LabConfig::default() };
+    let lab = Laboratory::new(config).unwrap();
+    let hidden = Hidden::random("source_directivity", 1.0, &lab, 530).unwrap();
+    let truth = lab.truth(std::slice::from_ref(&hidden)).unwrap().sources[0].axis;
+    let found = diagnose(&lab, &[hidden]);
+    only_cause(&found, "source_directivity");
+    let axis = found.model.axis.values().next().unwrap();
+    let cosine: f64 = axis.iter().zip(truth).map(|(a, b)| a * b).sum();
+    assert!(cosine > 15f64.to_radians().cos(), "{axis:?} {truth:?}");
+}
+
+#[test]
 fn rough_walls_are_found() {
     let lab = lab(523);
     let hidden = Hidden::random("scattering", 1.0, &lab, 523).unwrap();

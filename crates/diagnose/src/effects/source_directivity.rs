@@ -3,7 +3,8 @@
 use crate::{BandView, Case, Effect, Parameter, Survey};
 
 /// A pattern of first order, 1 - d + d cos(angle to the axis), d rising by so much an octave; radiated power as without it.
-/// The axis is the room file's, or fitted where it states none. All sources share the pattern.
+/// The axis is the room file's; where it states none, azimuth (from x towards y) and elevation are fitted, all directions being as
+/// likely beforehand. All sources share the pattern.
 ///
 /// Mark: residuals of the direct sound and of early reflections that follow the angle at which they leave the source; later
 /// ones vanish. Mimicked by: something in the way, directional receivers. Turning the source tells them apart.
@@ -14,6 +15,12 @@ use crate::{BandView, Case, Effect, Parameter, Survey};
 pub struct SourceDirectivity;
 
 const MOST: f64 = 0.9;
+/// Standard deviations of the angles of a direction that may be any, in degrees: 180 / sqrt 3, and sqrt(pi^2 / 4 - 2) radians.
+const AZIMUTH_SD_DEG: f64 = 103.9;
+const ELEVATION_SD_DEG: f64 = 39.2;
+/// Directions that a fit starts from: azimuth and elevation in degrees. At the poles the azimuth would mean nothing.
+const STARTS_DEG: [[f64; 2]; 6] =
+    [[0.0, 0.0], [90.0, 0.0], [180.0, 0.0], [-90.0, 0.0], [0.0, 70.0], [0.0, -70.0]];
 
 impl Effect for SourceDirectivity {
     fn id(&self) -> &'static str {
@@ -33,6 +40,15 @@ impl SourceDirectivity {
     fn axes_are_stated(survey: &Survey) -> bool {
         survey.sources().iter().all(|s| s.axis.is_some())
     }
+
+    /// The axis of a source, a unit vector.
+    pub(crate) fn axis(values: &[f64], survey: &Survey, source: usize) -> [f64; 3] {
+        if let Some(axis) = survey.sources()[source].axis.filter(|_| Self::axes_are_stated(survey)) {
+            return axis;
+        }
+        let [azimuth, elevation] = [values[2 + 2 * source], values[3 + 2 * source]].map(f64::to_radians);
+        [elevation.cos() * azimuth.cos(), elevation.cos() * azimuth.sin(), elevation.sin()]
+    }
 }
 
 impl Case for SourceDirectivity {
@@ -43,10 +59,12 @@ impl Case for SourceDirectivity {
         ];
         if !Self::axes_are_stated(survey) {
             for source in survey.sources() {
-                for axis in ["x", "y", "z"] {
-                    let name = format!("axis_{axis}_{}", source.id);
-                    found.push(Parameter::new(name, "", 0.0, 1.0, (-3.0, 3.0)).typically(0.6));
-                }
+                let (azimuth, elevation) =
+                    (format!("axis_azimuth_{}", source.id), format!("axis_elevation_{}", source.id));
+                found.push(
+                    Parameter::new(azimuth, "deg", 0.0, AZIMUTH_SD_DEG, (-360.0, 360.0)).typically(45.0),
+                );
+                found.push(Parameter::new(elevation, "deg", 0.0, ELEVATION_SD_DEG, (-90.0, 90.0)));
             }
         }
         found
@@ -56,17 +74,11 @@ impl Case for SourceDirectivity {
         if Self::axes_are_stated(survey) {
             return vec![vec![0.3, 0.05]];
         }
-        let mut starts = Vec::new();
-        for k in 0..3 {
-            for sign in [-1.0, 1.0] {
-                let mut start = vec![0.3, 0.05];
-                for _ in survey.sources() {
-                    start.extend((0..3).map(|i| if i == k { sign } else { 0.1 }));
-                }
-                starts.push(start);
-            }
-        }
-        starts
+        let one = |direction: [f64; 2]| {
+            let axes = survey.sources().iter().flat_map(|_| direction);
+            [0.3, 0.05].into_iter().chain(axes).collect()
+        };
+        STARTS_DEG.into_iter().map(one).collect()
     }
 
     fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
@@ -75,13 +87,7 @@ impl Case for SourceDirectivity {
         if d == 0.0 {
             return;
         }
-        let source = view.pair().source;
-        let axis =
-            survey.sources()[source].axis.filter(|_| Self::axes_are_stated(survey)).unwrap_or_else(|| {
-                let own = &values[2 + 3 * source..5 + 3 * source];
-                let length = own.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-6);
-                [own[0] / length, own[1] / length, own[2] / length]
-            });
+        let axis = Self::axis(values, survey, view.pair().source);
         let q = 1.0 - d;
         let power = q * q + d * d / 3.0;
         for (bin, l) in ln_energy.iter_mut().enumerate() {
