@@ -22,6 +22,8 @@ const STRAY_SHARE: f64 = 0.4;
 const MISREAD_SHARE: f64 = 0.02;
 /// Times at which the fit starts to look for partners of a peak, and how it narrows.
 const WIDTHS_S: [f64; 3] = [4e-4, 1.2e-4, 0.0];
+/// Of the starts that an effect offers, those that are followed.
+const MOST_STARTS: usize = 3;
 /// Latency of a recording whose time zero means nothing.
 const FREE_LATENCY_S: f64 = 1.0;
 /// Time zero where the file says that it is the emission: half a sample or so.
@@ -237,7 +239,9 @@ pub(crate) fn fit(
     // From where the direct sounds point, and from where everything should be: a single response far off must not carry the
     // others away.
     let direct = maximise(&model, &start, "arrival times")?.values;
-    for first in [direct, start] {
+    let mut firsts = offered(&mut model, &start);
+    firsts.extend([direct, start]);
+    for first in firsts {
         let mut x = first;
         let mut found = None;
         for width_s in WIDTHS_S {
@@ -250,8 +254,29 @@ pub(crate) fn fit(
             best = Some(found);
         }
     }
-    let firsts = model.effects.iter().map(|p| p.first).collect();
-    best.map(|b| (b, firsts)).ok_or(Error::Singular { what: "arrival times" })
+    let places = model.effects.iter().map(|p| p.first).collect();
+    best.map(|b| (b, places)).ok_or(Error::Singular { what: "arrival times" })
+}
+
+/// The most promising of the values that the effects offer to start from: reflections that lie several of their distances off find no
+/// partners from the neutral values.
+fn offered(model: &mut ArrivalModel<'_>, neutral: &[f64]) -> Vec<Vec<f64>> {
+    model.width_s = Some(WIDTHS_S[0]);
+    let mut starts: Vec<Vec<f64>> = Vec::new();
+    for placed in &model.effects {
+        let options = placed.case.starts(model.data.survey);
+        let at = placed.first..placed.first + placed.parameters.len();
+        starts.extend(options.into_iter().filter(|o| o[..] != neutral[at.clone()]).map(|option| {
+            let mut x = neutral.to_vec();
+            x[at.clone()].copy_from_slice(&option);
+            x
+        }));
+    }
+    let mut ranked: Vec<(f64, Vec<f64>)> =
+        starts.into_iter().map(|x| (model.log_likelihood(&x, None), x)).collect();
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    model.width_s = None;
+    ranked.into_iter().take(MOST_STARTS).map(|(_, x)| x).collect()
 }
 
 /// A model that is ready to be looked at with fitted values.

@@ -1,12 +1,13 @@
 //! The whole diagnosis.
 
-use crate::diagnosis::{CandidateScore, Cause, Diagnosis, FittedMaterial, LackOfFit, Verdict};
-use crate::effect::{Effect, Evidence};
+use crate::diagnosis::{CandidateScore, Cause, Diagnosis, FittedMaterial, HeldOutGain, LackOfFit, Verdict};
+use crate::effect::{Effect, Evidence, Nuisance};
 use crate::found_parameters::parameters;
 use crate::held_out::{Folds, decay_curves, predict};
 use crate::isolability::{isolability, would_decide};
 use crate::lack_of_fit;
 use crate::naming::Named;
+use crate::notes::{Circumstances, notes};
 use crate::prediction::compare;
 use crate::residual_map::residual_map;
 use crate::search::{self, Search, State};
@@ -17,6 +18,8 @@ use std::time::Instant;
 
 /// Evidence by which the unnamed discrepancy must beat all named causes to unseat them, in nats.
 const UNSEAT_NATS: f64 = 5.0;
+/// Dispersion from which an unexplained misfit looks like another room.
+const SCATTERED: f64 = 3.0;
 /// Dispersion from which nothing is named: measured variance over that expected, causes and smooth discrepancy taken out.
 const HOPELESS: f64 = 100.0;
 
@@ -99,14 +102,27 @@ impl Diagnoser {
         let started = Instant::now();
         bench.calibrate_dispersion(&[], &used)?;
         let baseline_dispersion = bench.dispersion.clone();
-        let found = self.name(&mut bench, &cases, &used, observer)?;
+        let mut found = self.name(&mut bench, &cases, &used, observer)?;
         bench.seconds.insert("search", started.elapsed().as_secs_f64());
 
         let started = Instant::now();
-        report(observer, "lack of fit", 0, 2)?;
         let search = Search::new(&bench, &cases, self.effects.len(), used.clone());
         let base = search.state(&[], None)?;
-        let state = search.state(&found.chosen, Some(&base))?;
+        let mut state = search.state(&found.chosen, Some(&base))?;
+        let fold = Folds::new(&bench, &held);
+        let mut predicted = predict(&search, &state, &fold, &held, observer)?;
+        // A cause that is at work everywhere must help where it was not fitted.
+        let mut unconfirmed: Vec<&str> = Vec::new();
+        while let Some(worst) = least_confirmed(&search, &state, &predicted.gains) {
+            unconfirmed.push(search.candidates[worst].id);
+            found.drop(worst);
+            state = search.state(&found.chosen, Some(&base))?;
+            predicted = predict(&search, &state, &fold, &held, observer)?;
+        }
+        let predicting_s = started.elapsed().as_secs_f64();
+
+        let started = Instant::now();
+        report(observer, "lack of fit", 0, 2)?;
         let lack_before = lack_of_fit::test(&bench, &[], base.before(), &used)?;
         report(observer, "lack of fit", 1, 2)?;
         let energy_cases = search.cases_of(&state.chosen, Evidence::Energy);
@@ -121,12 +137,9 @@ impl Diagnoser {
         let beaten = !energy_cases.is_empty()
             && energy_cases.len() == state.chosen.len()
             && free_alone > state.energy.log_evidence + UNSEAT_NATS;
-        let testing_s = started.elapsed().as_secs_f64();
-
-        let started = Instant::now();
         // Where bins scatter a hundred times as far as they may, the baseline itself has not been met: no name can be trusted.
         let hopeless = bench.dispersion.iter().any(|d| *d > HOPELESS);
-        let verdict = if hopeless {
+        let verdict = if hopeless || beaten {
             Verdict::Unexplained
         } else if state.chosen.is_empty() {
             if lack_before.p_value < self.config.significance {
@@ -134,21 +147,20 @@ impl Diagnoser {
             } else {
                 Verdict::Adequate
             }
-        } else if beaten {
-            Verdict::Unexplained
         } else if !found.rivals.is_empty() {
             Verdict::Ambiguous
         } else {
             Verdict::Explained
         };
-        let state = if verdict == Verdict::Unexplained { base.clone() } else { state };
-        let unseated: Vec<&str> = match verdict {
-            Verdict::Unexplained => found.chosen.iter().map(|&c| search.candidates[c].id).collect(),
-            _ => Vec::new(),
-        };
+        let mut unseated: Vec<&str> = Vec::new();
+        if verdict == Verdict::Unexplained && !state.chosen.is_empty() {
+            unseated = state.chosen.iter().map(|&c| search.candidates[c].id).collect();
+            state = base.clone();
+            predicted = predict(&search, &state, &fold, &held, observer)?;
+        }
+        let testing_s = started.elapsed().as_secs_f64();
 
-        let fold = Folds::new(&bench, &held);
-        let predicted = predict(&search, &state, &fold, &held, observer)?;
+        let started = Instant::now();
         let causes: Vec<Cause> = state
             .chosen
             .iter()
@@ -169,15 +181,6 @@ impl Diagnoser {
             Verdict::Ambiguous => found.rivals.iter().map(|r| (*r).to_owned()).collect(),
             _ => Vec::new(),
         };
-        let mut decides: Vec<String> = Vec::new();
-        for (i, a) in alternatives.iter().enumerate() {
-            for b in &alternatives[i + 1..] {
-                let word = would_decide(a, b).to_owned();
-                if !decides.contains(&word) {
-                    decides.push(word);
-                }
-            }
-        }
         let isolability = isolability(&bench, &search.candidates)?;
         let candidates = self.candidate_scores(&search, &state, &found, observer)?;
         let cases_now = search.cases_of(&state.chosen, Evidence::Energy);
@@ -192,64 +195,22 @@ impl Diagnoser {
             decay_curves(&bench, &before, &after, false)
         };
         let model = extension::extended_model(&bench, &search, &state);
-        let mut notes = bench.notes.clone();
-        if bench.survey.air_assumed {
-            notes.push("The room file states no climate: 20 degrees and 50 % humidity were assumed.".into());
-        }
-        if bench.survey.responses.len() == 1 {
-            notes.push(
-                "One response only: what is the same at every position cannot be told from what is not."
-                    .into(),
-            );
-        }
-        if held_out.is_none() {
-            notes.push("Too few receivers to hold any out: no gain at new positions can be given.".into());
-        }
-        if hopeless {
-            notes.push(
-                "The simulation could not be fitted to these responses at all: stated materials, places or mesh may be far off. No \
-                 cause is named."
-                    .into(),
-            );
-        } else if !unseated.is_empty() {
-            notes.push(format!(
-                "{} would help, but a smooth discrepancy without a name explains more: the cause is not in the catalogue.",
-                unseated.join(" and ")
-            ));
-        }
-        if !(base.energy.settled && state.energy.settled && state.arrivals.settled) {
-            notes.push(
-                "A fit had not come to rest after its last step: take its figures with caution.".into(),
-            );
-        }
-        if verdict == Verdict::Explained && lack_after.p_value < self.config.significance {
-            notes.push("A significant misfit is left that none of the named causes explains.".into());
-        }
-        if bench.arrivals.iter().any(Vec::is_empty) {
-            notes.push("Where the direct line is blocked, arrival times are not compared.".into());
-        }
-        if baseline_dispersion.iter().any(|d| *d > 3.0) && verdict == Verdict::Unexplained {
-            notes.push(
-                "The responses scatter far more than this room would: are they of another room?".into(),
-            );
-        }
-        let materials = (0..bench.survey.materials.len())
-            .map(|m| {
-                let bands = bench.survey.bands.len();
-                let column = |values: &[f64]| values[m * bands..(m + 1) * bands].to_vec();
-                let fitted = FittedMaterial {
-                    stated: bench.priors[m].iter().map(|p| p.mean).collect(),
-                    absorption_before: column(&base.energy.values),
-                    absorption: column(&state.energy.values),
-                    absorption_sd: (0..bands).map(|b| state.energy.sd(m * bands + b)).collect(),
-                };
-                (bench.survey.materials[m].clone(), fitted)
-            })
-            .collect();
+        let notes = notes(&Circumstances {
+            bench: &bench,
+            verdict,
+            held_out: held_out.is_some(),
+            settled: base.energy.settled && state.energy.settled && state.arrivals.settled,
+            misfit_left: lack_after.p_value < self.config.significance,
+            hopeless,
+            scattered: baseline_dispersion.iter().any(|d| *d > SCATTERED),
+            unseated: &unseated,
+            unconfirmed: &unconfirmed,
+        });
         let mut seconds: Vec<(String, f64)> =
             bench.seconds.iter().map(|(stage, s)| ((*stage).to_owned(), *s)).collect();
         seconds.push(("lack of fit".into(), testing_s));
-        seconds.push(("prediction".into(), started.elapsed().as_secs_f64()));
+        seconds.push(("prediction".into(), predicting_s));
+        seconds.push(("report".into(), started.elapsed().as_secs_f64()));
         let common_gain_db = common_gain(&bench, &state);
         Ok(Diagnosis {
             verdict,
@@ -261,11 +222,11 @@ impl Diagnoser {
                 dispersion: dispersion_now,
             },
             causes,
+            would_decide: words_that_decide(&alternatives),
             alternatives,
-            would_decide: decides,
             candidates,
             isolability,
-            materials,
+            materials: fitted_materials(&bench, &base, &state),
             held_out,
             bands: bench.survey.bands,
             residuals,
@@ -319,4 +280,47 @@ fn without(search: &Search<'_>, state: &State, candidate: usize) -> Result<f64, 
 fn common_gain(bench: &Workbench, state: &State) -> Option<f64> {
     let index = bench.priors.len() * bench.survey.bands.len();
     (bench.survey.measurement.levels == sabine_acoustics::Levels::Common).then(|| state.energy.values[index])
+}
+
+/// The cause at work everywhere that gains least at positions which the fit has not seen, if chance may explain even that.
+fn least_confirmed(search: &Search<'_>, state: &State, gains: &[HeldOutGain]) -> Option<usize> {
+    let everywhere = |c: &usize| {
+        let case = search.candidates[*c].case;
+        let local = |(nuisance, _): &(Nuisance, f64)| {
+            matches!(nuisance, Nuisance::ReceiverPosition(_) | Nuisance::ResponseGain(_))
+        };
+        case.exchanged().is_none() && case.inverted().is_none() && !case.widens().iter().any(local)
+    };
+    let doubtful = state.chosen.iter().zip(gains).filter(|(c, gain)| everywhere(c) && gain.low <= 0.0);
+    doubtful.min_by(|a, b| a.1.nats_per_bin.total_cmp(&b.1.nats_per_bin)).map(|(c, _)| *c)
+}
+
+/// What would tell each two of the alternatives apart.
+fn words_that_decide(alternatives: &[String]) -> Vec<String> {
+    let mut words: Vec<String> = Vec::new();
+    for (i, a) in alternatives.iter().enumerate() {
+        for b in &alternatives[i + 1..] {
+            let word = would_decide(a, b).to_owned();
+            if !words.contains(&word) {
+                words.push(word);
+            }
+        }
+    }
+    words
+}
+
+fn fitted_materials(bench: &Workbench, base: &State, state: &State) -> Vec<(String, FittedMaterial)> {
+    (0..bench.survey.materials.len())
+        .map(|m| {
+            let bands = bench.survey.bands.len();
+            let column = |values: &[f64]| values[m * bands..(m + 1) * bands].to_vec();
+            let fitted = FittedMaterial {
+                stated: bench.priors[m].iter().map(|p| p.mean).collect(),
+                absorption_before: column(&base.energy.values),
+                absorption: column(&state.energy.values),
+                absorption_sd: (0..bands).map(|b| state.energy.sd(m * bands + b)).collect(),
+            };
+            (bench.survey.materials[m].clone(), fitted)
+        })
+        .collect()
 }

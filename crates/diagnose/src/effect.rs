@@ -1,6 +1,6 @@
 //! A named physical cause of a misfit, and the cases in which it can come.
 
-use crate::{ArrivalView, BandView, Survey};
+use crate::{ArrivalView, BandView, Dimensions, Survey};
 
 /// A parameter of an effect.
 #[derive(Clone, Debug, PartialEq)]
@@ -140,6 +140,11 @@ pub trait Case: Send + Sync {
     /// Kelvin by which the air is warmer than stated: once the case is named, paths are taken at that temperature.
     fn warmer_by_k(&self, _values: &[f64], _survey: &Survey) -> f64 {
         0.0
+    }
+
+    /// Size of the room: once the case is named, it is traced anew at this size.
+    fn resized(&self, _values: &[f64]) -> Option<Dimensions> {
+        None
     }
 
     /// Priors that it widens, with their new standard deviation.

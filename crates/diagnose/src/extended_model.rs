@@ -1,5 +1,6 @@
 //! The room with its named causes at work, as a file from which sound can be rendered.
 
+use sabine_acoustics::Scene;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -91,4 +92,25 @@ pub struct Dimensions {
     pub scale: [f64; 3],
     /// Shift along each axis in metres.
     pub shift_m: [f64; 3],
+}
+
+impl Dimensions {
+    /// Factors along the axes about the middle of the mesh's box, then a shift in metres.
+    pub fn new(scale: [f64; 3], shift_m: [f64; 3]) -> Self {
+        Self { scale, shift_m }
+    }
+
+    /// A scene of this size.
+    pub(crate) fn applied(&self, scene: &Scene) -> Result<Scene, sabine_acoustics::Error> {
+        let corner = |fold: fn(f64, f64) -> f64, from: f64, k: usize| {
+            scene.vertices().iter().map(|v| v[k]).fold(from, fold)
+        };
+        let middle: [f64; 3] = std::array::from_fn(|k| {
+            0.5 * (corner(f64::min, f64::INFINITY, k) + corner(f64::max, f64::NEG_INFINITY, k))
+        });
+        let vertices = scene.vertices().iter().map(|v| {
+            std::array::from_fn(|k| middle[k] + (v[k] - middle[k]) * self.scale[k] + self.shift_m[k])
+        });
+        Scene::new(vertices.collect(), scene.triangles().to_vec(), scene.materials().to_vec())
+    }
 }

@@ -1,7 +1,7 @@
 //! Turns named causes into a model that renders.
 
 use crate::effect::{Evidence, Nuisance};
-use crate::extended_model::{CoupledDecay, Dimensions, ExtendedModel};
+use crate::extended_model::{CoupledDecay, ExtendedModel};
 use crate::found_parameters::{parameters, place_of};
 use crate::search::{Search, State};
 use crate::traced_pair::scattering_more;
@@ -85,12 +85,7 @@ pub(crate) fn extended_model(bench: &Workbench, search: &Search<'_>, state: &Sta
             "truncation" => model.truncation = Some([values[0], values[1]]),
             "sound_speed" => model.temperature_c = Some(values[0]),
             "sampling_clock" => model.clock_ppm = Some(values[0]),
-            "room_dimensions" => {
-                model.dimensions = Some(Dimensions {
-                    scale: std::array::from_fn(|k| 1.0 + 0.01 * values[k]),
-                    shift_m: std::array::from_fn(|k| values[3 + k]),
-                });
-            }
+            "room_dimensions" => model.dimensions = case.resized(&values),
             "time_zero" => model.latency_s = Some(1e-3 * values[0]),
             "position_error" => {
                 let offset: Vec<f64> = parameters(search, state, candidate).iter().map(|p| p.value).collect();

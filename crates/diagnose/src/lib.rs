@@ -77,6 +77,7 @@ mod kernel;
 mod lack_of_fit;
 mod measured;
 mod naming;
+mod notes;
 mod polarity;
 mod prediction;
 mod recording_chain;

@@ -21,6 +21,14 @@ pub(crate) struct Named {
 }
 
 impl Named {
+    /// Takes a name back, and the set that it stands for.
+    pub fn drop(&mut self, candidate: usize) {
+        if self.chosen.last() == Some(&candidate) {
+            self.rivals.clear();
+        }
+        self.chosen.retain(|&c| c != candidate);
+    }
+
     pub fn probability(&self, candidate: usize) -> f64 {
         self.probabilities.iter().find(|p| p.0 == candidate).map_or(0.0, |p| p.1)
     }
@@ -72,7 +80,7 @@ impl Diagnoser {
                 named.rivals = std::iter::once(best.id).chain(rivals.iter().map(|r| r.id)).collect();
                 break;
             }
-            let (moved, warmer_k, absorption) = {
+            let (moved, warmer_k, resized, absorption) = {
                 let search = Search::new(bench, cases, self.effects.len(), used.to_vec());
                 let state = search.state(&named.chosen, None)?;
                 let offset = |first: usize| std::array::from_fn(|k| state.arrivals.values[first + k]);
@@ -92,7 +100,8 @@ impl Diagnoser {
                 let case = &cases[best.best].2;
                 let own = maximum.values.get(first..first + case.parameters(&bench.survey).len());
                 let warmer_k = own.map_or(0.0, |values| case.warmer_by_k(values, &bench.survey));
-                (moved, warmer_k, state.energy.values)
+                let resized = own.and_then(|values| case.resized(values));
+                (moved, warmer_k, resized, state.energy.values)
             };
             // With the cause at work the materials are others: what is compared, and with which spread, follows them.
             if cases[best.best].2.evidence() != Evidence::Arrivals {
@@ -100,6 +109,9 @@ impl Diagnoser {
             }
             if warmer_k != 0.0 {
                 bench.warm(warmer_k)?;
+            }
+            if let Some(dimensions) = resized {
+                bench.resize(&dimensions)?;
             }
             for (place, offset_m) in moved {
                 bench.move_place(place, offset_m)?;

@@ -183,16 +183,7 @@ impl ExtendedModel {
     fn scene(&self, stated: &Scene, materials: Vec<Material>) -> Result<Scene, Cause> {
         let scene = stated.with_materials(materials)?;
         let Some(change) = &self.dimensions else { return Ok(scene) };
-        let corner = |fold: fn(f64, f64) -> f64, from: f64, k: usize| {
-            scene.vertices().iter().map(|v| v[k]).fold(from, fold)
-        };
-        let middle: [f64; 3] = std::array::from_fn(|k| {
-            0.5 * (corner(f64::min, f64::INFINITY, k) + corner(f64::max, f64::NEG_INFINITY, k))
-        });
-        let vertices = scene.vertices().iter().map(|v| {
-            std::array::from_fn(|k| middle[k] + (v[k] - middle[k]) * change.scale[k] + change.shift_m[k])
-        });
-        Scene::new(vertices.collect(), scene.triangles().to_vec(), scene.materials().to_vec())
+        change.applied(&scene)
     }
 
     fn pattern(

@@ -38,14 +38,14 @@ pub(crate) fn traced_s(survey: &Survey, measured: &[Measured], range_db: f64) ->
     longest.min(LONGEST_S)
 }
 
-/// The tracer, and the scene with scattering spread over the bands.
+/// The scene with scattering spread over the bands, and its tracer.
 pub(crate) fn prepare(
     room: &MeasuredRoom,
     survey: &Survey,
     materials: &[Material],
     config: &DiagnoseConfig,
     traced_s: f64,
-) -> Result<(PathTracer, PreparedScene), Error> {
+) -> Result<(Scene, PathTracer, PreparedScene), Error> {
     let bands = survey.bands;
     let spread: Vec<Material> = materials
         .iter()
@@ -67,7 +67,7 @@ pub(crate) fn prepare(
     if !config.allow_leaks {
         prepared.check_leaks(&scene, room.sources()[survey.responses[0].source].position_m)?;
     }
-    Ok((tracer, prepared))
+    Ok((scene, tracer, prepared))
 }
 
 pub(crate) fn trace(

@@ -4,6 +4,7 @@ use crate::arrival_model::{self, ArrivalData};
 use crate::discrepancy::FreeDiscrepancy;
 use crate::effect::{Case, Nuisance};
 use crate::energy_model::{self, ABSORPTION, Before, BinResidual, EnergyData, EnergyModel};
+use crate::extended_model::Dimensions;
 use crate::gauss_newton::{Maximum, Prior};
 use crate::kernel::BandKernel;
 use crate::measured::{Measured, PEAKS_S};
@@ -13,7 +14,8 @@ use crate::traced_room::{prepare, trace, traced_s};
 use crate::{DiagnoseConfig, Error};
 use rayon::prelude::*;
 use sabine_acoustics::{
-    Air, ImpulseResponse, Material, MaterialPrior, MeasuredRoom, Observer, PerBand, Receiver, Source, report,
+    Air, ImpulseResponse, Material, MaterialPrior, MeasuredRoom, Observer, PerBand, Receiver, Scene, Source,
+    report,
 };
 use sabine_propagate::{PathTracer, PreparedScene};
 use std::collections::BTreeMap;
@@ -46,6 +48,10 @@ pub(crate) struct Workbench {
     pub dispersion: Vec<f64>,
     pub notes: Vec<String>,
     traced_s: f64,
+    /// Kelvin by which the air was found to be warmer than stated.
+    warmer_k: f64,
+    /// What is traced: the mesh, with scattering spread over the bands.
+    scene: Scene,
     tracer: PathTracer,
     prepared: PreparedScene,
     sources: Vec<Source>,
@@ -137,7 +143,7 @@ impl Workbench {
         };
         let priors: Vec<Vec<Prior>> = room.priors().iter().map(absorption_priors).collect();
         let traced_s = traced_s(&survey, &measured, config.range_db);
-        let (tracer, prepared) = prepare(room, &survey, &materials, config, traced_s)?;
+        let (scene, tracer, prepared) = prepare(room, &survey, &materials, config, traced_s)?;
         let pairs = trace(room, &survey, &materials, (&tracer, &prepared), observer)?;
         let absorption = materials
             .iter()
@@ -166,6 +172,8 @@ impl Workbench {
             reference: Vec::new(),
             notes,
             traced_s,
+            warmer_k: 0.0,
+            scene,
             tracer,
             prepared,
             sources: room.sources().to_vec(),
@@ -343,33 +351,59 @@ impl Workbench {
             }
             Nuisance::Absorption(_) | Nuisance::ResponseGain(_) => return Ok(()),
         }
-        for (pair, response) in self.survey.responses.iter().enumerate() {
-            let concerned = place == Nuisance::SourcePosition(response.source)
-                || place == Nuisance::ReceiverPosition(response.receiver);
-            let ends = (&self.sources[response.source], &self.receivers[response.receiver]);
-            if concerned {
-                // A place outside the room is none: the stated one is as good.
-                if let Ok(paths) =
-                    self.tracer.trace_prepared(&self.prepared, ends.0, ends.1, &response.air, &())
-                {
-                    self.pairs[pair] = TracedPair::new(paths, response.air, &self.materials)?;
-                    self.direct_s[pair] = self.pairs[pair].direct_s;
-                }
-            }
-        }
+        self.retrace(place)?;
         self.expand(true)
     }
 
     /// Takes all paths at another temperature. Arrival times stay relative to the stated one.
     pub fn warm(&mut self, kelvin: f64) -> Result<(), Error> {
-        for (pair, traced) in self.pairs.iter_mut().enumerate() {
-            let stated = self.survey.responses[pair].air;
-            let temperature_c = (stated.temperature_c() + kelvin).clamp(-40.0, 60.0);
-            let air = Air::new(temperature_c, stated.relative_humidity_percent(), stated.pressure_kpa())?;
-            traced.set_air(air);
-            self.direct_s[pair] = traced.direct_s;
+        self.warmer_k = kelvin;
+        for pair in 0..self.pairs.len() {
+            self.set_air(pair)?;
         }
         self.expand(true)
+    }
+
+    /// Traces everything anew in a room of another size. Arrival times stay relative to the stated one.
+    pub fn resize(&mut self, dimensions: &Dimensions) -> Result<(), Error> {
+        self.prepared = self.tracer.prepare(&dimensions.applied(&self.scene)?)?;
+        for source in 0..self.sources.len() {
+            self.retrace(Nuisance::SourcePosition(source))?;
+        }
+        self.expand(true)
+    }
+
+    /// Traces the pairs of a place anew, as far as it lies in the room: the stated place is as good as one that is none.
+    fn retrace(&mut self, place: Nuisance) -> Result<(), Error> {
+        for pair in 0..self.survey.responses.len() {
+            let response = &self.survey.responses[pair];
+            let concerned = place == Nuisance::SourcePosition(response.source)
+                || place == Nuisance::ReceiverPosition(response.receiver);
+            if !concerned {
+                continue;
+            }
+            let ends = (&self.sources[response.source], &self.receivers[response.receiver]);
+            if let Ok(paths) = self.tracer.trace_prepared(&self.prepared, ends.0, ends.1, &response.air, &())
+            {
+                self.pairs[pair] = TracedPair::new(paths, response.air, &self.materials)?;
+                self.direct_s[pair] = self.pairs[pair].direct_s;
+                self.set_air(pair)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The air of a pair, as it was found.
+    fn set_air(&mut self, pair: usize) -> Result<(), Error> {
+        if self.warmer_k == 0.0 {
+            return Ok(());
+        }
+        let stated = self.survey.responses[pair].air;
+        let temperature_c = (stated.temperature_c() + self.warmer_k).clamp(-40.0, 60.0);
+        let air = Air::new(temperature_c, stated.relative_humidity_percent(), stated.pressure_kpa())?;
+        self.pairs[pair].set_air(air);
+        self.direct_s[pair] = self.pairs[pair].direct_s;
+        Ok(())
     }
 
     /// Sets the dispersion of each band to what the bins still scatter once anything smooth has been taken out.

@@ -1,6 +1,6 @@
 //! `room_dimensions`: the room is longer, wider or higher than its model.
 
-use crate::{ArrivalView, Case, Effect, Evidence, Parameter, Survey};
+use crate::{ArrivalView, Case, Dimensions, Effect, Evidence, Parameter, Survey};
 
 /// Scale of the room along each axis, and a shift of it against sources and receivers, which stay where they are.
 ///
@@ -11,6 +11,9 @@ use crate::{ArrivalView, Case, Effect, Evidence, Parameter, Survey};
 /// moves the direct sound too.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RoomDimensions;
+
+/// A change from which a search starts: reflections then find partners up to twice as far off.
+const START_PERCENT: f64 = 2.5;
 
 impl Effect for RoomDimensions {
     fn id(&self) -> &'static str {
@@ -37,6 +40,30 @@ impl Case for RoomDimensions {
             axes.map(|a| Parameter::new(format!("scale_{a}"), "%", 0.0, 2.0, (-15.0, 15.0)).typically(1.0));
         let shift = axes.map(|a| Parameter::new(format!("shift_{a}"), "m", 0.0, 0.05, (-0.5, 0.5)));
         scale.into_iter().chain(shift).collect()
+    }
+
+    fn starts(&self, survey: &Survey) -> Vec<Vec<f64>> {
+        let [low, high] = survey.box_m();
+        let mut starts = vec![vec![0.0; 6]];
+        for k in 0..3 {
+            for percent in [-START_PERCENT, START_PERCENT] {
+                // One wall moves, or the other, or both.
+                for side in [-0.5, 0.0, 0.5] {
+                    let mut start = vec![0.0; 6];
+                    start[k] = percent;
+                    start[3 + k] = side * 0.01 * percent * (high[k] - low[k]);
+                    starts.push(start);
+                }
+            }
+        }
+        starts
+    }
+
+    fn resized(&self, values: &[f64]) -> Option<Dimensions> {
+        Some(Dimensions {
+            scale: std::array::from_fn(|k| 1.0 + 0.01 * values[k]),
+            shift_m: std::array::from_fn(|k| values[3 + k]),
+        })
     }
 
     fn delay_s(&self, values: &[f64], arrival: &ArrivalView<'_>) -> f64 {
