@@ -28,8 +28,8 @@ struct Arguments {
     /// Rooms for each effect and strength; 0 prints the tables of the record alone
     #[arg(long, default_value_t = 3)]
     rooms: u64,
-    /// Seed of the first room; nothing was tuned on seeds from 2000 on
-    #[arg(long, default_value_t = 2000)]
+    /// Seed of the first room; nothing was tuned on seeds from 3000 on
+    #[arg(long, default_value_t = 3000)]
     seed: u64,
     /// Receivers in each room
     #[arg(long, default_value_t = 12)]
@@ -37,6 +37,9 @@ struct Arguments {
     /// Rays for each pair
     #[arg(long, default_value_t = DiagnoseConfig::default().rays)]
     rays: usize,
+    /// Decay that is compared, in dB
+    #[arg(long, default_value_t = DiagnoseConfig::default().range_db)]
+    range_db: f64,
     /// Effects without meaning beside the catalogue, 0 to 14: a control
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=14))]
     shams: u64,
@@ -105,6 +108,7 @@ fn tasks(arguments: &Arguments) -> Vec<Task> {
                     seed: arguments.seed + room,
                     receivers: arguments.receivers,
                     rays: arguments.rays,
+                    range_db: arguments.range_db,
                     shams: arguments.shams as usize,
                 });
             }

@@ -16,6 +16,7 @@ pub struct Task {
     pub seed: u64,
     pub receivers: usize,
     pub rays: usize,
+    pub range_db: f64,
     /// Effects without meaning that stand beside the catalogue.
     pub shams: usize,
 }
@@ -94,7 +95,12 @@ impl Task {
             .collect::<Result<_, _>>()?;
         let room = lab.write(&hidden, folder, None)?;
         let started = std::time::Instant::now();
-        let config = DiagnoseConfig { rays: self.rays, seed: self.seed, ..DiagnoseConfig::default() };
+        let config = DiagnoseConfig {
+            rays: self.rays,
+            range_db: self.range_db,
+            seed: self.seed,
+            ..DiagnoseConfig::default()
+        };
         let mut effects = catalogue();
         effects.extend((0..self.shams.min(IDS.len())).map(|n| Box::new(Sham::new(n)) as _));
         let found = Diagnoser::new(config)?.with_effects(effects).diagnose(&room, &[], &())?;

@@ -15,6 +15,9 @@ const LEFT: f64 = 1e-9;
 /// Points within a bin at which the fade is averaged.
 const POINTS: usize = 4;
 
+/// Distance of the ends from which a fit starts, in seconds.
+const START_S: f64 = 0.02;
+
 impl Effect for Truncation {
     fn id(&self) -> &'static str {
         "truncation"
@@ -48,8 +51,10 @@ impl Case for Truncation {
     }
 
     fn starts(&self, survey: &Survey) -> Vec<Vec<f64>> {
-        let longest_s = longest_s(survey);
-        [0.15, 0.25, 0.35, 0.5, 0.7, 0.9].map(|share| vec![share * longest_s, 0.05]).to_vec()
+        // An end beyond what is compared changes nothing, and one before the true end silences what was measured: only close starts
+        // lead there.
+        let steps = ((longest_s(survey) / START_S) as usize).clamp(8, 120);
+        (1..steps).map(|k| vec![k as f64 / steps as f64 * longest_s(survey), 0.03]).collect()
     }
 
     fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
