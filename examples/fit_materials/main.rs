@@ -54,6 +54,12 @@ struct Arguments {
     /// Receiver of --t60 and of the rendered response [default: the first]
     #[arg(long, value_name = "ID")]
     receiver: Option<String>,
+    /// Standard deviation of the length of a reflected path by errors of positions and mesh, in metres; for --responses
+    #[arg(long, default_value_t = 0.1, value_name = "M")]
+    path_error_m: f64,
+    /// How strongly neighbouring octaves of a material are held together, 0 to 10000
+    #[arg(long, default_value_t = 0.0)]
+    smoothness: f64,
     /// Rays of the first trace
     #[arg(long, default_value_t = 20_000)]
     rays: usize,
@@ -181,7 +187,10 @@ impl<'a> Room<'a> {
             Slope::Paper => SlopeObjective::Paper,
             Slope::Li2018 => SlopeObjective::Li2018,
         };
-        Ok(MaterialFitter::new(FitConfig { objective, ..FitConfig::default() })?)
+        let arrival_error_s = self.arguments.path_error_m / self.air.speed_of_sound_m_s();
+        let smoothness = self.arguments.smoothness;
+        let config = FitConfig { objective, arrival_error_s, smoothness, ..FitConfig::default() };
+        Ok(MaterialFitter::new(config)?)
     }
 
     fn trace(

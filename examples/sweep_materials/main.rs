@@ -33,6 +33,12 @@ struct Arguments {
     /// Rays of the first trace of every fit; more follow where they are needed
     #[arg(long, default_value_t = 20_000)]
     rays: usize,
+    /// Specular paths taken from the closed form in rooms that are boxes, in every trace
+    #[arg(long, default_value_t = 0)]
+    cuboid_paths: usize,
+    /// Most paths that a fit may rest on
+    #[arg(long, default_value_t = 3_000_000)]
+    max_paths: usize,
     /// Relative Monte-Carlo error of T60 that is aimed at
     #[arg(long, default_value_t = 0.01)]
     t60_error: f64,
@@ -173,6 +179,7 @@ struct Traced<'a> {
     duration_s: f64,
     responses: u64,
     noise_seed: u64,
+    cuboid_paths: usize,
 }
 
 impl Traced<'_> {
@@ -204,7 +211,13 @@ fn mean(readings: &[PerBand<Reading>]) -> PerBand<Reading> {
 impl Retrace for Traced<'_> {
     fn trace(&self, seed: u64, effort: f64) -> Result<Vec<PathSet>, AcousticsError> {
         let rays = (effort * self.rays as f64).ceil() as usize;
-        let config = TracerConfig { rays, duration_s: self.duration_s, seed, ..TracerConfig::default() };
+        let config = TracerConfig {
+            rays,
+            duration_s: self.duration_s,
+            seed,
+            cuboid_paths: self.cuboid_paths,
+            ..TracerConfig::default()
+        };
         let tracer = PathTracer::new(config).map_err(|e| AcousticsError::implementation("tracing", e))?;
         let Room { scene, source, receiver, .. } = self.room;
         Ok(vec![tracer.trace(scene, source, receiver, &self.air, &())?])
@@ -240,10 +253,16 @@ fn fit_room(
     let air = Air::default();
     let responses = (RENDERED_S / target_s).clamp(RESPONSES.0, RESPONSES.1).ceil() as u64;
     let (rays, duration_s) = (arguments.rays, 1.25 * target_s);
-    let traced = Traced { room, air, rays, duration_s, responses, noise_seed: 1 };
+    let cuboid_paths = arguments.cuboid_paths;
+    let traced = Traced { room, air, rays, duration_s, responses, noise_seed: 1, cuboid_paths };
     let fitter = |objective| MaterialFitter::new(FitConfig { objective, ..FitConfig::default() });
 
-    let config = RetraceConfig { seed: 1, t60_error: arguments.t60_error, ..RetraceConfig::default() };
+    let config = RetraceConfig {
+        seed: 1,
+        t60_error: arguments.t60_error,
+        max_paths: arguments.max_paths,
+        ..RetraceConfig::default()
+    };
     let edc = fitter(SlopeObjective::DecayCurve)?.fit_t60_retracing(
         &traced,
         &materials,

@@ -88,6 +88,9 @@ const STRIDE: f64 = 1.6;
 /// Change of any material, in standard deviations of its prior, below which another pass would bring nothing: the error
 /// left is of the order of its square.
 const SETTLED: f64 = 0.02;
+/// Square of the relative change of a slope over one standard deviation of the prior that is rounding: a slope that nothing moves, as
+/// that of a single path, is not fitted.
+const RIGID: f64 = 1e-18;
 
 /// The most probable materials that meet the targets: minimises half the squared deviations from the priors, in standard
 /// deviations, subject to m/m' = 1, by the method of multipliers (Nocedal and Wright 2006, chapter 17).
@@ -241,7 +244,7 @@ impl<'g, 'a, 'b> Rounds<'g, 'a, 'b> {
             let square: f64 = residual.map_or(0.0, |(_, g)| {
                 g.iter().zip(&band.prior.standard_deviation).map(|(g, sd)| (g * sd).powi(2)).sum()
             });
-            *weight = if square > 0.0 { 1.0 / (group.config.prior_weight * square) } else { 0.0 };
+            *weight = if square > RIGID { 1.0 / (group.config.prior_weight * square) } else { 0.0 };
         }
         rounds
     }

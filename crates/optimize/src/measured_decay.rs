@@ -156,6 +156,35 @@ impl BinnedDecay {
         Ok(decay)
     }
 
+    /// The same in bins of at least this width, in seconds: neighbours are joined from the start on, and what is left over at the end
+    /// joins the last.
+    pub fn widened(&self, least_s: f64) -> Self {
+        let mut wide = Self {
+            edges_s: vec![self.edges_s[0]],
+            energy: Vec::new(),
+            values: Vec::new(),
+            signal: Vec::new(),
+            pulse: self.pulse.clone(),
+            tail: self.tail,
+        };
+        let bins = self.energy.len();
+        let mut from = 0;
+        while from < bins {
+            // Half a sample forgives rounding.
+            let enough = |to: usize| self.edges_s[to] - self.edges_s[from] >= least_s * (1.0 - 1e-6);
+            let to = (from + 1..=bins).find(|&to| enough(to)).unwrap_or(bins);
+            let to = if self.edges_s[bins] - self.edges_s[to] < least_s { bins } else { to };
+            let sum = |of: &[f64]| of[from..to].iter().sum::<f64>();
+            let gross: f64 = (from..to).map(|j| self.energy[j] / self.signal[j]).sum();
+            wide.edges_s.push(self.edges_s[to]);
+            wide.energy.push(sum(&self.energy));
+            wide.values.push(sum(&self.values));
+            wide.signal.push(sum(&self.energy) / gross);
+            from = to;
+        }
+        wide
+    }
+
     /// Level in dB of the energy still to come at the start of each bin, relative to that at the first.
     pub fn level_db(&self) -> Vec<f64> {
         let mut sum = self.tail;
@@ -186,4 +215,32 @@ fn growth(duration: f64) -> f64 {
         if filled(middle) < duration { low = middle } else { high = middle }
     }
     high
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wide_bins_hold_what_the_narrow_ones_held() {
+        let narrow = BinnedDecay {
+            edges_s: vec![0.0, 0.001, 0.002, 0.003, 0.005, 0.009, 0.0095],
+            energy: vec![8.0, 4.0, 3.0, 2.0, 1.0, 0.1],
+            values: vec![1.0, 1.0, 1.0, 2.0, 4.0, 0.5],
+            signal: vec![1.0, 0.8, 1.0, 0.5, 0.5, 0.5],
+            pulse: Pulse::new(&[0.0, 1.0, 0.0], 1, 1e4),
+            tail: 0.05,
+        };
+        let wide = narrow.widened(0.002);
+        // The last half millisecond is too short to stand alone.
+        assert_eq!(wide.edges_s, [0.0, 0.002, 0.005, 0.0095]);
+        assert_eq!(wide.energy, [12.0, 5.0, 1.1]);
+        assert_eq!(wide.values, [2.0, 3.0, 4.5]);
+        // 8 + 5 were measured for 12 of signal, 3 + 4 for 5, and 2.2 for 1.1.
+        for (found, expected) in wide.signal.iter().zip([12.0 / 13.0, 5.0 / 7.0, 0.5]) {
+            assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        }
+        assert_eq!(narrow.widened(0.0).edges_s, narrow.edges_s);
+        assert_eq!(narrow.widened(1.0).edges_s, [0.0, 0.0095]);
+    }
 }

@@ -12,6 +12,11 @@ use sabine_acoustics::{Levels, PathSet};
 const POINTS: usize = 8;
 /// A path counts in a measured bin if at least this share of its energy falls into it.
 const LEAST_SHARE: f64 = 1e-4;
+/// Errors of arrival are summed over so many quarters of a standard deviation to either side.
+const QUARTERS: i32 = 12;
+/// Least width of a bin, in standard deviations of an arrival: errors of neighbouring bins, in truth of opposite signs, are taken for
+/// independent, which may not be all that there is in a bin.
+const WIDTH: f64 = 2.0;
 /// Pairs that interfere less are left out.
 const LEAST_OVERLAP: f64 = 1e-7;
 
@@ -42,10 +47,19 @@ pub(crate) struct Window {
     /// First bin of the paths, and the share of each from there on.
     pub from: usize,
     pub shares: Vec<f64>,
-    /// Exact paths, by their place in [`BandResponse::exact`], and the share of each.
-    pub exact: Vec<(usize, f64)>,
+    pub exact: Vec<Arrival>,
     /// Pairs of these, by their place in this list, and how much they interfere ([`Pulse::overlap`]).
     pub overlaps: Vec<(usize, usize, f64)>,
+}
+
+/// An exact path in a measured bin.
+pub(crate) struct Arrival {
+    /// Its place in [`BandResponse::exact`].
+    pub place: usize,
+    /// Expected share of its energy that falls into the bin.
+    pub share: f64,
+    /// Variance of this share by the error of its arrival.
+    pub variance: f64,
 }
 
 impl<'a> ResponseBand<'a> {
@@ -61,7 +75,9 @@ impl<'a> ResponseBand<'a> {
         mut weights: Vec<f32>,
         decay: &BinnedDecay,
         latency_s: f64,
+        arrival_error_s: f64,
     ) -> bool {
+        let decay = &decay.widened(WIDTH * arrival_error_s);
         let end_s = history.bins() as f64 * history.bin_s;
         let edges_s: Vec<f64> =
             decay.edges_s.iter().map(|t| t - latency_s).take_while(|t| *t <= end_s).collect();
@@ -79,11 +95,11 @@ impl<'a> ResponseBand<'a> {
         let window = |(j, edges): (usize, &[f64])| {
             let (from, shares) = shares(edges, history, pulse);
             let paths = exact.iter().enumerate().map(|(place, &(i, _))| {
-                let after = |edge: f64| pulse.before(edge - history.times_s[i]);
-                (place, after(edges[1]) - after(edges[0]))
+                let (share, variance) = arrival(edges, history.times_s[i], arrival_error_s, pulse);
+                Arrival { place, share, variance }
             });
-            let exact_here: Vec<(usize, f64)> = paths.filter(|(_, share)| *share > LEAST_SHARE).collect();
-            let time_s = |n: usize| history.times_s[exact[exact_here[n].0].0];
+            let exact_here: Vec<Arrival> = paths.filter(|a| a.share > LEAST_SHARE).collect();
+            let time_s = |n: usize| history.times_s[exact[exact_here[n].place].0];
             let pairs = (0..exact_here.len()).flat_map(|n| (0..n).map(move |m| (n, m)));
             let overlaps = pairs.map(|(n, m)| (n, m, pulse.overlap(edges, time_s(n), time_s(m))));
             let overlaps = overlaps.filter(|(_, _, overlap)| *overlap > LEAST_OVERLAP).collect();
@@ -118,6 +134,27 @@ impl<'a> ResponseBand<'a> {
     }
 }
 
+/// Mean and variance of the share of a pulse between two edges, its arrival being normally distributed about a time.
+fn arrival(edges_s: &[f64], time_s: f64, error_s: f64, pulse: &Pulse) -> (f64, f64) {
+    let reach_s = 0.25 * f64::from(QUARTERS) * error_s + pulse.half_s();
+    if time_s + reach_s < edges_s[0] || time_s - reach_s > edges_s[1] {
+        return (0.0, 0.0);
+    }
+    let quarters = if error_s > 0.0 { QUARTERS } else { 0 };
+    let (mut weight, mut mean, mut square) = (0.0, 0.0, 0.0);
+    for i in -quarters..=quarters {
+        let z = 0.25 * f64::from(i);
+        let at_s = time_s + z * error_s;
+        let share = pulse.before(edges_s[1] - at_s) - pulse.before(edges_s[0] - at_s);
+        let w = (-0.5 * z * z).exp();
+        weight += w;
+        mean += w * share;
+        square += w * share * share;
+    }
+    mean /= weight;
+    (mean, (square / weight - mean * mean).max(0.0))
+}
+
 /// Which share of each bin of the paths falls between two edges once it has passed the filter.
 fn shares(edges_s: &[f64], history: &History, pulse: &Pulse) -> (usize, Vec<f64>) {
     let bin_s = history.bin_s;
@@ -130,4 +167,38 @@ fn shares(edges_s: &[f64], history: &History, pulse: &Pulse) -> (usize, Vec<f64>
     };
     let from = from.min(history.bins());
     (from, (from..to.clamp(from, history.bins())).map(share).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+
+    #[test]
+    fn shares_of_uncertain_arrivals_are_what_drawing_them_gives() {
+        // A pulse of three samples at 10 kHz.
+        let pulse = Pulse::new(&[0.0, 0.3, 1.0, -0.5, 0.0], 2, 10_000.0);
+        let mut random = rand_pcg::Pcg64::seed_from_u64(5);
+        for (edges, time_s) in [([0.01, 0.011], 0.0103), ([0.01, 0.0107], 0.0115), ([0.01, 0.03], 0.0102)] {
+            let error_s = 0.25e-3;
+            let (mut sum, mut square) = (0.0, 0.0);
+            let draws = 100_000;
+            for _ in 0..draws {
+                let (u, v): (f64, f64) = (random.random(), random.random());
+                let z = (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos();
+                let at_s = time_s + error_s * z;
+                let share = pulse.before(edges[1] - at_s) - pulse.before(edges[0] - at_s);
+                sum += share;
+                square += share * share;
+            }
+            let mean = sum / f64::from(draws);
+            let variance = square / f64::from(draws) - mean * mean;
+            let found = arrival(&edges, time_s, error_s, &pulse);
+            assert!((found.0 - mean).abs() < 0.01, "{edges:?}: {found:?} {mean}");
+            assert!((found.1 - variance).abs() < 0.01, "{edges:?}: {found:?} {variance}");
+        }
+        let (share, variance) = arrival(&[0.01, 0.011], 0.0103, 0.0, &pulse);
+        assert!(variance == 0.0 && share > 0.99, "{share} {variance}");
+        assert_eq!(arrival(&[0.01, 0.011], 0.02, 1e-3, &pulse), (0.0, 0.0));
+    }
 }

@@ -2,7 +2,7 @@
 
 use crate::expansion::Bins;
 use crate::history::variance_of_sum;
-use crate::response_band::{BandResponse, ResponseBand, Window};
+use crate::response_band::{Arrival, BandResponse, ResponseBand, Window};
 use sabine_acoustics::Levels;
 
 /// A measured bin and what the paths give for it near an absorption.
@@ -160,7 +160,7 @@ impl Bin {
             hits.iter_mut().zip(row).for_each(|(h, n)| *h += e * n);
         }
         let mut single = 0.0;
-        for &(place, share) in &window.exact {
+        for &Arrival { place, share, .. } in &window.exact {
             let (e, counts) = exact[place];
             single += share * e;
             hits.iter_mut().zip(counts).for_each(|(h, &n)| *h += share * e * f64::from(n));
@@ -173,10 +173,11 @@ impl Bin {
         // Arrivals interfere. Of random sign they add 2 sum e_i e_j G^2 over i != j to the variance, G being what pulses so far
         // apart have in common; in a diffuse field that is E^2 / (bandwidth x duration).
         let mut variance = (2.0 * single * sampled + sampled * sampled) / window.values;
-        let whole = |n: usize| exact[window.exact[n].0].0;
+        let whole = |n: usize| exact[window.exact[n].place].0;
         variance += 2.0 * window.overlaps.iter().map(|&(n, m, o)| o * whole(n) * whole(m)).sum::<f64>();
-        variance +=
-            window.exact.iter().map(|(place, s)| (path_error * s * exact[*place].0).powi(2)).sum::<f64>();
+        // A reflection is not known perfectly, neither how strong it is nor on which side of an edge it arrives.
+        let known = |a: &Arrival| exact[a.place].0.powi(2) * ((path_error * a.share).powi(2) + a.variance);
+        variance += window.exact.iter().map(known).sum::<f64>();
         Some(Self {
             group: None,
             place: 0,

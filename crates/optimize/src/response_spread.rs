@@ -12,7 +12,8 @@ const SHOWS: f64 = 1.0 / 3.0;
 impl Spread {
     /// Errors of a fit to responses, linearised at the solution: cov = C (P + F + M) C in standard deviations of the priors, with
     /// C the inverse of prior plus data information, P the prior's, F what the measurement's chance and M what that of the
-    /// rays adds. Materials at a bound or held do not follow.
+    /// rays adds. A material at a bound keeps its prior's error; the others do not take it for known, or they would seem sure of
+    /// what they had to make up for.
     pub fn of_responses(
         unknowns: &Unknowns<'_>,
         expansions: &[ResponseExpansion<'_>],
@@ -80,13 +81,7 @@ impl Spread {
             let a = absorption[unknowns.free[i].0][unknowns.free[i].1];
             at_bound(a, bounds.0) || at_bound(a, bounds.1)
         };
-        let mut precision = &prior + &information;
-        for i in (0..n).filter(|&i| fixed(i)) {
-            precision.row_mut(i).fill(0.0);
-            precision.column_mut(i).fill(0.0);
-            precision[(i, i)] = 1.0;
-        }
-        let inverse = or_unit(precision);
+        let inverse = or_unit(&prior + &information);
         let covariance = &inverse * (prior + chance + rays) * &inverse;
         for (i, &(b, k)) in unknowns.free.iter().enumerate() {
             let before = prior_covariance[(i, i)];

@@ -50,7 +50,7 @@ impl MaterialFitter {
     /// not flat. Time zero is the emission, or what puts the onset on the shortest path ([`Measurement::time_zero`]). The direct sound itself (5 ms,
     /// more in low octaves) is left out: it depends on the source's directivity.
     ///
-    /// Of the settings it uses bin width, bounds, smoothness, the error of reflections and the number of iterations. It runs
+    /// Of the settings it uses bin width, bounds, smoothness, the errors of reflections and of their arrival and the number of iterations. It runs
     /// until the materials settle, and says where they do not ([`Warning::NotSettled`]).
     ///
     /// # Errors
@@ -85,7 +85,14 @@ impl MaterialFitter {
                         Ok(decay) => {
                             let exponent = exponents.values()[b];
                             let weights = histories[i].weights(pair.paths, materials, exponent, b, 1.0)?;
-                            if !band.add(i, &histories[i], weights, decay, latencies_s[i]) {
+                            if !band.add(
+                                i,
+                                &histories[i],
+                                weights,
+                                decay,
+                                latencies_s[i],
+                                config.arrival_error_s,
+                            ) {
                                 let needed_s = decay.edges_s[1] - latencies_s[i];
                                 let available_s = histories[i].bins() as f64 * config.bin_s;
                                 let reason = NoReading::TooShort { needed_s, available_s };

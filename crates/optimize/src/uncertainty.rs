@@ -75,6 +75,14 @@ impl Spread {
             }
             rows.push(row);
         }
+        if rows.is_empty() {
+            // Nothing is known beyond the priors.
+            for (i, &(b, k)) in free.iter().enumerate() {
+                spread.standard_error[b][k] = bands[b].prior.standard_deviation[k] * prior[(i, i)].sqrt();
+                spread.remaining[b][k] = 1.0;
+            }
+            return spread;
+        }
         let full = DMatrix::from_fn(rows.len(), n, |r, i| rows[r][i]);
         let moving = DMatrix::from_fn(rows.len(), n, |r, i| movable[r][i]);
         // Only bands in which something can move have a gain.

@@ -274,6 +274,32 @@ fn a_band_without_energy_is_said_to_have_none() {
 }
 
 #[test]
+fn a_single_path_has_no_slope() {
+    let mut paths = PathSet::new(1, 400.0);
+    let chain = paths.reflect(PathSet::DIRECT, 0, Reflection::Specular);
+    let up = [0.0, 0.0, 1.0];
+    paths.push(Contribution {
+        length_m: 10.0,
+        log_weight: 0.0,
+        chain,
+        tail: PathSet::DIRECT,
+        departure: up,
+        arrival: up,
+        batch: None,
+    });
+    for objective in [SlopeObjective::DecayCurve, SlopeObjective::Paper, SlopeObjective::Li2018] {
+        let config = FitConfig { objective, ..FitConfig::default() };
+        let fit = fit_with(config, &paths, &priors(1), &exact([0.8; 7]));
+        assert_eq!(fit.unreachable.len(), OCTAVES.len(), "{objective:?}");
+        for unreachable in &fit.unreachable {
+            assert_eq!(unreachable.reason, UnreachableReason::NoEnergy, "{objective:?}");
+        }
+        // The prior stands.
+        assert!(fit.materials[0].absorption().values().iter().all(|a| (a - 0.15).abs() < 1e-6));
+    }
+}
+
+#[test]
 fn too_few_rays_are_said_to_be_too_few() {
     let few = Ergodic { shares: vec![0.8, 0.2], rays: 32, ..six_materials() };
     let priors = [AbsorptionPrior::uniform(OCTAVES, 0.05, 0.0), AbsorptionPrior::uniform(OCTAVES, 0.5, 0.3)];

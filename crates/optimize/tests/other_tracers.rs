@@ -34,6 +34,7 @@ fn room(faces: [usize; 6], absorption: &[[f64; 2]]) -> Scene {
 /// neighbour that rings longer is what is heard late.
 const THREE: [[f64; 2]; 3] = [[0.12, 0.12], [0.3, 0.35], [0.25, 0.2]];
 
+#[derive(Clone)]
 struct Measured {
     decay: MeasuredDecay,
     paths: PathSet,
@@ -53,12 +54,25 @@ fn measure(
     gain: f32,
     delay: usize,
 ) -> Measured {
+    measure_crooked(truth, source, receiver, seed, gain, delay, 0.0)
+}
+
+#[allow(clippy::too_many_arguments)]
+fn measure_crooked(
+    truth: &Scene,
+    source: [f64; 3],
+    receiver: [f64; 3],
+    seed: u64,
+    gain: f32,
+    delay: usize,
+    arrival_error_s: f64,
+) -> Measured {
     let (source, receiver) = (Source::omni("s", source).unwrap(), Receiver::omni("r", receiver).unwrap());
     let air = Air::default();
     let mut samples = vec![0.0; delay];
     samples.extend(
         Hearing { octaves: octaves(), rate_hz: RATE_HZ, duration_s: DURATION_S }
-            .pressure(truth, &source, &receiver, seed)
+            .pressure_of_a_crooked_room(truth, &source, &receiver, seed, arrival_error_s)
             .iter()
             .map(|s| gain * s),
     );
@@ -74,13 +88,24 @@ fn fit(
     time_zero: TimeZero,
     prior: (f64, f64),
 ) -> ResponseFit {
+    fit_trusting(truth, measured, levels, time_zero, prior, 0.0)
+}
+
+fn fit_trusting(
+    truth: &Scene,
+    measured: &[Measured],
+    levels: Levels,
+    time_zero: TimeZero,
+    prior: (f64, f64),
+    arrival_error_s: f64,
+) -> ResponseFit {
     let guess = vec![Material::uniform(octaves(), prior.0, 0.0).unwrap(); truth.materials().len()];
     let priors = vec![AbsorptionPrior::uniform(octaves(), prior.0, prior.1); guess.len()];
     let pairs: Vec<MeasuredPair<'_>> =
         measured.iter().map(|m| MeasuredPair { measured: &m.decay, paths: &m.paths }).collect();
     let measurement = Measurement { time_zero, levels };
-    // These walls are mirrors, and source and receiver hear all directions alike.
-    let config = FitConfig { reflection_error: 0.05, ..FitConfig::default() };
+    // These walls are mirrors where they are said to be, and source and receiver hear all directions alike.
+    let config = FitConfig { reflection_error: 0.05, arrival_error_s, ..FitConfig::default() };
     MaterialFitter::new(config)
         .unwrap()
         .fit_responses(&pairs, measurement, &guess, &priors, &Air::default(), &())
@@ -144,6 +169,56 @@ fn three_materials_from_two_receivers_are_covered_by_their_intervals() {
             assert!(fit.fit.not_determined.iter().any(named), "{k} at {band_hz} Hz: {error}");
         }
     }
+}
+
+#[test]
+fn calibrated_levels_and_a_common_latency() {
+    let truth = room([0, 0, 0, 0, 1, 2], &THREE);
+    let measured: Vec<Measured> =
+        (0..2).map(|i| measure(&truth, SOURCES[0], RECEIVERS[i], i as u64, 1.0, 300)).collect();
+    let fit = fit(&truth, &measured, Levels::Absolute, TimeZero::Common, (0.2, 0.15));
+    for gain in &fit.gain_db {
+        assert!(gain.values().iter().all(|g| *g == Some(0.0)), "{gain:?}");
+    }
+    for (error, standard_error) in errors(&truth, &fit).iter().flatten() {
+        assert!(error.abs() < 3.0 * standard_error, "{:?}", errors(&truth, &fit));
+    }
+    // Twice the level, said to be calibrated, is read as less absorption: the walls that carry the decay cannot do it.
+    let loud: Vec<Measured> =
+        (0..2).map(|i| measure(&truth, SOURCES[0], RECEIVERS[i], i as u64, 2.0, 300)).collect();
+    let wrong = self::fit(&truth, &loud, Levels::Absolute, TimeZero::Common, (0.2, 0.15));
+    for (loud, true_level) in wrong.dispersion.values().iter().zip(fit.dispersion.values()) {
+        assert!(loud.unwrap() > 1.2 * true_level.unwrap(), "{loud:?} {true_level:?}");
+    }
+}
+
+#[test]
+fn arrivals_that_are_off_are_allowed_for() {
+    // A mesh that is off by some decimetres: arrivals by a millisecond.
+    const ERROR_S: f64 = 1e-3;
+    let truth = room([0, 0, 0, 0, 1, 2], &THREE);
+    let standardised = |allowed_s: f64| -> f64 {
+        let (mut square, mut count) = (0.0, 0.0);
+        for trial in 0..4u64 {
+            let pair = |i: usize| {
+                let seed = 2 * trial + i as u64;
+                measure_crooked(&truth, SOURCES[0], RECEIVERS[i], seed, 1.0, 0, ERROR_S)
+            };
+            let measured: Vec<Measured> = (0..2).map(pair).collect();
+            let prior = (0.2, 0.15);
+            let fit = fit_trusting(&truth, &measured, Levels::Common, TimeZero::Emission, prior, allowed_s);
+            for (error, standard_error) in errors(&truth, &fit).iter().flatten() {
+                square += (error / standard_error).powi(2);
+                count += 1.0;
+            }
+        }
+        square / count
+    };
+    let (allowed_for, trusted) = (standardised(ERROR_S), standardised(0.0));
+    println!("standardised errors squared: {allowed_for:.2} allowed for, {trusted:.2} trusted");
+    // 24 squares, partly correlated: their mean scatters by about 0.4.
+    assert!(allowed_for < 2.0, "{allowed_for}");
+    assert!(trusted > 1.5 * allowed_for, "{trusted} {allowed_for}");
 }
 
 #[test]

@@ -111,7 +111,13 @@ fn twelve_pairs_tell_what_they_hold_of_the_large_surfaces() {
         measured.iter().map(|(measured, paths)| MeasuredPair { measured, paths }).collect();
     let guess = vec![Material::uniform(octaves, PRIOR.0, 0.0).unwrap(); 6];
     let priors = vec![AbsorptionPrior::uniform(octaves, PRIOR.0, PRIOR.1); 6];
-    let config = FitConfig { reflection_error: REFLECTION_ERROR, bin_s: 2.5e-4, ..FitConfig::default() };
+    // Positions and walls are exact.
+    let config = FitConfig {
+        reflection_error: REFLECTION_ERROR,
+        arrival_error_s: 0.0,
+        bin_s: 2.5e-4,
+        ..FitConfig::default()
+    };
     let measurement = Measurement { time_zero: TimeZero::Emission, levels: Levels::Common };
     let fitter = MaterialFitter::new(config).unwrap();
     let found = fitter.fit_responses(&pairs, measurement, &guess, &priors, &air, &()).unwrap();

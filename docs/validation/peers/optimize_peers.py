@@ -13,6 +13,7 @@ compilation included. misuka knows no air: its energies are given the air's shar
 misuka (PolyForm Noncommercial) compiles through LLVM and needs a newer one than 15 (DRJIT_LIBLLVM_PATH names the library).
 """
 
+import itertools
 import json
 import os
 import subprocess
@@ -35,6 +36,8 @@ ONE = np.array([[0.15, 0.16, 0.18, 0.2, 0.22, 0.25, 0.27, 0.3]] * 3)
 # Alike in all octaves: in Sabine's responses an octave filter lets pass what rings longer beside it.
 THREE = np.array([[0.12] * 8, [0.35] * 8, [0.25] * 8])
 CASES = {"one": (ONE, 1), "three": (THREE, 2)}
+# Specular paths of up to so many reflections are pulses in the responses that Sabine gets.
+ORDER = 6
 ADAM_STEPS, ADAM_RATE, SAMPLES, SLICE_S = 60, 0.06, 1000, 0.02
 
 
@@ -55,7 +58,8 @@ def air_per_m():
 
 
 def particles(receiver, seed, count=100_000, radius=0.5):
-    """Times, hits of walls, floor and ceiling, and shares of energy of all crossings of a sphere, free of absorption and air."""
+    """Lengths, hits of walls, floor and ceiling, shares of energy, and number of scatterings of all crossings of a sphere, free of
+    absorption and air."""
     random = np.random.default_rng(seed)
     size, centre = np.array(SIZE_M), np.array(receiver)
 
@@ -64,7 +68,7 @@ def particles(receiver, seed, count=100_000, radius=0.5):
         return v / np.linalg.norm(v, axis=1, keepdims=True)
 
     at, way = np.tile(SOURCE_M, (count, 1)).astype(float), isotropic(count)
-    travelled, hits = np.zeros(count), np.zeros((count, 3))
+    travelled, hits, scatterings = np.zeros(count), np.zeros((count, 3)), np.zeros(count, int)
     found = []
     alive = np.arange(count)
     while len(alive):
@@ -78,7 +82,8 @@ def particles(receiver, seed, count=100_000, radius=0.5):
         half = np.sqrt(np.clip(radius**2 - miss2, 0, None))
         chord = np.clip(np.minimum(nearest + half, length) - np.maximum(nearest - half, 0), 0, None)
         inside = np.flatnonzero(chord > 0)
-        found.append((travelled[alive][inside] + np.clip(nearest[inside], 0, None), hits[alive][inside], chord[inside]))
+        lengths = travelled[alive][inside] + np.clip(nearest[inside], 0, None)
+        found.append((lengths, hits[alive][inside], chord[inside], scatterings[alive][inside]))
         travelled[alive] += length
         high = v[np.arange(len(p)), axis] > 0
         surface = np.where(axis < 2, 0, np.where(high, 2, 1))
@@ -91,19 +96,48 @@ def particles(receiver, seed, count=100_000, radius=0.5):
         lambert /= np.linalg.norm(lambert, axis=1, keepdims=True)
         scattered = random.random(len(p)) < SCATTERING
         at[alive], way[alive] = p, np.where(scattered[:, None], lambert, mirrored)
+        scatterings[alive] += scattered
         alive = alive[travelled[alive] < DURATION_S * SPEED_M_S]
-    length, hits, chord = (np.concatenate(x) for x in zip(*found))
-    return length, hits, chord / (4 / 3 * np.pi * radius**3) / count
+    length, hits, chord, scatterings = (np.concatenate(x) for x in zip(*found))
+    return length, hits, chord / (4 / 3 * np.pi * radius**3) / count, scatterings
+
+
+def images(receiver):
+    """The same for the image sources of up to ORDER reflections, found by mirroring."""
+    per_axis = []
+    for size, s, r in zip(SIZE_M, SOURCE_M, receiver):
+        # Mirrored at 0 and at `size` in turn, beginning with either: distance along the axis, hits of the low and the high wall.
+        axis = [(s - r, 0, 0)]
+        for first in (0, 1):
+            place, hits = s, [0, 0]
+            for n in range(ORDER):
+                high = (first + n) % 2
+                place, hits[high] = 2 * size * high - place, hits[high] + 1
+                axis.append((place - r, *hits))
+        per_axis.append(axis)
+    found = []
+    for (x, *hx), (y, *hy), (z, low, high) in itertools.product(*per_axis):
+        walls = sum(hx) + sum(hy)
+        if walls + low + high <= ORDER:
+            found.append((np.sqrt(x * x + y * y + z * z), (walls, low, high)))
+    length, hits = np.array([f[0] for f in found]), np.array([f[1] for f in found])
+    share = (1 - SCATTERING) ** hits.sum(axis=1) / (4 * np.pi * length**2)
+    return length, hits, share, np.zeros(len(length), int)
+
+
+def path_energies(paths, absorption):
+    """Energy of each path in each octave."""
+    length, hits, share, _ = paths
+    log = hits @ np.log1p(-absorption) - np.outer(length, air_per_m())
+    return share[:, None] * np.exp(log)
 
 
 def energies(paths, absorption):
     """Energy per bin and octave."""
-    length, hits, share = paths
     bins = int(DURATION_S / BIN_S)
-    place = (length / SPEED_M_S / BIN_S).astype(int)
+    place = (paths[0] / SPEED_M_S / BIN_S).astype(int)
     use = place < bins
-    log = hits @ np.log1p(-absorption) - np.outer(length, air_per_m())
-    weights = share[:, None] * np.exp(log)
+    weights = path_energies(paths, absorption)
     return np.stack([np.bincount(place[use], weights[use, b], bins) for b in range(len(OCTAVES_HZ))])
 
 
@@ -125,23 +159,31 @@ def direct_s(receiver):
     return float(np.linalg.norm(np.array(receiver) - SOURCE_M)) / SPEED_M_S
 
 
-def responses(folder, truth):
-    """Noise under the energies with an exact direct sound, in every octave: what a diffuse field makes of them."""
+def responses(folder, absorption):
+    """Pressure: a pulse of random sign for each specular path of up to ORDER reflections, and noise under the energies of all others,
+    which is what a diffuse field makes of them. (Under single reflections it would give them the chance of a diffuse field.)"""
     rate = 48_000
-    for i, (receiver, energy) in enumerate(zip(RECEIVERS_M, truth)):
+    for i, receiver in enumerate(RECEIVERS_M):
         samples = int(DURATION_S * rate)
-        noise = np.fft.rfft(np.random.default_rng(50 + i).normal(size=samples))
+        random = np.random.default_rng(50 + i)
+        noise = np.fft.rfft(random.normal(size=samples))
         frequency = np.fft.rfftfreq(samples, 1 / rate)
-        pressure = np.zeros(samples)
-        start = int((direct_s(receiver) + 0.0025) / BIN_S)
+        length, hits, share, scatterings = particles(receiver, i)
+        others = (scatterings > 0) | (hits.sum(axis=1) > ORDER)
+        energy = energies((length[others], hits[others], share[others], scatterings[others]), absorption)
+        exact = images(receiver)
+        amplitudes = np.sqrt(path_energies(exact, absorption)) * np.where(exact[1].sum(axis=1) > 0, random.choice([-1, 1], len(exact[0])), 1)[:, None]
+        pressure, pulses = np.zeros(samples), np.zeros(len(frequency), complex)
         for b, hz in enumerate(OCTAVES_HZ):
             low, high = (0, 88.4) if b == 0 else (hz / 2**0.5, hz * 2**0.5 if b < 7 else rate)
-            octave = np.fft.irfft(np.where((frequency >= low) & (frequency < high), noise, 0), samples)
+            band = (frequency >= low) & (frequency < high)
+            octave = np.fft.irfft(np.where(band, noise, 0), samples)
             # A unit impulse has this energy in the band.
             octave *= np.sqrt((min(high, rate / 2) - low) / (rate / 2) / octave.var() / (rate * BIN_S))
-            quiet = np.where(np.arange(energy.shape[1]) < start, 0.0, energy[b])
-            pressure += octave * np.sqrt(np.repeat(quiet, int(rate * BIN_S))[:samples])
-        pressure[round(direct_s(receiver) * rate)] += np.sqrt(1 / (4 * np.pi)) / (direct_s(receiver) * SPEED_M_S)
+            pressure += octave * np.sqrt(np.repeat(energy[b], int(rate * BIN_S))[:samples])
+            for length_m, amplitude in zip(exact[0], amplitudes[:, b]):
+                pulses[band] += amplitude * np.exp(-2j * np.pi * frequency[band] * length_m / SPEED_M_S)
+        pressure += np.fft.irfft(pulses, samples)
         with wave.open(str(Path(folder, f"r{i}.wav")), "wb") as file:
             file.setparams((1, 3, rate, samples, "NONE", ""))
             whole = np.clip(pressure / np.abs(pressure).max() * 0.9, -1, 1) * (2**23 - 1)
@@ -168,7 +210,7 @@ def sabine(case, folder, truth):
     for i, receiver in enumerate(RECEIVERS_M):
         toml += f'[[receivers]]\nid = "r{i}"\nposition_m = {receiver}\n'
     if case == "three":
-        responses(folder, truth)
+        responses(folder, THREE)
         toml += "".join(f'[[responses]]\nsource = "s"\nreceiver = "r{i}"\nfile = "r{i}.wav"\n' for i in range(2))
     Path(folder, "room.toml").write_text(toml)
     command = [str(ROOT / "target/release/examples/fit_materials"), "--room", folder, "--out", str(Path(folder, "out")), "--rays", "20000"]

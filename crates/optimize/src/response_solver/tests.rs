@@ -178,7 +178,7 @@ fn by_solver(bands: usize, smoothness: f64, path_error: f64, prior: (f64, f64)) 
                 let mut plain = paths(r).1;
                 plain.sort_by_key(|p| p.window);
                 let weights = plain.iter().map(|p| p.energy as f32).collect();
-                assert!(band.add(r, history, weights, &decay(r, b), 0.0));
+                assert!(band.add(r, history, weights, &decay(r, b), 0.0, 0.0));
             }
             band
         })

@@ -27,14 +27,32 @@ impl Hearing {
     /// a wall would be absorbed by it (the Fresnel zone of a path of 34 m at 1 kHz is 3.4 m wide), which no model of energies
     /// knows.
     pub fn pressure(&self, truth: &Scene, source: &Source, receiver: &Receiver, seed: u64) -> Vec<f32> {
+        self.pressure_of_a_crooked_room(truth, source, receiver, seed, 0.0)
+    }
+
+    /// The same where every image but the source itself arrives too early or too late by normally distributed errors, in seconds.
+    pub fn pressure_of_a_crooked_room(
+        &self,
+        truth: &Scene,
+        source: &Source,
+        receiver: &Receiver,
+        seed: u64,
+        arrival_error_s: f64,
+    ) -> Vec<f32> {
         const HALF: i64 = 24;
         let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
+        let mut crooked = rand_pcg::Pcg64::seed_from_u64(seed + 1_000_000);
+        let mut normal = move || -> f64 {
+            let (u, v): (f64, f64) = (crooked.random(), crooked.random());
+            (-2.0 * (1.0 - u).ln()).sqrt() * (2.0 * PI * v).cos()
+        };
         let rate = f64::from(self.rate_hz);
         let mut columns = vec![vec![0f32; (self.duration_s * rate) as usize]; self.octaves.len()];
         let walls = Walls::of(truth);
         for image in self.images(truth, source, receiver) {
             let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
-            let at = image.length_m / Air::default().speed_of_sound_m_s() * rate;
+            let off_s = if image.hits.iter().sum::<u32>() > 0 { arrival_error_s * normal() } else { 0.0 };
+            let at = (image.length_m / Air::default().speed_of_sound_m_s() + off_s) * rate;
             let first = at.floor() as i64 - HALF + 1;
             let pulse: Vec<f64> = (first..first + 2 * HALF)
                 .map(|i| {
