@@ -122,6 +122,7 @@ mod tracing;
 mod triangle_pack;
 mod vector;
 mod walk;
+pub mod wave;
 mod wide_node;
 
 pub use ambisonic_renderer::AmbisonicRenderer;
