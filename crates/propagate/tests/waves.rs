@@ -59,11 +59,23 @@ fn level(samples: &[f32], rate: f64, hz: f64) -> f64 {
     re.hypot(im)
 }
 
+/// The closed form behind the low cut that the solver states: a Butterworth high pass at a quarter of c / (2 longest side).
+fn expected(modes: &BoxModes, size_m: [f64; 3], [from, to]: [[f64; 3]; 2], hz: f64) -> (f64, f64) {
+    let longest_m = size_m.into_iter().fold(0.0, f64::max);
+    let x = hz / (speed_m_s() / (8.0 * longest_m));
+    // -x^2 / (1 - x^2 + j sqrt 2 x)
+    let (a, b) = (1.0 - x * x, std::f64::consts::SQRT_2 * x);
+    let scale = -x * x / (a * a + b * b);
+    let (re, im) = modes.pressure(from, to, hz);
+    (scale * (a * re + b * im), scale * (a * im - b * re))
+}
+
 /// Level differences from the closed form in dB, at every half hertz between two frequencies.
 fn differences_db(
     modes: &BoxModes,
+    size_m: [f64; 3],
     response: &ImpulseResponse,
-    [from, to]: [[f64; 3]; 2],
+    ends: [[f64; 3]; 2],
     [low_hz, high_hz]: [f64; 2],
 ) -> Vec<f64> {
     let rate = f64::from(response.sample_rate_hz());
@@ -71,7 +83,7 @@ fn differences_db(
     (0..count)
         .map(|i| {
             let hz = low_hz + 0.5 * i as f64;
-            let (re, im) = modes.pressure(from, to, hz);
+            let (re, im) = expected(modes, size_m, ends, hz);
             20.0 * (level(response.samples(), rate, hz) / re.hypot(im)).log10()
         })
         .collect()
@@ -133,7 +145,7 @@ fn modes_decay_as_their_walls_have_it() {
     let response = respond(&config, &scene, [0.2, 0.25, 0.3], &[end]).swap_remove(0);
     let window = rate as usize;
     let mut worst: f64 = 0.0;
-    for n in [[1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1], [2, 1, 0]] {
+    for n in [[1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1], [2, 0, 0]] {
         let (hz, decay_per_s) = modes.mode(n);
         let at = |begin: usize| {
             let windowed: Vec<f32> = (0..window)
@@ -157,14 +169,14 @@ fn modes_decay_as_their_walls_have_it() {
 #[test]
 fn spectra_at_new_positions_are_those_of_the_modes() {
     let (scene, modes) = box_of(SIZE_M, ABSORPTIONS);
-    let config = WaveConfig { duration_s: 1.5, sample_rate_hz: 2000, ..Default::default() };
+    let config = WaveConfig { duration_s: 1.0, sample_rate_hz: 1000, ..Default::default() };
     let from = [1.17, 0.93, 1.31];
     let places = [[3.9, 3.3, 1.2], [2.2, 3.1, 1.7], [4.4, 1.1, 0.6], [0.7, 2.9, 2.1]];
     let responses = respond(&config, &scene, from, &places);
     for (to, response) in places.into_iter().zip(&responses) {
-        let db = rms(&differences_db(&modes, response, [from, to], [20.0, 300.0]));
+        let db = rms(&differences_db(&modes, SIZE_M, response, [from, to], [20.0, 300.0]));
         eprintln!("at {to:?}: {db:.2} dB rms");
-        assert!(db < 1.5, "at {to:?}: {db} dB rms");
+        assert!(db < 3.0, "at {to:?}: {db} dB rms");
     }
 }
 
@@ -173,25 +185,30 @@ fn finer_grids_converge_in_second_order() {
     let size_m = [2.31, 1.93, 1.57];
     let (scene, modes) = box_of(size_m, [0.1, 0.05, 0.2, 0.1, 0.08, 0.12]);
     let (from, to) = ([0.45, 0.61, 0.37], [1.83, 1.22, 1.19]);
-    let errors: Vec<f64> = [8.0, 16.0, 32.0]
+    let errors: Vec<f64> = [8.0, 14.0, 24.5]
         .into_iter()
         .map(|points_per_wavelength| {
-            let config = WaveConfig { points_per_wavelength, sample_rate_hz: 1000, ..Default::default() };
+            let config = WaveConfig {
+                points_per_wavelength,
+                limit_hz: 250.0,
+                sample_rate_hz: 1000,
+                ..Default::default()
+            };
             let response = respond(&config, &scene, from, &[to]).swap_remove(0);
             let (mut off, mut all) = (0.0, 0.0);
-            for i in 0..200 {
-                let hz = 60.0 + f64::from(i);
+            for i in 0..210 {
+                let hz = 40.0 + f64::from(i);
                 let ((re, im), (re_true, im_true)) =
-                    (line(response.samples(), 1000.0, hz), modes.pressure(from, to, hz));
+                    (line(response.samples(), 1000.0, hz), expected(&modes, size_m, [from, to], hz));
                 off += (re - re_true).powi(2) + (im - im_true).powi(2);
                 all += re_true * re_true + im_true * im_true;
             }
             f64::sqrt(off / all)
         })
         .collect();
-    eprintln!("relative errors of the complex pressure, 8, 16, 32 voxels per wave length: {errors:.4?}");
+    eprintln!("relative errors of the complex pressure, 8, 14, 24.5 voxels per wave length: {errors:.4?}");
     for pair in errors.windows(2) {
-        assert!(pair[0] / pair[1] > 3.0, "{errors:?}");
+        assert!(pair[0] / pair[1] > 2.2, "{errors:?}");
     }
     assert!(errors[2] < 0.05, "{errors:?}");
 }
@@ -210,8 +227,9 @@ fn each_octave_has_its_absorption() {
     for (band, value) in values.into_iter().enumerate() {
         let (_, modes) = box_of(size_m, [value; 6]);
         let centre_hz = bands.exact_hz(band);
-        let db = rms(&differences_db(&modes, &response, [from, to], [0.97 * centre_hz, 1.03 * centre_hz]));
-        assert!(db < 0.5, "{centre_hz:.0} Hz: {db} dB rms");
+        let db =
+            rms(&differences_db(&modes, size_m, &response, [from, to], [0.97 * centre_hz, 1.03 * centre_hz]));
+        assert!(db < 1.0, "{centre_hz:.0} Hz: {db} dB rms");
     }
 }
 
@@ -227,10 +245,15 @@ fn walls_between_voxel_borders_are_where_the_mesh_has_them() {
     vertices.extend([[3.613, 2.977, 2.431], [3.62, 2.97, 2.43], [3.62, 2.98, 2.43]]);
     triangles.push(sabine_acoustics::Triangle { vertices: [first, first + 1, first + 2], material: 0 });
     let scene = Scene::new(vertices, triangles, plain.materials().to_vec()).unwrap();
-    let config = WaveConfig { limit_hz: 250.0, sample_rate_hz: 1000, ..Default::default() };
+    let config = WaveConfig {
+        limit_hz: 250.0,
+        points_per_wavelength: 24.0,
+        sample_rate_hz: 1000,
+        ..Default::default()
+    };
     let (from, to) = ([0.5, 0.6, 0.4], [2.4, 1.9, 1.7]);
     let response = respond(&config, &scene, from, &[to]).swap_remove(0);
-    let db = rms(&differences_db(&modes, &response, [from, to], [40.0, 240.0]));
+    let db = rms(&differences_db(&modes, size_m, &response, [from, to], [40.0, 240.0]));
     eprintln!("walls within voxels: {db:.2} dB rms");
     assert!(db < 1.0, "{db}");
 }
@@ -240,13 +263,13 @@ fn the_direct_sound_is_one_at_one_metre() {
     // Walls 6 m away: the direct sound has passed before the first echo comes.
     let (scene, _) = box_of([13.0, 12.6, 12.2], [0.5; 6]);
     let rate = 8000u32;
-    let config = WaveConfig { duration_s: 0.16, sample_rate_hz: rate, limit_hz: 200.0, ..Default::default() };
+    let config = WaveConfig { duration_s: 0.31, sample_rate_hz: rate, limit_hz: 120.0, ..Default::default() };
     let from = [6.43, 6.28, 6.11];
     let to = [[7.43, 6.28, 6.11], [6.43 + 1.2, 6.28 + 1.2, 6.11 + 1.0]];
     for (to, response) in to.into_iter().zip(respond(&config, &scene, from, &to)) {
         let distance_m = (0..3).map(|a| (to[a] - from[a]).powi(2)).sum::<f64>().sqrt();
-        // A wave train of 120 Hz under a Gauss envelope of 4 ms: what the response makes of it arrives before the echoes.
-        let probe = |t: f64| (-(t / 4e-3).powi(2)).exp() * (TAU * 120.0 * t).cos();
+        // A wave train of 80 Hz under a Gauss envelope of 8 ms: what the response makes of it arrives before the echoes.
+        let probe = |t: f64| (-(t / 8e-3).powi(2)).exp() * (TAU * 80.0 * t).cos();
         let direct_s = distance_m / speed_m_s();
         let filtered: f64 = response
             .samples()
@@ -256,7 +279,7 @@ fn the_direct_sound_is_one_at_one_metre() {
             .sum();
         let off_db = 20.0 * (filtered * distance_m).log10();
         eprintln!("{distance_m:.2} m: {off_db:.3} dB");
-        assert!(off_db.abs() < 0.3, "{distance_m} m: {off_db} dB");
+        assert!(off_db.abs() < 0.15, "{distance_m} m: {off_db} dB");
     }
 }
 

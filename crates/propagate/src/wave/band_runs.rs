@@ -27,8 +27,6 @@ pub(crate) struct RunPlan<'a> {
     pub pulse: SourcePulse,
     pub steps: usize,
     pub speed_m_s: f64,
-    /// Share of the pressure that the air takes, per second.
-    pub air_per_s: f64,
     /// Steps of earlier runs, and of all.
     pub reported: [u64; 2],
 }
@@ -49,10 +47,8 @@ impl BandRun {
             if step.is_multiple_of(REPORTED_STEPS) {
                 report(observer, "waves", plan.reported[0] + step as u64, plan.reported[1])?;
             }
-            // Air takes the same share of all waves of an octave: it may do so afterwards.
-            let left = (-plan.air_per_s * step as f64 * step_s).exp();
             for (record, receiver) in pressure.iter_mut().zip(plan.receivers) {
-                record.push(left * receiver.read(&waves.now));
+                record.push(receiver.read(&waves.now));
             }
             waves.step();
             let emitted = plan.pulse.at(step as f64 * step_s);
@@ -65,13 +61,26 @@ impl BandRun {
         Ok(Self { step_s, pressure })
     }
 
+    /// The same run through air that takes a share of the pressure per second, its last `fading` steps fading away. Air takes
+    /// as much of all waves of an octave: it may do so afterwards.
+    pub fn through_air(&self, air_per_s: f64, fading: usize) -> Self {
+        let steps = self.pressure.first().map_or(0, Vec::len);
+        let left = |step: usize| {
+            let turn = ((steps - step) as f64 - 0.5) / fading as f64;
+            let fade = if turn < 1.0 { 0.5 - 0.5 * (PI * turn).cos() } else { 1.0 };
+            fade * (-air_per_s * step as f64 * self.step_s).exp()
+        };
+        let record = |record: &Vec<f64>| record.iter().enumerate().map(|(i, p)| left(i) * p).collect();
+        Self { step_s: self.step_s, pressure: self.pressure.iter().map(record).collect() }
+    }
+
     /// Adds the transfer functions from source to receivers, times a gain, to the lines of spectra.
     pub fn add_to(
         &self,
         lines: &mut [Vec<Complex<f64>>],
         spectrum: &Spectrum,
         pulse: SourcePulse,
-        gain: impl Fn(f64) -> f64 + Sync,
+        gain: impl Fn(f64) -> Complex<f64> + Sync,
     ) {
         let emitted: Vec<f64> = (0..)
             .map(|step| f64::from(step) * self.step_s)
@@ -82,7 +91,7 @@ impl BandRun {
             lines.par_iter_mut().enumerate().for_each(|(i, line)| {
                 let hz = spectrum.frequency_hz(i);
                 let gain = gain(hz);
-                if gain != 0.0 {
+                if gain.norm_sqr() > 0.0 {
                     let turn = TAU * hz * self.step_s;
                     *line += gain * at_line(pressure, turn) / at_line(&emitted, turn);
                 }

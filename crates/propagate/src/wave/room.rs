@@ -13,6 +13,8 @@ use std::collections::HashMap;
 const FACING: f64 = 0.95;
 /// Narrowest a voxel between two walls may get, in voxels.
 const NARROWEST: f64 = 1e-3;
+/// Share of the voxels around a point that must be in the room and in its sight.
+const LEAST_SHARE: f64 = 1e-3;
 /// The voxel belongs to the room.
 const INSIDE: u8 = 8;
 
@@ -127,28 +129,56 @@ impl WaveRoom {
         self.axes.bytes()
     }
 
-    /// The voxels around a point that belong to the room and that it sees, with their shares in a linear interpolation.
+    /// Voxels around a point with their shares in an interpolation: of third degree along each axis on which four voxels
+    /// belong to the room and see the point, of first degree along the others. Where not even two are there, those that are
+    /// share the whole, for the pressure hardly changes across a wall.
     pub(crate) fn around(&self, point_m: Vec3) -> Vec<(usize, f64)> {
-        self.corners(point_m)
-            .filter(|&(voxel, share)| share > 0.0 && self.marks[voxel] & INSIDE != 0)
-            .filter(|&(voxel, _)| visible(&self.mesh, point_m, self.axes.centre_m(voxel)))
-            .collect()
+        let in_sight = |&(voxel, _): &(usize, f64)| {
+            self.is_inside(voxel) && visible(&self.mesh, point_m, self.axes.centre_m(voxel))
+        };
+        // Most axes of third degree first.
+        for cubic in [7usize, 3, 5, 6, 1, 2, 4] {
+            let corners = self.stencil(point_m, std::array::from_fn(|a| cubic >> a & 1 == 1));
+            if corners.iter().all(in_sight) {
+                return corners;
+            }
+        }
+        let mut corners = self.stencil(point_m, [false; 3]);
+        corners.retain(in_sight);
+        let sum: f64 = corners.iter().map(|(_, share)| share).sum();
+        corners.iter_mut().for_each(|(_, share)| *share /= sum);
+        corners.retain(|_| sum > LEAST_SHARE);
+        corners
     }
 
-    fn corners(&self, point_m: Vec3) -> impl Iterator<Item = (usize, f64)> {
-        let axes = self.axes;
-        let at: Vec3 = std::array::from_fn(|a| {
-            axes.coordinate(a, point_m[a]).clamp(0.0, axes.count[a] as f64 - 1.0 - 1e-9)
+    /// Voxels about a point, with the products of Lagrange's polynomials along the axes.
+    fn stencil(&self, point_m: Vec3, cubic: [bool; 3]) -> Vec<(usize, f64)> {
+        let along: [Vec<(usize, f64)>; 3] = std::array::from_fn(|a| {
+            let last = self.axes.count[a] - 1;
+            let at = self.axes.coordinate(a, point_m[a]).clamp(0.0, last as f64 - 1e-9);
+            let (first, t) = (at as usize, at.fract());
+            if !cubic[a] || first == 0 || first + 2 > last {
+                return vec![(first, 1.0 - t), (first + 1, t)];
+            }
+            let weights = [
+                -t * (t - 1.0) * (t - 2.0) / 6.0,
+                (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
+                -(t + 1.0) * t * (t - 2.0) / 2.0,
+                (t + 1.0) * t * (t - 1.0) / 6.0,
+            ];
+            weights.into_iter().enumerate().map(|(i, weight)| (first + i - 1, weight)).collect()
         });
-        (0..8usize).map(move |corner| {
-            let upper: [usize; 3] = std::array::from_fn(|a| corner >> a & 1);
-            let place = std::array::from_fn(|a| at[a] as usize + upper[a]);
-            let part = |a: usize| {
-                let above = at[a].fract();
-                if upper[a] == 1 { above } else { 1.0 - above }
-            };
-            (axes.index(place), part(0) * part(1) * part(2))
-        })
+        let mut shares = Vec::new();
+        for &(k, z) in &along[2] {
+            for &(j, y) in &along[1] {
+                for &(i, x) in &along[0] {
+                    if x * y * z != 0.0 {
+                        shares.push((self.axes.index([i, j, k]), x * y * z));
+                    }
+                }
+            }
+        }
+        shares
     }
 
     /// Marks what is joined to the source.
@@ -156,7 +186,8 @@ impl WaveRoom {
         let seen = |&(voxel, _): &(usize, f64)| {
             visible(&self.mesh, source.position_m, self.axes.centre_m(voxel)) && !self.axes.is_outer(voxel)
         };
-        let first = self.corners(source.position_m).filter(seen).max_by(|a, b| a.1.total_cmp(&b.1));
+        let nearest = self.stencil(source.position_m, [false; 3]);
+        let first = nearest.into_iter().filter(seen).max_by(|a, b| a.1.total_cmp(&b.1));
         let Some((first, _)) = first else {
             return Err(Error::BetweenVoxels {
                 what: "source",
