@@ -176,6 +176,14 @@ pub enum Error {
         /// About the lowest frequency at which the room resounds, in Hz.
         lowest_hz: f64,
     },
+    /// Waves and paths of different sample rates.
+    #[error("the waves are sampled at {waves_hz} Hz, the paths at {paths_hz} Hz")]
+    JoinedRates {
+        /// Sample rate of the waves in Hz.
+        waves_hz: u32,
+        /// Sample rate of the response from paths in Hz.
+        paths_hz: u32,
+    },
     /// A SOFA file that cannot be read.
     #[cfg(feature = "sofa")]
     #[error("{}: {source}", path.display())]

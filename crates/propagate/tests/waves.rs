@@ -4,9 +4,11 @@
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
 use sabine_acoustics::{
-    Air, Error as AcousticsError, ImpulseResponse, Material, OctaveBands, PerBand, Receiver, Scene, Source,
+    Air, Error as AcousticsError, ImpulseResponse, Material, OctaveBands, PerBand, Propagator, Receiver,
+    Scene, Source,
 };
-use sabine_propagate::wave::{WaveConfig, WaveSolver};
+use sabine_propagate::wave::{Crossover, WaveConfig, WaveSolver};
+use sabine_propagate::{Error, PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use sabine_testkit::BoxModes;
 use std::f64::consts::TAU;
 
@@ -43,6 +45,9 @@ fn respond(config: &WaveConfig, scene: &Scene, from: [f64; 3], to: &[[f64; 3]]) 
         .unwrap()
         .respond(scene, &source(from), &receivers, &Air::default(), &())
         .unwrap()
+        .iter()
+        .map(|waves| waves.response().unwrap())
+        .collect()
 }
 
 /// Fourier transform of some samples, as an integral over seconds, times the sample rate.
@@ -258,29 +263,88 @@ fn walls_between_voxel_borders_are_where_the_mesh_has_them() {
     assert!(db < 1.0, "{db}");
 }
 
+/// A box with walls 6 m and more from its middle, where a source stands, and two receivers: 1 m away, and farther askew.
+const HALL_M: [f64; 3] = [13.0, 12.6, 12.2];
+const MIDDLE_M: [f64; 3] = [6.43, 6.28, 6.11];
+const NEAR_M: [[f64; 3]; 2] = [[7.43, 6.28, 6.11], [7.63, 7.48, 7.11]];
+
+fn distance_m(to: [f64; 3]) -> f64 {
+    (0..3).map(|a| (to[a] - MIDDLE_M[a]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Level of the direct sound in dB re 1 / distance, by a wave train under a Gauss envelope that is over before echoes come.
+fn direct_db(samples: &[f64], lead: usize, rate: f64, distance_m: f64, [hz, width_s]: [f64; 2]) -> f64 {
+    let probe = |t: f64| (-(t / width_s).powi(2)).exp() * (TAU * hz * t).cos();
+    let at = |i: usize| (i as f64 - lead as f64) / rate - distance_m / speed_m_s();
+    let found: f64 = samples.iter().enumerate().map(|(i, s)| s * probe(at(i))).sum();
+    20.0 * (found * distance_m).log10()
+}
+
 #[test]
 fn the_direct_sound_is_one_at_one_metre() {
-    // Walls 6 m away: the direct sound has passed before the first echo comes.
-    let (scene, _) = box_of([13.0, 12.6, 12.2], [0.5; 6]);
+    let (scene, _) = box_of(HALL_M, [0.5; 6]);
     let rate = 8000u32;
     let config = WaveConfig { duration_s: 0.31, sample_rate_hz: rate, limit_hz: 120.0, ..Default::default() };
-    let from = [6.43, 6.28, 6.11];
-    let to = [[7.43, 6.28, 6.11], [6.43 + 1.2, 6.28 + 1.2, 6.11 + 1.0]];
-    for (to, response) in to.into_iter().zip(respond(&config, &scene, from, &to)) {
-        let distance_m = (0..3).map(|a| (to[a] - from[a]).powi(2)).sum::<f64>().sqrt();
-        // A wave train of 80 Hz under a Gauss envelope of 8 ms: what the response makes of it arrives before the echoes.
-        let probe = |t: f64| (-(t / 8e-3).powi(2)).exp() * (TAU * 80.0 * t).cos();
-        let direct_s = distance_m / speed_m_s();
-        let filtered: f64 = response
-            .samples()
-            .iter()
-            .enumerate()
-            .map(|(i, &s)| f64::from(s) * probe(i as f64 / f64::from(rate) - direct_s))
-            .sum();
-        let off_db = 20.0 * (filtered * distance_m).log10();
-        eprintln!("{distance_m:.2} m: {off_db:.3} dB");
-        assert!(off_db.abs() < 0.15, "{distance_m} m: {off_db} dB");
+    let receivers = NEAR_M.map(receiver);
+    let solver = WaveSolver::new(config).unwrap();
+    let found = solver.respond(&scene, &source(MIDDLE_M), &receivers, &Air::default(), &()).unwrap();
+    for (to, waves) in NEAR_M.into_iter().zip(&found) {
+        let distance_m = distance_m(to);
+        let db = direct_db(waves.samples(), waves.lead(), f64::from(rate), distance_m, [80.0, 8e-3]);
+        eprintln!("{distance_m:.2} m: {db:.3} dB");
+        assert!(db.abs() < 0.15, "{distance_m} m: {db} dB");
     }
+}
+
+#[test]
+fn waves_and_paths_join_at_the_same_level() {
+    let absorption = 0.5;
+    let (scene, _) = box_of(HALL_M, [absorption; 6]);
+    let crossover = Crossover::new(85.0).unwrap();
+    let rate = 8000u32;
+    let duration_s = 0.4;
+    let config =
+        WaveConfig { limit_hz: crossover.limit_hz(), duration_s, sample_rate_hz: rate, ..Default::default() };
+    let air = Air::default();
+    let to = receiver(NEAR_M[1]);
+    let from = source(MIDDLE_M);
+    let solver = WaveSolver::new(config).unwrap();
+    let waves = solver.respond(&scene, &from, std::slice::from_ref(&to), &air, &()).unwrap().swap_remove(0);
+    let tracer = PathTracer::new(TracerConfig { rays: 2000, duration_s, ..Default::default() }).unwrap();
+    let paths = tracer.trace(&scene, &from, &to, &air, &()).unwrap();
+    let config = RenderConfig { sample_rate_hz: rate, ..Default::default() };
+    let high =
+        PressureRenderer::new(config).unwrap().render(&paths, &vec![wall(absorption); 6], &air).unwrap();
+    let joined = crossover.join(&waves, &high).unwrap();
+    eprintln!("{:.2} dB apart, {:.2} dB at the crossover", joined.level_difference_db, joined.gain_db);
+    // The direct sound below, at and above the crossover.
+    let samples: Vec<f64> = joined.response.samples().iter().map(|&s| f64::from(s)).collect();
+    for train in [[60.0, 10e-3], [85.0, 10e-3], [120.0, 8e-3], [400.0, 4e-3]] {
+        let db = direct_db(&samples, 0, f64::from(rate), distance_m(NEAR_M[1]), train);
+        eprintln!("{} Hz: {db:.3} dB", train[0]);
+        assert!(db.abs() < 0.2, "{} Hz: {db} dB", train[0]);
+    }
+    // Two ways to the same energy: half of it absorbed, and half of it by Paris' formula.
+    assert!(joined.level_difference_db.abs() < 1.0 && joined.gain_db.abs() < 1.0, "{joined:?}");
+    let lower = Crossover::new(200.0).unwrap();
+    assert!(matches!(lower.join(&waves, &high), Err(Error::OutOfRange { .. })));
+}
+
+#[test]
+fn a_response_joined_to_itself_stays_itself() {
+    let (scene, _) = box_of([2.9, 2.4, 2.1], ABSORPTIONS);
+    let config = WaveConfig { duration_s: 0.3, sample_rate_hz: 1000, limit_hz: 250.0, ..Default::default() };
+    let solver = WaveSolver::new(config).unwrap();
+    let (from, to) = (source([0.5, 0.6, 0.4]), receiver([2.4, 2.1, 1.9]));
+    let waves = solver.respond(&scene, &from, &[to], &Air::default(), &()).unwrap().swap_remove(0);
+    let whole = waves.response().unwrap();
+    let joined = Crossover::new(100.0).unwrap().join(&waves, &whole).unwrap();
+    // All but the ringing before time zero, which the one has and the other has not.
+    let off: f64 =
+        whole.samples().iter().zip(joined.response.samples()).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+    let all: f64 = whole.samples().iter().map(|&a| f64::from(a).powi(2)).sum();
+    assert!((off / all).sqrt() < 0.01, "{}", (off / all).sqrt());
+    assert!(joined.gain_db.abs() < 0.05 && joined.level_difference_db.abs() < 0.1, "{joined:?}");
 }
 
 #[test]
@@ -296,7 +360,6 @@ fn threads_change_nothing() {
 
 #[test]
 fn rooms_that_voxels_cannot_hold_are_refused() {
-    use sabine_propagate::Error;
     let (scene, _) = box_of(SIZE_M, [0.1; 6]);
     let (from, to) = (source([1.0, 1.0, 1.0]), receiver([3.0, 3.0, 2.0]));
     let with = |config: WaveConfig, scene: &Scene| {

@@ -4,6 +4,7 @@ use super::admittance::admittance_of_absorption;
 use super::band_runs::{BandRun, RunPlan};
 use super::leapfrog::Leapfrog;
 use super::point_weights::PointWeights;
+use super::response::WaveResponse;
 use super::room::WaveRoom;
 use super::source_pulse::SourcePulse;
 use crate::Error;
@@ -12,7 +13,7 @@ use crate::error::check_range;
 use crate::placement::check_placement;
 use crate::spectrum::Spectrum;
 use realfft::num_complex::Complex;
-use sabine_acoustics::{Air, ImpulseResponse, Material, Observer, OctaveBands, Receiver, Scene, Source};
+use sabine_acoustics::{Air, Material, Observer, OctaveBands, Receiver, Scene, Source};
 use std::f64::consts::{PI, SQRT_2};
 
 /// Periods of the lowest mode that a response must hold.
@@ -23,6 +24,8 @@ const FADE_PERIODS: f64 = 2.0;
 const GONE_ABOVE: f64 = 1.6;
 /// Corner of the low cut, over the lowest mode.
 const LOW_CUT: f64 = 0.25;
+/// Periods of the limit for which the fading at the limit may ring before an arrival.
+const LEAD_PERIODS: f64 = 10.0;
 /// Periods of the low cut's corner after which it has died down by more than 150 dB.
 const LOW_CUT_PERIODS: f64 = 4.0;
 
@@ -103,9 +106,10 @@ impl WaveConfig {
 /// let config = WaveConfig { limit_hz: 80.0, duration_s: 0.5, sample_rate_hz: 1000, ..Default::default() };
 /// let (source, receiver) = (Source::omni("s", [0.4, 0.4, 0.4])?, Receiver::omni("r", [3.0, 0.5, 0.5])?);
 /// let responses = WaveSolver::new(config)?.respond(&scene, &source, &[receiver], &Air::default(), &())?;
+/// let response = responses[0].response()?;
 /// let level = |hz: f64| {
 ///     let turn = |i: usize| std::f64::consts::TAU * hz * i as f64 / 1000.0;
-///     let samples = responses[0].samples().iter().enumerate();
+///     let samples = response.samples().iter().enumerate();
 ///     let sum = samples.fold((0.0, 0.0), |(re, im), (i, &s)| {
 ///         (re + f64::from(s) * turn(i).cos(), im + f64::from(s) * turn(i).sin())
 ///     });
@@ -162,7 +166,7 @@ impl WaveSolver {
         receivers: &[Receiver],
         air: &Air,
         observer: &dyn Observer,
-    ) -> Result<Vec<ImpulseResponse>, Error> {
+    ) -> Result<Vec<WaveResponse>, Error> {
         let bands = self.bands(room, materials)?;
         for receiver in receivers {
             check_placement(&room.mesh, source, receiver)?;
@@ -183,7 +187,8 @@ impl WaveSolver {
         let steps = ((duration_s + pulse.end_s() + fade_s) / step_s).ceil() as usize;
         let samples = ((duration_s * rate).round() as usize).max(1);
         let low_cut_hz = LOW_CUT * lowest_hz;
-        let least = ((duration_s + fade_s + LOW_CUT_PERIODS / low_cut_hz) * rate).ceil() as usize;
+        let lead = (LEAD_PERIODS / limit_hz * rate).ceil() as usize;
+        let least = lead + ((duration_s + fade_s + LOW_CUT_PERIODS / low_cut_hz) * rate).ceil() as usize;
         let spectrum = Spectrum::new(least, sample_rate_hz);
         let mut lines = vec![vec![Complex::default(); spectrum.length() / 2 + 1]; receivers.len()];
         let masks = BandMasks::new(bands, sample_rate_hz);
@@ -220,14 +225,14 @@ impl WaveSolver {
             };
             heard.add_to(&mut lines, &spectrum, pulse, gain);
         }
-        lines
-            .into_iter()
-            .map(|lines| {
-                let mut response = spectrum.signal(lines);
-                response.truncate(samples);
-                Ok(ImpulseResponse::new(response.into_iter().map(|s| s as f32).collect(), sample_rate_hz)?)
-            })
-            .collect()
+        let response = |lines| {
+            let mut response = spectrum.signal(lines);
+            // What comes before time zero stands at the end.
+            response.rotate_right(lead);
+            response.truncate(lead + samples);
+            WaveResponse { samples: response, lead, sample_rate_hz, limit_hz }
+        };
+        Ok(lines.into_iter().map(response).collect())
     }
 
     /// [`WaveSolver::prepare`] and [`WaveSolver::solve`] with the scene's own materials.
@@ -241,7 +246,7 @@ impl WaveSolver {
         receivers: &[Receiver],
         air: &Air,
         observer: &dyn Observer,
-    ) -> Result<Vec<ImpulseResponse>, Error> {
+    ) -> Result<Vec<WaveResponse>, Error> {
         let materials: Vec<Material> = scene.materials().iter().map(|named| named.material.clone()).collect();
         self.solve(&self.prepare(scene, source, air)?, &materials, source, receivers, air, observer)
     }
