@@ -358,6 +358,33 @@ fn threads_change_nothing() {
     assert!(on(1).samples() == on(3).samples());
 }
 
+/// `cargo test --release -p sabine-propagate --test waves -- --ignored --nocapture`: time and memory of a room of 60 m3 up to
+/// 300 Hz, each octave with walls of its own.
+#[test]
+#[ignore = "a measurement, not a test"]
+fn time_and_memory_of_sixty_cubic_metres() {
+    let bands = OctaveBands::new(62.5, 250.0).unwrap();
+    let absorption = PerBand::new(bands, vec![0.05, 0.1, 0.15]).unwrap();
+    let material = Material::new(absorption, PerBand::uniform(bands, 0.0)).unwrap();
+    let scene = Scene::shoebox(SIZE_M, std::array::from_fn(|_| material.clone())).unwrap();
+    let from = source([1.17, 0.93, 1.31]);
+    let to = receiver([3.9, 3.3, 1.2]);
+    let solver = WaveSolver::new(WaveConfig::default()).unwrap();
+    let start = std::time::Instant::now();
+    let room = solver.prepare(&scene, &from, &Air::default()).unwrap();
+    let prepare_s = start.elapsed().as_secs_f64();
+    let materials = vec![material; 6];
+    let start = std::time::Instant::now();
+    solver.solve(&room, &materials, &from, &[to], &Air::default(), &()).unwrap();
+    eprintln!(
+        "{:.1} m3, {} voxels, at most {:.1} MiB: cut in {prepare_s:.2} s, three octaves of 1 s solved in {:.2} s",
+        room.volume_m3(),
+        room.voxels(),
+        room.bytes() as f64 / f64::from(1 << 20),
+        start.elapsed().as_secs_f64()
+    );
+}
+
 #[test]
 fn rooms_that_voxels_cannot_hold_are_refused() {
     let (scene, _) = box_of(SIZE_M, [0.1; 6]);
