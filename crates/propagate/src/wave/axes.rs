@@ -6,8 +6,9 @@ use std::ops::Range;
 
 /// Fewest voxels between two sides of the room: with less there is no inside to speak of.
 const LEAST_VOXELS: f64 = 4.0;
-/// Memory for each voxel of the grid (bytes): two pressures, a mark, and what surfaces and search take on top.
-const BYTES_PER_VOXEL: u64 = 32;
+/// Memory for each voxel of the grid (bytes): two pressures and a mark, and voxels with walls, a tenth of them in a room of
+/// 170,000, 240 bytes each.
+const BYTES_PER_VOXEL: u64 = 48;
 /// Voxels that an index can name.
 const MOST_VOXELS: f64 = 4e9;
 
