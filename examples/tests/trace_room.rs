@@ -83,6 +83,50 @@ fn threads_change_nothing() {
     assert!(bytes("one", "1") == bytes("three", "3"));
 }
 
+/// Energy per hertz between two frequencies, by a plain Fourier sum.
+fn energy(response: &ImpulseResponse, low_hz: f64, high_hz: f64) -> f64 {
+    let count = 60;
+    (0..count)
+        .map(|i| {
+            let hz = low_hz + (high_hz - low_hz) * (f64::from(i) + 0.5) / f64::from(count);
+            let turn = std::f64::consts::TAU * hz / f64::from(response.sample_rate_hz());
+            let sum = response.samples().iter().enumerate().fold((0.0, 0.0), |(re, im), (i, &s)| {
+                let (sine, cosine) = (turn * i as f64).sin_cos();
+                (re + f64::from(s) * cosine, im + f64::from(s) * sine)
+            });
+            (sum.0 * sum.0 + sum.1 * sum.1) / f64::from(count)
+        })
+        .sum()
+}
+
+#[test]
+fn waves_take_the_low_end_and_leave_the_rest() {
+    let folder = tempfile::tempdir().unwrap();
+    let heard = |name: &str, more: &[&str]| {
+        let out = folder.path().join(name);
+        let result = traced(&out, &[&["--duration", "0.5"], more].concat());
+        let audio = read_audio(out.join("impulse_response.wav"), Channel::Mono).unwrap();
+        (result, ImpulseResponse::from(audio))
+    };
+    let (plain, rays) = heard("rays", &[]);
+    let (result, joined) = heard("waves", &["--wave-below", "100"]);
+    assert!(plain["waves"].is_null());
+    let waves = &result["waves"];
+    let number = |key: &str| waves[key].as_f64().unwrap();
+    assert!(number("below_hz") == 100.0 && number("voxels") > 10_000.0 && number("seconds") > 0.0);
+    assert!(number("level_difference_db").abs() < 6.0 && number("gain_db").abs() < 3.5, "{waves}");
+    assert_eq!(joined.samples().len(), rays.samples().len());
+    // Above the octave about 100 Hz nothing changes.
+    let off: f64 = (0..40)
+        .map(|i| 200.0 + 25.0 * f64::from(i))
+        .map(|hz| (energy(&joined, hz, hz + 1.0) / energy(&rays, hz, hz + 1.0)).log10().abs() * 10.0)
+        .fold(0.0, f64::max);
+    assert!(off < 0.2, "{off} dB");
+    // Below it there are other peaks, about as loud in the mean over modes.
+    let level_db = 10.0 * (energy(&joined, 30.0, 70.0) / energy(&rays, 30.0, 70.0)).log10();
+    assert!(level_db.abs() > 0.01 && level_db.abs() < 12.0, "{level_db} dB");
+}
+
 #[test]
 fn bad_input_is_named_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
@@ -95,6 +139,9 @@ fn bad_input_is_named_and_nothing_is_written() {
         (vec!["--ambisonics", "7"], "ambisonic order"),
         (vec!["--rate", "10"], "sample_rate_hz"),
         (vec!["--duration", "-1"], "duration_s"),
+        (vec!["--wave-below", "-1"], "crossover_hz"),
+        (vec!["--wave-below", "3000", "--rate", "16000"], "would fit"),
+        (vec!["--wave-below", "100", "--pattern", "cardioid"], "--pattern"),
         (vec!["--room", empty.to_str().unwrap()], "room.toml"),
     ] {
         let output = run(&[&arguments[..], &["--out", out.to_str().unwrap()]].concat());

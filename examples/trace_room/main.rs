@@ -4,6 +4,7 @@
 //! Without arguments it runs on the fixture of the repository. See README.md beside this file.
 
 mod plan;
+mod waves;
 
 use clap::{Parser, ValueEnum};
 use sabine::acoustics::{
@@ -22,6 +23,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
+use waves::{WaveRoomBelow, Waves};
 
 /// The first try lasts this many times the longest reverberation time that Eyring's formula expects ...
 const DURATION_FACTOR: f64 = 1.2;
@@ -59,6 +61,10 @@ struct Arguments {
     /// Add sound diffracted over edges to receivers in a shadow
     #[arg(long)]
     diffraction: bool,
+    /// Below this frequency impulse_response.wav is a solution of the wave equation, from an omnidirectional source. Its time
+    /// grows with the fourth power of the frequency. Parameters and ambisonics are those of the paths
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, conflicts_with = "pattern")]
+    wave_below: Option<f64>,
     /// Go on although more than one ray in a thousand escapes through holes of the mesh
     #[arg(long)]
     allow_leaks: bool,
@@ -140,6 +146,8 @@ fn run(arguments: &Arguments) -> Result<(), Anything> {
     }
     let facing = receiver.axis.map_or_else(|| Ok(Orientation::default()), Orientation::towards)?;
 
+    let below =
+        arguments.wave_below.map(|hz| WaveRoomBelow::new(hz, arguments.rate, &room, source)).transpose()?;
     let bar = Bar::new();
     let start = Instant::now();
     let (paths, parameters) = trace(arguments, &room, source, receiver, &conditions, &bar)?;
@@ -147,18 +155,30 @@ fn run(arguments: &Arguments) -> Result<(), Anything> {
     bar.finish();
     let start = Instant::now();
     let mut response = mono.render_under(&paths, &conditions)?;
+    let render_s = start.elapsed().as_secs_f64();
+    let joined = |below: WaveRoomBelow| below.join(source, receiver, &conditions, &response, &bar);
+    let waves = below.map(joined).transpose()?;
+    bar.finish();
+    if let Some(waves) = &waves {
+        response = waves.joined.response.clone();
+    }
+    let start = Instant::now();
     if let Some(model) = &extended {
         response = model.finish(&source.id, &receiver.id, response, arguments.seed)?;
     }
     let directional = ambisonic.render(&paths, &conditions, facing)?;
-    let render_s = start.elapsed().as_secs_f64();
+    let render_s = render_s + start.elapsed().as_secs_f64();
 
     for warning in MeshReport::inspect(room.scene(), source.position_m)?.warnings() {
         println!("note: {warning}");
     }
     print!("{}", table(&parameters));
     println!("{} paths; traced in {trace_s:.2} s, rendered in {render_s:.2} s", paths.len());
+    if let Some(waves) = &waves {
+        println!("{}", waves.line());
+    }
     let mut result = as_json(&parameters);
+    result["waves"] = json!(waves.as_ref().map(Waves::as_json));
     result["room"] = json!(room_path.display().to_string());
     result["model"] = json!(model.map(|path| path.display().to_string()));
     result["source"] = json!(source.id);

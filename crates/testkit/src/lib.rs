@@ -4,6 +4,7 @@
 //! walks are written here a second time, in another way than in the crates under test.
 //!
 //! - [`ShoeboxImages`]: all image sources of a box, as energy, as pressure and as a [`PathSet`](sabine_acoustics::PathSet).
+//! - [`BoxModes`]: standing waves of a box whose walls have an impedance, exactly.
 //! - [`BruteForceRays`]: every ray against every triangle.
 //! - [`Phonons`]: particles in any closed mesh, as energy with standard errors and as pressure: the truth behind the
 //!   recording in `fixtures/`.
@@ -31,6 +32,7 @@
 //! Accuracy: `tests/oracles.rs` holds the oracles against closed forms and against each other. References: J. B. Allen and D. A. Berkley, JASA 65
 //! (1979) 943 (image sources); H. Kuttruff, *Room Acoustics* (particles, mean free path).
 
+mod box_modes;
 mod brute_force;
 mod filter;
 mod geometry;
@@ -40,6 +42,7 @@ mod phonons;
 mod shoebox;
 mod tolerance;
 
+pub use box_modes::BoxModes;
 pub use brute_force::BruteForceRays;
 pub use laboratory::{End, Fault, Gap, Hidden, LabConfig, Laboratory, TrueMaterial, TrueSource, Truth};
 pub use phonons::{PhononConfig, PhononEnergy, Phonons};
