@@ -7,7 +7,7 @@ mod page;
 mod spectrogram;
 
 pub use bar::Bar;
-pub use chart::{Chart, Look, Scale, Series};
+pub use chart::{Chart, Look, Scale, Series, chart_sheet};
 pub use output::{OutputError, OutputFolder};
 pub use page::{Page, escape};
 pub use spectrogram::spectrogram_png;
