@@ -65,7 +65,7 @@
 //! # Accuracy
 //! | claim | shown by |
 //! |---|---|
-//! | the fixture, whose room is known: estimates within 14 % of the truth, the rendered response within 1 % of them | `docs/validation/match_room.md` |
+//! | the fixture, whose room is known: estimates within 9 % of the truth (8 kHz: 15 %), the rendered response within 1.5 % of them | `docs/validation/match_room.md` |
 //! | the same seed gives the same sound on any number of threads | `examples/tests/match_room.rs` |
 //! | everything else | the front pages of the crates |
 //!
