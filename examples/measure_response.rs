@@ -5,7 +5,7 @@ use sabine::acoustics::{
     BandParameters, Channel, DecayFit, FilterBank, ImpulseResponse, NoReading, OctaveBands, PerBand, Reading,
     RoomParameters, equalisation, read_audio, write_atomically,
 };
-use sabine_examples::{Chart, Look, OutputFolder, Scale, Series, escape};
+use sabine_examples::{Chart, Look, OutputFolder, Scale, Series, chart_sheet};
 use serde_json::{Value, json};
 use std::error::Error;
 use std::fmt::Write as _;
@@ -16,8 +16,6 @@ use std::time::Instant;
 
 /// Points in a plotted decay.
 const PLOT_POINTS: usize = 300;
-/// Size of one plot in the units of the page of plots.
-const PLOT: (usize, usize) = (600, 400);
 
 /// Read EDT, T20, T30, T60, C50, C80, D50 and DRR from impulse responses, octave by octave.
 #[derive(Parser)]
@@ -228,13 +226,7 @@ fn plot(response: &ImpulseResponse, room: &RoomParameters) -> Result<String, Any
     let bank = FilterBank::new(room.bands(), response.sample_rate_hz())?;
     let bands = bank.analyse(response.samples());
     let block = (response.samples().len() / PLOT_POINTS).max(1);
-    let rows = room.bands().len().div_ceil(2);
-    let mut page = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" font-family=\"sans-serif\">\
-         <rect width=\"100%\" height=\"100%\" fill=\"white\"/>",
-        2 * PLOT.0,
-        rows * PLOT.1
-    );
+    let mut charts = Vec::new();
     for (i, (hz, samples)) in bands.iter().enumerate() {
         let measured: Vec<(f64, f64)> = samples
             .chunks(block)
@@ -268,20 +260,7 @@ fn plot(response: &ImpulseResponse, room: &RoomParameters) -> Result<String, Any
             Ok(t60) => format!("{hz} Hz: T60 {:.3} ± {:.3} s", t60.value, t60.standard_error),
             Err(reason) => format!("{hz} Hz: {reason}"),
         };
-        let (x, y) = (i % 2 * PLOT.0, i / 2 * PLOT.1);
-        let _ = write!(
-            page,
-            "<text x=\"{}\" y=\"{}\" font-size=\"16\" fill=\"#222222\">{}</text>\
-             <svg x=\"{x}\" y=\"{}\" width=\"{}\" height=\"{}\">{}</svg>",
-            x + 62,
-            y + 24,
-            escape(&title),
-            y + 32,
-            PLOT.0,
-            PLOT.1 - 40,
-            chart.plain_svg()?
-        );
+        charts.push((title, chart));
     }
-    page.push_str("</svg>\n");
-    Ok(page)
+    chart_sheet(&charts)
 }

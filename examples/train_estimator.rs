@@ -5,11 +5,11 @@
 
 use clap::{Parser, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use plotters::prelude::*;
 use sabine::acoustics::write_atomically;
 use sabine::estimator::{
     Dataset, EpochRecord, Loss, NetworkConfig, PerturbConfig, Schedule, T60Scale, TrainConfig, Trainer,
 };
+use sabine_examples::{Chart, Look, Scale, Series};
 use std::error::Error;
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -90,7 +90,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+fn run(arguments: &Arguments) -> Result<(), Box<dyn Error + Send + Sync>> {
     std::fs::create_dir_all(&arguments.out)?;
     println!("checking {}", arguments.data.display());
     let dataset = Dataset::open(&arguments.data)?;
@@ -159,21 +159,16 @@ fn config(arguments: &Arguments) -> TrainConfig {
     }
 }
 
-fn draw(path: &Path, history: &[EpochRecord]) -> Result<(), Box<dyn Error>> {
-    let mut svg = String::new();
-    {
-        let root = SVGBackend::with_string(&mut svg, (800, 500)).into_drawing_area();
-        root.fill(&WHITE)?;
-        let top = history.iter().map(|r| r.validation_error).fold(1.0, f64::max);
-        let mut chart = ChartBuilder::on(&root)
-            .margin(20)
-            .x_label_area_size(40)
-            .y_label_area_size(60)
-            .build_cartesian_2d(0.0..history.len() as f64, 0.0..top)?;
-        chart.configure_mesh().x_desc("epoch").y_desc("validation error / constant guess").draw()?;
-        let points = history.iter().map(|r| (r.epoch as f64, r.validation_error));
-        chart.draw_series(LineSeries::new(points, &BLUE))?;
-        root.present()?;
-    }
+fn draw(path: &Path, history: &[EpochRecord]) -> Result<(), Box<dyn Error + Send + Sync>> {
+    let points = history.iter().map(|r| (r.epoch as f64, r.validation_error)).collect();
+    let chart = Chart {
+        x_label: "epoch".to_owned(),
+        y_label: "validation error / constant guess".to_owned(),
+        x: Scale::Linear(0.0, history.len() as f64),
+        y: None,
+        series: vec![Series { in_legend: false, ..Series::new("validation", Look::Line, 0, points) }],
+        small: false,
+    };
+    let svg = chart.plain_svg()?;
     Ok(write_atomically(path, |file| file.write_all(svg.as_bytes()))?)
 }

@@ -19,14 +19,17 @@ def histogram(label, columns, hertz, unit, ticks, goal, path):
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {total} {top + height + 46}" '
         'font-family="sans-serif" font-size="11">',
-        "<style>text{fill:#333}.b{fill:none;stroke:#c2410c;stroke-width:1.5}.a{fill:#60a5fa}.g{stroke:#16a34a;stroke-width:3}"
-        ".x{stroke:#999}@media(prefers-color-scheme:dark){text{fill:#ddd}.b{stroke:#fb923c}.a{fill:#2563eb}.x{stroke:#777}}</style>",
+        # The style of examples/src/chart.rs: Okabe and Ito's colours on paper that turns dark.
+        "<style>text{fill:#222;font-family:system-ui,sans-serif}.b{fill:none;stroke:#D55E00;stroke-width:1.5}.a{fill:#56B4E9}"
+        ".g{stroke:#009E73;stroke-width:3}.x{stroke:#888}.paper{fill:#fff}"
+        "@media(prefers-color-scheme:dark){.paper{fill:#161616}text{fill:#e4e4e4}.b{stroke:#ff8a3c}.a{fill:#0072B2}.x{stroke:#777}}</style>",
+        '<rect class="paper" width="100%" height="100%"/>',
         f'<text x="{left}" y="16" font-size="13" font-weight="bold">{label}</text>',
         f'<rect class="a" x="{left}" y="24" width="12" height="10"/><text x="{left + 16}" y="33">training set</text>',
         f'<path class="b" d="M{left + 100} 29h14"/><text x="{left + 120}" y="33">measured responses of the test rooms, as they are</text>',
     ]
     if goal:
-        parts.append(f'<path class="g" d="M{left + 400} 29h14"/><text x="{left + 420}" y="33">{goal[0]:g} to {goal[1]:g} {unit}</text>')
+        parts.append(f'<path class="g" d="M{left + 440} 29h14"/><text x="{left + 460}" y="33">{goal[0]:g} to {goal[1]:g} {unit}</text>')
     for i, ((after, before), hz) in enumerate(zip(columns, hertz)):
         x0, base = left + i * (width + gap), top + height
         bins, first, step = len(after["histogram"]), after["first_edge"], after["bin_width"]

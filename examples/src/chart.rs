@@ -1,7 +1,9 @@
 //! Line charts as SVG: one style for all, readable in light and dark, with colours that the colour-blind can tell apart.
 
+use crate::escape;
 use plotters::coord::Shift;
 use plotters::prelude::*;
+use std::fmt::Write;
 
 /// Size of a chart in SVG units: it scales to its place on the page, and its text stays readable on a phone.
 const SIZE: (u32, u32) = (480, 320);
@@ -23,11 +25,14 @@ const COLOURS: [RGBColor; 6] = [
     RGBColor(86, 180, 233),
 ];
 /// Chosen by attribute, so that the file keeps plain colours for viewers that know no style sheets.
-const DARK: &str = "<style>@media (prefers-color-scheme: dark){\
-svg.chart [fill=\"#222222\"]{fill:#e4e4e4}svg.chart [stroke=\"#222222\"]{stroke:#e4e4e4}\
+const STYLE: &str = "<style>svg.chart text,svg.charts text{font-family:system-ui,sans-serif}\
+@media (prefers-color-scheme: dark){svg.chart .paper,svg.charts .paper{fill:#161616}\
+svg.chart [fill=\"#222222\"],svg.charts [fill=\"#222222\"]{fill:#e4e4e4}svg.chart [stroke=\"#222222\"]{stroke:#e4e4e4}\
 svg.chart [stroke=\"#D0D0D0\"]{stroke:#444}\
 svg.chart [fill=\"#0072B2\"]{fill:#4da3dc}svg.chart [stroke=\"#0072B2\"]{stroke:#4da3dc}\
 svg.chart [fill=\"#D55E00\"]{fill:#ff8a3c}svg.chart [stroke=\"#D55E00\"]{stroke:#ff8a3c}}</style>";
+/// Behind a chart that stands alone: white, or the dark of the pages.
+const PAPER: &str = "<rect class=\"paper\" width=\"100%\" height=\"100%\" fill=\"white\"/>";
 
 /// How a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,15 +101,15 @@ impl Chart {
     /// # Errors
     /// What plotters reports; drawing into memory does not fail by itself.
     pub fn svg(&self) -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
-        self.with_opening(DARK)
+        self.with_opening(STYLE)
     }
 
-    /// The chart on white, for a file of its own.
+    /// The chart on its own paper, for a file of its own: white, dark where the viewer prefers that.
     ///
     /// # Errors
     /// As [`Chart::svg`].
     pub fn plain_svg(&self) -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
-        self.with_opening("<rect width=\"100%\" height=\"100%\" fill=\"white\"/>")
+        self.with_opening(&format!("{STYLE}{PAPER}"))
     }
 
     fn with_opening(&self, opening: &str) -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
@@ -116,7 +121,9 @@ impl Chart {
             root.present().map_err(|e| e.to_string())?;
         }
         let sized = format!("<svg width=\"{}\" height=\"{}\"", size.0, size.1);
-        let text = text.replacen(&sized, "<svg class=\"chart\" role=\"img\"", 1);
+        let label = escape(&format!("{} over {}", self.y_label, self.x_label));
+        let opened = format!("<svg class=\"chart\" role=\"img\" aria-label=\"{label}\"");
+        let text = text.replacen(&sized, &opened, 1);
         Ok(match text.find('>') {
             Some(end) => format!("{}{opening}{}", &text[..=end], &text[end + 1..]),
             None => text,
@@ -258,4 +265,37 @@ impl Chart {
         }
         Ok(())
     }
+}
+
+/// Charts with a title each, side by side in two columns, as one SVG file.
+///
+/// # Errors
+/// As [`Chart::svg`].
+pub fn chart_sheet(charts: &[(String, Chart)]) -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
+    let (cell, title) = ((SIZE.0 + 20, SIZE.1 + 42), 32);
+    let rows = (charts.len() as u32).div_ceil(2);
+    let mut sheet = format!(
+        "<svg class=\"charts\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" font-family=\"sans-serif\">{STYLE}{PAPER}",
+        2 * cell.0,
+        rows * cell.1
+    );
+    for (i, (text, chart)) in (0u32..).zip(charts) {
+        let (x, y) = (i % 2 * cell.0, i / 2 * cell.1);
+        // Wide letters take six tenths of their height: a long title is set smaller rather than cut.
+        let size = (f64::from(SIZE.0 - 62) / 0.6 / text.chars().count().max(1) as f64).min(16.0);
+        let _ = write!(
+            sheet,
+            "<text x=\"{}\" y=\"{}\" font-size=\"{size:.1}\" fill=\"#222222\">{}</text>\
+             <svg x=\"{x}\" y=\"{}\" width=\"{}\" height=\"{}\">{}</svg>",
+            x + 62,
+            y + 24,
+            escape(text),
+            y + title,
+            SIZE.0,
+            SIZE.1,
+            // The style stands once, at the head.
+            chart.with_opening("")?
+        );
+    }
+    Ok(sheet + "</svg>\n")
 }

@@ -7,7 +7,7 @@ mod page;
 mod spectrogram;
 
 pub use bar::Bar;
-pub use chart::{Chart, Look, Scale, Series};
+pub use chart::{Chart, Look, Scale, Series, chart_sheet};
 pub use output::{OutputError, OutputFolder};
 pub use page::{Page, escape};
 pub use spectrogram::spectrogram_png;
@@ -19,6 +19,8 @@ mod how_to {
     mod calibrate_a_room {}
     #[doc = include_str!("../../docs/how-to/live-use.md")]
     mod live_use {}
+    #[doc = include_str!("../../docs/how-to/own-effect.md")]
+    mod own_effect {}
     #[doc = include_str!("../../docs/how-to/own-estimator.md")]
     mod own_estimator {}
     #[doc = include_str!("../../docs/how-to/own-tracer.md")]

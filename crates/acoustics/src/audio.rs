@@ -91,6 +91,18 @@ pub fn probe_wav(path: impl AsRef<Path>) -> Result<AudioInfo, Error> {
 /// # Errors
 /// [`Error::InFile`] with the cause [`Error::Empty`], [`Error::NotFinite`], or [`Error::OutOfRange`] for a sample beyond full
 /// scale in an integer format, a sample rate outside 1 kHz to 768 kHz or more than 4 GiB of samples; [`Error::Io`] if the file cannot be written.
+/// ```
+/// use sabine_acoustics::{Channel, SampleFormat, read_audio, write_wav};
+/// let path = std::env::temp_dir().join(format!("sabine_write_wav_{}.wav", std::process::id()));
+/// write_wav(&path, &[0.5, -0.5, 0.25], 16_000, SampleFormat::Int16)?;
+/// let read = read_audio(&path, Channel::Mono)?;
+/// assert_eq!((read.samples(), read.sample_rate_hz()), (&[0.5, -0.5, 0.25][..], 16_000));
+/// // Beyond full scale an integer would wrap: refused, and the file stays as it was.
+/// assert!(write_wav(&path, &[1.5], 16_000, SampleFormat::Int16).is_err());
+/// assert_eq!(read_audio(&path, Channel::Mono)?, read);
+/// # std::fs::remove_file(&path).ok();
+/// # Ok::<(), sabine_acoustics::Error>(())
+/// ```
 pub fn write_wav(
     path: impl AsRef<Path>,
     samples: &[f32],

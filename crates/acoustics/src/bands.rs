@@ -120,6 +120,15 @@ fn nominal_index(centre_hz: f64) -> Result<usize, Error> {
 /// One value for each band of a run of octaves.
 ///
 /// Combining values of different runs is an error, never a silent truncation.
+/// ```
+/// use sabine_acoustics::{OctaveBands, PerBand};
+/// let t60_s = PerBand::from_fn(OctaveBands::T60, |band| 0.8 - 0.05 * band as f64);
+/// assert_eq!(t60_s.at_hz(125.0), Some(&0.8));
+/// assert_eq!(t60_s.at_hz(62.5), None);
+/// let other = PerBand::uniform(OctaveBands::EQ, 0.0);
+/// assert!(t60_s.zip_with(&other, |a, b| a + b).is_err());
+/// # Ok::<(), sabine_acoustics::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct PerBand<T> {
     bands: OctaveBands,

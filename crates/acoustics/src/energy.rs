@@ -5,6 +5,7 @@ use crate::{Error, NoReading, OctaveBands};
 /// Energy per time bin and band. **Not** a pressure response: it must not be convolved with sound.
 ///
 /// Scaled so that the direct sound of an omnidirectional source at 1 m carries energy 1 in every band.
+/// [`PathSet::energy_response`](crate::PathSet::energy_response) makes one; [`EnergyResponse::decay_curve`] reads it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EnergyResponse {
     bands: OctaveBands,

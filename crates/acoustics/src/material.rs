@@ -4,6 +4,14 @@ use crate::error::check_range;
 use crate::{Error, OctaveBands, PerBand};
 
 /// How a surface treats sound energy, per octave band.
+/// ```
+/// use sabine_acoustics::{Material, OctaveBands, PerBand};
+/// let bands = OctaveBands::new(500.0, 2000.0)?;
+/// let curtain = Material::new(PerBand::new(bands, vec![0.4, 0.6, 0.7])?, PerBand::uniform(bands, 0.2))?;
+/// assert_eq!(curtain.absorption().at_hz(1000.0), Some(&0.6));
+/// assert!(Material::uniform(bands, 1.2, 0.1).is_err()); // more than all energy
+/// # Ok::<(), sabine_acoustics::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     absorption: PerBand<f64>,

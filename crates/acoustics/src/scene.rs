@@ -25,6 +25,13 @@ pub struct NamedMaterial {
 ///
 /// Indices are checked, coordinates are finite and all materials share their bands. Whether the mesh is closed is for the
 /// tracer to say.
+/// ```
+/// use sabine_acoustics::{Material, OctaveBands, Scene};
+/// let wall = Material::uniform(OctaveBands::SIMULATION, 0.1, 0.2)?;
+/// let room = Scene::shoebox([5.0, 4.0, 3.0], std::array::from_fn(|_| wall.clone()))?;
+/// assert!((room.volume_m3() - 60.0).abs() < 1e-9 && (room.surface_m2() - 94.0).abs() < 1e-9);
+/// # Ok::<(), sabine_acoustics::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     vertices: Vec<[f64; 3]>,

@@ -3,6 +3,13 @@
 use crate::Error;
 
 /// Mono samples at a sample rate. Full scale is 1; the samples are finite and there is at least one.
+/// ```
+/// use sabine_acoustics::Signal;
+/// let second = Signal::new(vec![0.5, -0.25], 2_000)?;
+/// assert_eq!((second.peak(), second.duration_s()), (0.5, 1e-3));
+/// assert!(Signal::new(vec![f32::NAN], 48_000).is_err());
+/// # Ok::<(), sabine_acoustics::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signal {
     samples: Vec<f32>,
@@ -49,6 +56,17 @@ impl Signal {
 ///
 /// Scaled so that the direct sound of an omnidirectional source at 1 m has amplitude 1. Sample 0 is the instant of
 /// emission unless a measurement says otherwise.
+/// ```
+/// use sabine_acoustics::{ImpulseResponse, Onset};
+/// // The direct sound over 3.43 m at 343 m/s.
+/// let mut samples = vec![0.0; 4800];
+/// samples[480] = 1.0 / 3.43;
+/// let response = ImpulseResponse::new(samples, 48_000)?;
+/// let arrival_s = Onset::find(response.samples(), 48_000)?.index as f64 / 48_000.0;
+/// assert!((arrival_s * 343.0 - 3.43).abs() < 0.08, "{arrival_s}");
+/// assert!((response.peak() * 3.43 - 1.0).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImpulseResponse {
     samples: Vec<f32>,

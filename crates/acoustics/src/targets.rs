@@ -3,6 +3,16 @@
 use crate::{Error, Estimate, OctaveBands, PerBand};
 
 /// Reverberation time and equalisation per octave: what the estimator hears and the fit aims at.
+/// ```
+/// use sabine_acoustics::{Estimate, OctaveBands, PerBand, RoomTargets};
+/// let targets = RoomTargets::new(
+///     PerBand::uniform(OctaveBands::T60, Estimate::new(0.6, 0.05)),
+///     PerBand::uniform(OctaveBands::EQ, Estimate::exact(0.0)),
+/// )?;
+/// let (low, high) = targets.t60_s().at_hz(1000.0).unwrap().interval(2.0);
+/// assert!((low - 0.5).abs() < 1e-9 && (high - 0.7).abs() < 1e-9);
+/// # Ok::<(), sabine_acoustics::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct RoomTargets {
     t60_s: PerBand<Estimate>,

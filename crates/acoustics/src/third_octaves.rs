@@ -12,6 +12,14 @@ const NOMINAL_HZ: [f64; 30] = [
 const REFERENCE: i32 = 16;
 
 /// A contiguous run of third-octave bands, named by their nominal centres (62.5 Hz stands for 63 Hz).
+/// ```
+/// use sabine_acoustics::ThirdOctaveBands;
+/// let bands = ThirdOctaveBands::new(800.0, 1250.0)?;
+/// assert_eq!(bands.len(), 3);
+/// let (low, high) = bands.edges_hz(1);
+/// assert!((high / low - 10f64.powf(0.1)).abs() < 1e-12); // base 10: ten to a decade
+/// # Ok::<(), sabine_acoustics::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ThirdOctaveBands {
     first: u8,

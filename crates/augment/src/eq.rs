@@ -32,6 +32,17 @@ impl Default for EqConfig {
 }
 
 /// Gives a response another equalisation, drawn octave by octave from normal distributions, by a linear-phase filter.
+/// ```
+/// use sabine_acoustics::{ImpulseResponse, OctaveBands, PerBand, equalisation};
+/// use sabine_augment::{EqAugment, EqConfig, SyntheticRoomConfig, SyntheticRooms};
+/// let room = SyntheticRooms::new(SyntheticRoomConfig::default())?.draw(1)?;
+/// let augment = EqAugment::new(EqConfig::default(), room.sample_rate_hz())?;
+/// let wanted_db = PerBand::from_fn(OctaveBands::EQ, |band| [3.0, 0.0, -3.0, 2.0, 0.0, -2.0, 4.0][band]);
+/// let coloured = augment.to_db(&room, &wanted_db)?;
+/// let found_db = equalisation(&coloured, OctaveBands::EQ)?;
+/// assert!((found_db.at_hz(4000.0).unwrap().clone()?.value - 4.0).abs() < 0.5);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct EqAugment {
     config: EqConfig,

@@ -12,6 +12,37 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// A room to be written to disk.
+/// Responses that lie in a folder become a measured room:
+/// ```
+/// use sabine_acoustics::*;
+/// let bands = OctaveBands::new(500.0, 1000.0)?;
+/// let wall = Material::uniform(bands, 0.1, 0.1)?;
+/// let prior = MaterialPrior { absorption: Some(wall.absorption().clone()), absorption_sd: PerBand::uniform(bands, 0.05) };
+/// let mut samples = vec![0.0; 4800];
+/// samples[420] = 0.33; // 3 m at 343 m/s and 48 kHz
+/// let room = NewRoom {
+///     scene: Scene::shoebox([6.0, 5.0, 3.0], std::array::from_fn(|_| wall.clone()))?,
+///     priors: vec![prior; 6],
+///     air: Some(Air::default()),
+///     measurement: Measurement { time_zero: TimeZero::Emission, levels: Levels::Absolute },
+///     sources: vec![Source::omni("s1", [1.0, 2.0, 1.5])?],
+///     receivers: vec![Receiver::omni("r1", [4.0, 2.0, 1.5])?],
+///     responses: vec![NewResponse {
+///         source: "s1".into(),
+///         receiver: "r1".into(),
+///         name: "s1_r1".into(),
+///         air: None,
+///         session: None,
+///         samples: ImpulseResponse::new(samples, 48_000)?,
+///     }],
+/// };
+/// # let folder = std::env::temp_dir().join(format!("sabine_new_room_{}", std::process::id()));
+/// # std::fs::remove_dir_all(&folder).ok();
+/// let read = room.write(&folder)?; // room.toml, room.obj, ir/s1_r1.wav
+/// assert_eq!(read.load_response(0)?.samples()[420], 0.33);
+/// # std::fs::remove_dir_all(&folder).ok();
+/// # Ok::<(), Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct NewRoom {
     /// Mesh and materials; their scattering is written as it stands.

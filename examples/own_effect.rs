@@ -1,0 +1,99 @@
+//! An effect of one's own in the catalogue: a recorder whose automatic gain swells and sinks while it records.
+//!
+//! The laboratory of the tests hides it in a small room; the whole catalogue and the new effect compete to explain the responses.
+//! `docs/how-to/own-effect.md` goes through it.
+
+use clap::Parser;
+use sabine::acoustics::MeasuredRoom;
+use sabine::diagnose::{
+    BandView, Case, DiagnoseConfig, Diagnoser, Diagnosis, Effect, Parameter, Stage, Survey, catalogue,
+};
+use sabine_testkit::{Hidden, LabConfig, Laboratory};
+use std::f64::consts::{LN_10, TAU};
+
+/// Gain in dB over the time of the file: a sine and a cosine of one period, alike in all octaves and responses.
+///
+/// Mark: residuals that swell with the time of the file. Mimicked by: a cut, if less than half a period is heard.
+#[derive(Clone, Copy)]
+struct GainDrift;
+
+impl Effect for GainDrift {
+    fn id(&self) -> &'static str {
+        "gain_drift"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "The gain swells and sinks while a response is recorded: is an automatic gain control on?"
+    }
+
+    fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
+        vec![Box::new(*self)]
+    }
+}
+
+impl Case for GainDrift {
+    fn stage(&self) -> Stage {
+        Stage::Recorder
+    }
+
+    fn parameters(&self, _: &Survey) -> Vec<Parameter> {
+        vec![
+            Parameter::new("sine", "dB", 0.0, 3.0, (-20.0, 20.0)).typically(3.0),
+            Parameter::new("cosine", "dB", 0.0, 3.0, (-20.0, 20.0)),
+            Parameter::new("period", "s", 0.3, 0.3, (0.05, 2.0)),
+        ]
+    }
+
+    /// Sine and cosine are found from anywhere; the period only from near by.
+    fn starts(&self, _: &Survey) -> Vec<Vec<f64>> {
+        [0.1, 0.15, 0.2, 0.3, 0.45, 0.7].map(|period_s| vec![0.5, 0.5, period_s]).to_vec()
+    }
+
+    fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+        for (bin, ln) in ln_energy.iter_mut().enumerate() {
+            let (sin, cos) = (TAU * view.file_time_s(bin) / values[2]).sin_cos();
+            *ln += LN_10 / 10.0 * (values[0] * sin + values[1] * cos);
+        }
+    }
+}
+
+/// Diagnose a room with one more effect in the catalogue.
+#[derive(Parser)]
+struct Arguments {
+    /// A measured room [default: one of the laboratory, in which the effect is hidden]
+    #[arg(long, value_name = "DIR")]
+    room: Option<std::path::PathBuf>,
+    /// Leave the new effect out
+    #[arg(long)]
+    without: bool,
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let arguments = Arguments::parse();
+    let mut effects = catalogue();
+    if !arguments.without {
+        effects.push(Box::new(GainDrift));
+    }
+    let config = DiagnoseConfig { rays: 1000, ..DiagnoseConfig::default() };
+    let diagnoser = Diagnoser::new(config)?.with_effects(effects);
+    let found = if let Some(folder) = arguments.room {
+        diagnoser.diagnose(&MeasuredRoom::read(folder)?, &[], &())?
+    } else {
+        let hidden = Hidden::GainDrift { depth_db: 3.0, period_s: 0.2, phase_rad: 1.0 };
+        let lab = Laboratory::new(LabConfig { seed: 11, receivers: 4, ..LabConfig::default() })?;
+        let folder = tempfile::tempdir()?;
+        diagnoser.diagnose(&lab.write(&[hidden], &folder.path().join("room"), None)?, &[], &())?
+    };
+    print(&found);
+    Ok(())
+}
+
+fn print(found: &Diagnosis) {
+    println!("{}", found.verdict);
+    for cause in &found.causes {
+        println!("{} ({:.0} nats): {}", cause.effect, cause.nats, cause.explanation);
+        for p in &cause.parameters {
+            println!("  {} {:.3} {} (90 %: {:.3} to {:.3})", p.name, p.value, p.unit, p.low, p.high);
+        }
+    }
+}
