@@ -23,6 +23,9 @@ const STEP: f64 = 1e-4;
 const MOST_STARTS: usize = 2;
 /// Bins in which unknown gains are first read.
 const EARLY_BINS: usize = 8;
+/// Logarithm of measured over predicted energy from which a bin's surprise grows in proportion, no longer exponentially: what no model
+/// expects, as noise 30 dB above a decay, must not drown the rest, and a search would not find its way out.
+const SURPRISE: f64 = 2.5;
 /// Bounds of absorption.
 pub(crate) const ABSORPTION: (f64, f64) = (0.002, 0.98);
 
@@ -44,6 +47,12 @@ pub(crate) struct EnergyData<'a> {
     pub gain_sd_db: f64,
     /// Factor by which variances exceed what is expected, by band.
     pub dispersion: &'a [f64],
+}
+
+/// Logarithm of the Gamma density of unit shape at a ratio, relative to its top; straight beyond [`SURPRISE`].
+fn log_density(ln_ratio: f64) -> f64 {
+    let z = ln_ratio.min(SURPRISE);
+    z - z.exp() + 1.0 + (1.0 - SURPRISE.exp()) * (ln_ratio - z)
 }
 
 /// An effect in a model, and where its parameters stand.
@@ -304,8 +313,7 @@ impl<'a> EnergyModel<'a> {
         let shape = |bin: usize| 1.0 / (self.data.states[pair][band].variance[bin] * dispersion);
         let ln_ratio: Vec<f64> =
             energies.iter().zip(&predicted).map(|(e, p)| e.max(silence).ln() - p).collect();
-        let value =
-            ln_ratio.iter().enumerate().map(|(bin, z)| shape(bin) * (z - z.min(30.0).exp() + 1.0)).sum();
+        let value = ln_ratio.iter().enumerate().map(|(bin, &z)| shape(bin) * log_density(z)).sum();
         let Some(slopes) = slopes else { return value };
 
         // Columns that matter in this band, and the change of the predicted logarithm with each.
@@ -330,7 +338,7 @@ impl<'a> EnergyModel<'a> {
         }
         for bin in 0..count {
             let weight = shape(bin);
-            let pull = weight * (ln_ratio[bin].min(30.0).exp() - 1.0);
+            let pull = weight * (ln_ratio[bin].min(SURPRISE).exp() - 1.0);
             for (i, &a) in columns.iter().enumerate() {
                 let slope = rows[i][bin];
                 if slope == 0.0 {
