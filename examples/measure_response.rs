@@ -249,8 +249,8 @@ fn plot(response: &ImpulseResponse, room: &RoomParameters) -> Result<String, Any
             series.push(Series::new("decay plus noise, fitted", Look::Dashed, 1, relative(fitted)));
         }
         let chart = Chart {
-            x_label: "time (s)".to_owned(),
-            y_label: "level (dB)".to_owned(),
+            x_label: "Time (s)".to_owned(),
+            y_label: "Level (dB)".to_owned(),
             x: Scale::Linear(0.0, response.duration_s()),
             y: Some((-100.0, 5.0)),
             series,

@@ -162,8 +162,8 @@ fn config(arguments: &Arguments) -> TrainConfig {
 fn draw(path: &Path, history: &[EpochRecord]) -> Result<(), Box<dyn Error + Send + Sync>> {
     let points = history.iter().map(|r| (r.epoch as f64, r.validation_error)).collect();
     let chart = Chart {
-        x_label: "epoch".to_owned(),
-        y_label: "validation error / constant guess".to_owned(),
+        x_label: "Epoch".to_owned(),
+        y_label: "Validation error / constant guess".to_owned(),
         x: Scale::Linear(0.0, history.len() as f64),
         y: None,
         series: vec![Series { in_legend: false, ..Series::new("validation", Look::Line, 0, points) }],

@@ -405,8 +405,8 @@ fn decay_chart(curves: &[Curve]) -> Chart {
     let colours = [4, 0, 1];
     let series = curves.iter().zip(colours);
     Chart {
-        x_label: "time, s".to_owned(),
-        y_label: "level, dB".to_owned(),
+        x_label: "Time (s)".to_owned(),
+        y_label: "Level (dB)".to_owned(),
         x: Scale::Linear(0.0, longest_s),
         y: Some((-65.0, 0.0)),
         series: series

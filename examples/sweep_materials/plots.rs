@@ -98,8 +98,8 @@ pub fn reached(points: &[Point]) -> Result<String, AnyError> {
         series.push(Series::new(name, Look::Dots, colour, targets.iter().map(|&t| of(t)).collect()));
     }
     let chart = Chart {
-        x_label: "T60 wanted, s".to_owned(),
-        y_label: "median T30 read, s".to_owned(),
+        x_label: "T60 wanted (s)".to_owned(),
+        y_label: "Median T30 read (s)".to_owned(),
         x: Scale::Linear(0.0, 1.05 * longest),
         y: Some((0.0, 1.4 * longest)),
         series,
@@ -123,8 +123,8 @@ pub fn errors(points: &[Point]) -> Result<String, AnyError> {
         }
     }
     let chart = Chart {
-        x_label: "T60 wanted, s".to_owned(),
-        y_label: "error, %; dashed: 95th pct.".to_owned(),
+        x_label: "T60 wanted (s)".to_owned(),
+        y_label: "Error (%); dashed: 95th pct.".to_owned(),
         x: Scale::Linear(0.0, 1.05 * targets.last().copied().unwrap_or(1.0)),
         y: Some((0.0, 50.0)),
         series,
