@@ -10,7 +10,7 @@ mod trial;
 use clap::Parser;
 use sabine::diagnose::DiagnoseConfig;
 use sabine_testkit::Hidden;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use trial::{Task, Trial};
 
@@ -117,13 +117,13 @@ fn tasks(arguments: &Arguments) -> Vec<Task> {
     tasks
 }
 
-fn read(path: &PathBuf) -> Result<Vec<Trial>, AnyError> {
+fn read(path: &Path) -> Result<Vec<Trial>, AnyError> {
     let mut reader = csv::Reader::from_path(path)?;
     let trials: Result<Vec<Trial>, csv::Error> = reader.deserialize().collect();
     trials.map_err(|error| format!("{}: {error}", path.display()).into())
 }
 
-fn write(path: &PathBuf, trials: &[Trial]) -> Result<(), AnyError> {
+fn write(path: &Path, trials: &[Trial]) -> Result<(), AnyError> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for trial in trials {
         writer.serialize(trial)?;
