@@ -114,7 +114,7 @@ fn waves_take_the_low_end_and_leave_the_rest() {
     let waves = &result["waves"];
     let number = |key: &str| waves[key].as_f64().unwrap();
     assert!(number("below_hz") == 100.0 && number("voxels") > 10_000.0 && number("seconds") > 0.0);
-    assert!(number("level_difference_db").abs() < 6.0 && number("gain_db").abs() < 3.5, "{waves}");
+    assert!(number("level_difference_db").abs() < 6.0 && number("gain_db").abs() < 6.1, "{waves}");
     assert_eq!(joined.samples().len(), rays.samples().len());
     // Above the octave about 100 Hz nothing changes.
     let off: f64 = (0..40)
@@ -122,9 +122,9 @@ fn waves_take_the_low_end_and_leave_the_rest() {
         .map(|hz| (energy(&joined, hz, hz + 1.0) / energy(&rays, hz, hz + 1.0)).log10().abs() * 10.0)
         .fold(0.0, f64::max);
     assert!(off < 0.2, "{off} dB");
-    // Below it there are other peaks, about as loud in the mean over modes.
+    // Below it there are other peaks: between two modes far less than the mean that rays know.
     let level_db = 10.0 * (energy(&joined, 30.0, 70.0) / energy(&rays, 30.0, 70.0)).log10();
-    assert!(level_db.abs() > 0.01 && level_db.abs() < 12.0, "{level_db} dB");
+    assert!(level_db.abs() > 0.5 && level_db.abs() < 20.0, "{level_db} dB");
 }
 
 #[test]

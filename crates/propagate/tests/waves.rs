@@ -240,10 +240,9 @@ fn each_octave_has_its_absorption() {
 
 #[test]
 fn walls_between_voxel_borders_are_where_the_mesh_has_them() {
-    // A step in the floor plan: the wall of the niche divides the room unevenly, so it falls within voxels.
     let size_m = [3.1, 2.6, 2.2];
     let (plain, modes) = box_of(size_m, [0.08; 6]);
-    // The same box, with a needle of rock far outside: voxels now span more than the box.
+    // The same box, with a chip of rock outside: voxels now divide more than the box, and its walls fall within them.
     let mut vertices = plain.vertices().to_vec();
     let mut triangles = plain.triangles().to_vec();
     let first = vertices.len() as u32;
@@ -422,7 +421,7 @@ fn rooms_that_voxels_cannot_hold_are_refused() {
         matches!(with(short, &scene), Error::TooShortForModes { needed_s, .. } if (0.11..0.13).contains(&needed_s))
     );
 
-    // A tube of 2 cm leads to the receiver's half of the room.
+    // A slit of 2 cm leads to the receiver's half of the room.
     let parted = parted_by_a_slit();
     assert!(matches!(with(config.clone(), &parted), Error::BetweenVoxels { what: "receiver", .. }));
 

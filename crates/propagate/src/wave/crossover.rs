@@ -43,7 +43,8 @@ pub struct JoinedResponse {
     pub response: ImpulseResponse,
     /// Energy of the waves over that of the paths in the octave about the crossover, in dB.
     pub level_difference_db: f64,
-    /// Gain at the crossover, in dB; 0 where both sides are equal, up to 3 where they have nothing but their energy in common.
+    /// Gain at the crossover, in dB; 0 where both sides are equal, about 3 where they have nothing but their energy in common,
+    /// at most 6.
     pub gain_db: f64,
 }
 
