@@ -4,6 +4,7 @@ use crate::diagnoser::{parameters, place_of};
 use crate::effect::{Evidence, Nuisance};
 use crate::extended_model::{CoupledDecay, Dimensions, ExtendedModel};
 use crate::search::{Search, State};
+use crate::sheets;
 use crate::traced_pair::scattering_more;
 use crate::workbench::Workbench;
 use std::collections::BTreeMap;
@@ -94,6 +95,14 @@ pub(crate) fn extended_model(bench: &Workbench, search: &Search<'_>, state: &Sta
                     scale: std::array::from_fn(|k| 1.0 + 0.01 * values[k]),
                     shift_m: std::array::from_fn(|k| values[3 + k]),
                 });
+            }
+            "extra_reflector" => model.sheets.extend(sheets::panel(search, state, &values)),
+            "open_patch" => {
+                let inside = survey.sources[survey.responses[0].source].position_m;
+                if let Some(plane) = case.plane().and_then(|p| survey.planes.get(p)) {
+                    let found = parameters(search, state, candidate);
+                    model.sheets.extend(sheets::hole(plane, inside, &found));
+                }
             }
             "time_zero" => model.latency_s = Some(1e-3 * values[0]),
             "position_error" => {
