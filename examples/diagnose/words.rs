@@ -23,6 +23,8 @@ pub fn effect(id: &str) -> String {
         "position_error" => "A position off",
         "time_zero" => "Latency left in",
         "channel_fault" => "Fault of one channel",
+        "extra_reflector" => "A surface that the model lacks",
+        "open_patch" => "An opening in a wall",
         other => return other.replace('_', " "),
     };
     known.to_owned()

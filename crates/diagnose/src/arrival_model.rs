@@ -3,10 +3,12 @@
 //! The direct sound comes when it should, give or take; every later peak belongs to one of the predicted specular reflections or to none
 //! (a mixture of normal distributions about the predicted times and an even background).
 
+mod sought;
+
 use crate::effect::{Case, Nuisance};
 use crate::energy_model::Placed;
 use crate::gauss_newton::{Maximum, Model, Prior, Slopes, maximise};
-use crate::measured::{Measured, PEAKS_S};
+use crate::measured::{Measured, PEAK_FLOOR_DB, PEAKS_S};
 use crate::traced_pair::Arrival;
 use crate::views::ArrivalView;
 use crate::{Error, Survey};
@@ -18,6 +20,10 @@ const DIRECT_SD_S: f64 = 2.5e-5;
 const REFLECTION_SD_S: f64 = 5e-5;
 /// Share of peaks that belong to no predicted reflection.
 const STRAY_SHARE: f64 = 0.4;
+/// Share of all peaks' worth that one peak has in which a surface that the mesh lacks is seen: two of three responses show it.
+const SEEN_SHARE: f64 = 0.65;
+/// Height of such a peak about what reflectance and distance give: its neighbours, and colour, in dB.
+const HEIGHT_SD_DB: f64 = 2.5;
 /// Share of direct sounds whose time was misread.
 const MISREAD_SHARE: f64 = 0.02;
 /// Times at which the fit starts to look for partners of a peak, and how it narrows.
@@ -191,18 +197,40 @@ impl<'a> ArrivalModel<'a> {
         }
         let times: Vec<(f64, Vec<(usize, f64)>)> =
             later.iter().map(|a| self.time(values, pair, a, true)).collect();
-        for peak in &measured.peaks_s {
+        let more = self.more(values, pair);
+        let each = SEEN_SHARE / measured.peaks_s.len().max(1) as f64;
+        let rest = 1.0 - each * more.len() as f64;
+        for (peak, height_db) in measured.peaks_s.iter().zip(&measured.peaks_db) {
             let densities: Vec<f64> = later
                 .iter()
                 .zip(&times)
-                .map(|(a, (t, _))| (1.0 - STRAY_SHARE) * a.energy.sqrt() / amplitude * normal(peak - t, sd))
+                .map(|(a, (t, _))| {
+                    rest * (1.0 - STRAY_SHARE) * a.energy.sqrt() / amplitude * normal(peak - t, sd)
+                })
                 .collect();
-            let total = densities.iter().sum::<f64>() + STRAY_SHARE / PEAKS_S;
+            // Heights of other peaks say nothing: anything down to the floor is as probable.
+            let added: Vec<f64> = more
+                .iter()
+                .map(|m| {
+                    each * normal(peak - m.time_s, sd)
+                        * normal(height_db - m.level_db, HEIGHT_SD_DB)
+                        * PEAK_FLOOR_DB
+                })
+                .collect();
+            let stray = rest * STRAY_SHARE / PEAKS_S;
+            let total = densities.iter().sum::<f64>() + added.iter().sum::<f64>() + stray;
             value += total.ln();
             for (density, (t, found)) in densities.iter().zip(&times) {
                 let share = density / total;
                 if share > 1e-3 {
                     push(found, peak - t, sd, share);
+                }
+            }
+            for (density, m) in added.iter().zip(&more) {
+                let share = density / total;
+                if share > 1e-3 {
+                    push(&m.slopes, peak - m.time_s, sd, share);
+                    push(&m.level_slopes, height_db - m.level_db, HEIGHT_SD_DB, share);
                 }
             }
         }
@@ -233,6 +261,9 @@ pub(crate) fn fit(
     cases: &[&dyn Case],
     used: &[bool],
 ) -> Result<(Maximum, Vec<usize>), Error> {
+    if let Some(place) = cases.iter().rposition(|c| c.seeks()) {
+        return sought::fit(data, cases, used, place);
+    }
     let mut model = ArrivalModel::new(data, cases, used);
     let start: Vec<f64> = model.priors.iter().map(|p| p.mean).collect();
     let mut best: Option<Maximum> = None;

@@ -1,6 +1,6 @@
 //! A named physical cause of a misfit, and the cases in which it can come.
 
-use crate::{ArrivalView, BandView, Dimensions, Survey};
+use crate::{ArrivalView, BandView, Dimensions, FoundParameter, Gate, StrayPeaks, Survey};
 
 /// A parameter of an effect.
 #[derive(Clone, Debug, PartialEq)]
@@ -87,6 +87,28 @@ pub enum Stage {
     Recorder,
 }
 
+/// What single reflections say for a cause.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OwnEvidence {
+    /// Logarithm of how much more probable they are with the cause than without, its parameters summed over.
+    pub nats: f64,
+    /// Its parameters as they and the fit together give them.
+    pub parameters: Vec<FoundParameter>,
+}
+
+/// A reflection that the mesh does not have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MoreArrival {
+    /// Length of its path in metres.
+    pub length_m: f64,
+    /// Unit vector in which it leaves the source.
+    pub departure: [f64; 3],
+    /// Unit vector from the receiver towards where it comes from.
+    pub arrival: [f64; 3],
+    /// Height of its peak over that of the direct sound, in dB.
+    pub level_db: f64,
+}
+
 /// A named physical cause: an entry of the catalogue.
 ///
 /// To add one, implement this and [`Case`], and hand it to [`Diagnoser::with_effects`](crate::Diagnoser::with_effects) beside
@@ -135,6 +157,36 @@ pub trait Case: Send + Sync {
     /// Seconds by which an arrival comes later.
     fn delay_s(&self, _values: &[f64], _arrival: &ArrivalView<'_>) -> f64 {
         0.0
+    }
+
+    /// A reflection that it adds to a response (index).
+    fn more_arrival(&self, _values: &[f64], _survey: &Survey, _response: usize) -> Option<MoreArrival> {
+        None
+    }
+
+    /// Whether its fit must start from what peaks say: then [`Case::starts_among`] gives the starts.
+    fn seeks(&self) -> bool {
+        false
+    }
+
+    /// Values to start from, given the peaks that nothing predicted explains.
+    fn starts_among(&self, _strays: &StrayPeaks<'_>) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
+
+    /// The flat surface (index among [`Survey::planes`]) in which it is.
+    fn plane(&self) -> Option<usize> {
+        None
+    }
+
+    /// Whether single reflections weigh it: then [`Case::among_gates`] says how much.
+    fn weighs_gates(&self) -> bool {
+        false
+    }
+
+    /// What single reflections say for it, given its parameters (value and standard deviation) from the fit of the decays.
+    fn among_gates(&self, _own: &[(f64, f64)], _gates: &[Gate]) -> Option<OwnEvidence> {
+        None
     }
 
     /// Kelvin by which the air is warmer than stated: once the case is named, paths are taken at that temperature.

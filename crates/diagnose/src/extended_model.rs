@@ -66,6 +66,20 @@ pub struct ExtendedModel {
     /// Responses that were exchanged.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub exchanged: Vec<[String; 2]>,
+    /// Flat surfaces that the mesh lacks.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sheets: Vec<Sheet>,
+}
+
+/// A flat rectangle that reflects on both sides: a panel, or (just before its wall, absorbing all) a hole.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct Sheet {
+    /// Its corners in order, in metres.
+    pub corners_m: [[f64; 3]; 4],
+    /// Absorption, the same in all octaves, 0 to 1; it does not scatter.
+    pub absorption: f64,
 }
 
 /// The second decay of a coupled volume.

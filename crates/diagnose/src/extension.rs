@@ -4,6 +4,7 @@ use crate::effect::{Evidence, Nuisance};
 use crate::extended_model::{CoupledDecay, ExtendedModel};
 use crate::found_parameters::{parameters, place_of};
 use crate::search::{Search, State};
+use crate::sheets;
 use crate::traced_pair::scattering_more;
 use crate::workbench::Workbench;
 use crate::{SourceDirectivity, TransducerResponse};
@@ -86,6 +87,14 @@ pub(crate) fn extended_model(bench: &Workbench, search: &Search<'_>, state: &Sta
             "sound_speed" => model.temperature_c = Some(values[0]),
             "sampling_clock" => model.clock_ppm = Some(values[0]),
             "room_dimensions" => model.dimensions = case.resized(&values),
+            "extra_reflector" => model.sheets.extend(sheets::panel(search, state, &values)),
+            "open_patch" => {
+                let inside = survey.sources[survey.responses[0].source].position_m;
+                if let Some(plane) = case.plane().and_then(|p| survey.planes.get(p)) {
+                    let found = parameters(search, state, candidate);
+                    model.sheets.extend(sheets::hole(plane, inside, &found));
+                }
+            }
             "time_zero" => model.latency_s = Some(1e-3 * values[0]),
             "position_error" => {
                 let offset: Vec<f64> = parameters(search, state, candidate).iter().map(|p| p.value).collect();

@@ -3,6 +3,7 @@
 use crate::diagnosis::FoundParameter;
 use crate::effect::{Evidence, Nuisance};
 use crate::gauss_newton::Maximum;
+use crate::own_evidence::merged;
 use crate::search::{Search, State};
 
 /// Half the width of a 90 % interval in standard deviations.
@@ -23,6 +24,7 @@ pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -
         });
     };
     let (maximum, first) = place_of(search, state, candidate);
+    let own = state.own.iter().find(|(c, _)| *c == candidate);
     for (i, p) in case.parameters(&bench.survey).into_iter().enumerate() {
         push(p.name, maximum.values[first + i], maximum.sd(first + i), p.bounds, p.unit);
     }
@@ -54,7 +56,10 @@ pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -
             }
         }
     }
-    found
+    match own {
+        Some((_, own)) => merged(found, &own.parameters),
+        None => found,
+    }
 }
 
 /// The fit that holds the parameters of a candidate, and where they start.

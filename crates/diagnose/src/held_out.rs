@@ -4,6 +4,8 @@ use crate::Error;
 use crate::diagnosis::{DecayCurves, HeldOut, HeldOutGain};
 use crate::effect::{Case, Evidence};
 use crate::energy_model::Before;
+use crate::gauss_newton::Maximum;
+use crate::own_evidence::{self, Fitted};
 use crate::prediction::{Compared, Errors, compare, decay_db};
 use crate::search::{Search, State};
 use crate::workbench::Workbench;
@@ -104,14 +106,20 @@ pub(crate) fn predict(
                     let arrivals = search.cases_of(chosen, Evidence::Arrivals);
                     let firsts: &[usize] = if *chosen == *state.chosen { &state.energy_firsts } else { &[] };
                     let before = Before { values: &state.energy.values, firsts };
-                    let fitted = bench.fit_energy(&cases, used, Some(before))?.0;
+                    let (fitted, firsts) = bench.fit_energy(&cases, used, Some(before))?;
                     let with = bench.fit_energy(&cases, &whole, Some(before))?.0;
                     let energy = with.log_evidence - fitted.log_evidence;
-                    let times = bench.fit_arrivals(&arrivals, &whole)?.0.log_evidence
-                        - bench.fit_arrivals(&arrivals, used)?.0.log_evidence;
+                    let all_times = bench.fit_arrivals(&arrivals, &whole)?.0;
+                    let seen_times = bench.fit_arrivals(&arrivals, used)?.0;
+                    let times = all_times.log_evidence - seen_times.log_evidence;
+                    let single = |energy: &Maximum, arrivals: &Maximum, used: &[bool]| {
+                        let fitted = Fitted { energy, energy_firsts: &firsts, arrivals };
+                        own_evidence::sum(&own_evidence::own(search, chosen, fitted, used))
+                    };
+                    let singles = single(&with, &all_times, &whole) - single(&fitted, &seen_times, used);
                     let all = search.all_cases(chosen);
                     let signs = bench.polarity(&all, &whole) - bench.polarity(&all, used);
-                    Ok((energy + times + signs, compare(bench, &cases, &fitted.values, pairs)))
+                    Ok((energy + times + signs + singles, compare(bench, &cases, &fitted.values, pairs)))
                 };
             let (base, before) = predictive(&[], None)?;
             let (free, discrepant) = predictive(&[], Some(&free))?;

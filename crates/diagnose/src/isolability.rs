@@ -173,6 +173,10 @@ pub(crate) fn would_decide(a: &str, b: &str) -> &'static str {
         "Measure two distances with a laser: between the far walls, and from the loudspeaker to a microphone."
     } else if has("channel_fault") {
         "Exchange the microphone's cable and channel with a neighbour's and measure again."
+    } else if has("open_patch") {
+        "Close what may be open and measure again, or measure where other first reflections meet that wall."
+    } else if has("extra_reflector") {
+        "Take out (or cover) what stands in the room and measure again."
     } else if has("scattering") {
         "Measure at more positions, some of them close to the walls."
     } else {

@@ -9,14 +9,14 @@
 //! # How
 //! Decays are compared as energy in octaves and time bins, relative to the direct sound; each bin with the spread that interference of
 //! the traced paths and their Monte-Carlo error give it. Arrival times of the direct sound and of early reflections are compared
-//! by themselves. Absorption stays free within its stated uncertainty beside every cause, gains, latencies and places within
+//! by themselves; so is the energy of single first reflections, for holes in walls. Absorption stays free within its stated uncertainty beside every cause, gains, latencies and places within
 //! theirs: otherwise a cause is credited with what absorption could have explained. Each cause is weighed by its evidence, all
 //! parameters integrated out, against every other and against a smooth discrepancy without a name; details at [`Diagnoser`], the
 //! reasoning in `docs/explanation/diagnosis.md`.
 //!
 //! # Does not
 //! - see what is not in its [`catalogue`]: then the verdict is [`Verdict::Unexplained`] and the residuals show where it sits.
-//! - diffract, solve waves, or find missing surfaces: the six effects of the catalogue that need it are not built.
+//! - diffract or solve waves: effects that need it are not built.
 //! - change scattering, geometry or air to make a fit look better: only what is named changes.
 //! - tell apart what the data cannot: a sampling clock and a temperature scale all times alike, and come out as a set.
 //!
@@ -45,6 +45,7 @@
 //! | claim | test |
 //! |---|---|
 //! | hidden effects are named, null rooms are not | `tests/hidden_effects.rs` |
+//! | panels and holes are found and located | `tests/hidden_surfaces.rs` |
 //! | evidence and bounds of the fit against closed forms | unit tests of the fit |
 //! | spread, groups of paths, octave shares against closed forms | unit tests of their modules |
 //! | rendering from the extended model against closed forms | `tests/rendering.rs` |
@@ -54,6 +55,7 @@
 //! # References
 //! - D. J. C. MacKay: Information Theory, Inference, and Learning Algorithms, 2003, chapters 27 and 28 (evidence, Laplace).
 //! - H. Kuttruff: Room Acoustics, 6th edition, 2017 (statistics of responses).
+//! - I. Dokmanić et al.: Acoustic echoes reveal room shape. PNAS 110, 2013 (images from distances).
 //! - J. B. Allen, D. A. Berkley: Image method for efficiently simulating small-room acoustics. JASA 65, 1979.
 
 mod arrival_model;
@@ -69,6 +71,7 @@ mod error;
 mod extended_model;
 mod extension;
 mod found_parameters;
+mod gates;
 mod gauss_newton;
 mod held_out;
 mod hit_groups;
@@ -76,14 +79,18 @@ mod isolability;
 mod kernel;
 mod lack_of_fit;
 mod measured;
+mod multilateration;
 mod naming;
 mod notes;
+mod own_evidence;
+mod planes;
 mod polarity;
 mod prediction;
 mod recording_chain;
 mod rendering;
 mod residual_map;
 mod search;
+mod sheets;
 mod survey;
 mod traced_pair;
 mod traced_room;
@@ -96,10 +103,13 @@ pub use diagnosis::{
     CandidateScore, Cause, DecayCurves, Diagnosis, FittedMaterial, FoundParameter, HeldOut, HeldOutGain,
     Isolability, LackOfFit, ResidualCell, Verdict,
 };
-pub use effect::{Case, Effect, Evidence, Nuisance, Parameter, Stage};
+pub use effect::{Case, Effect, Evidence, MoreArrival, Nuisance, OwnEvidence, Parameter, Stage};
 pub use effects::*;
 pub use error::Error;
-pub use extended_model::{CoupledDecay, Dimensions, ExtendedModel};
+pub use extended_model::{CoupledDecay, Dimensions, ExtendedModel, Sheet};
+pub use gates::Gate;
+pub use multilateration::{StrayPeak, StrayPeaks};
+pub use planes::Plane;
 pub use rendering::ExtendedRoom;
 pub use survey::{Place, Survey, SurveyedResponse};
 pub use views::{ArrivalView, BandView};

@@ -1,6 +1,7 @@
 //! What is read from one measured response.
 
 use crate::bins::Bins;
+use crate::gates::{self, EarlySamples};
 use crate::kernel::BandKernel;
 use sabine_acoustics::{FilterBank, ImpulseResponse, NoReading, OctaveBands, Onset};
 
@@ -8,8 +9,10 @@ use sabine_acoustics::{FilterBank, ImpulseResponse, NoReading, OctaveBands, Onse
 const DIRECT_S: f64 = 0.8e-3;
 /// Peaks are looked for so long after the direct sound.
 pub(crate) const PEAKS_S: f64 = 0.04;
+/// Early samples begin so long before the direct sound.
+const BEFORE_S: f64 = 2e-3;
 /// Peaks this far below the direct sound are not trusted.
-const PEAK_FLOOR_DB: f64 = 26.0;
+pub(crate) const PEAK_FLOOR_DB: f64 = 26.0;
 /// Peaks closer than this are one.
 const PEAK_DISTANCE_S: f64 = 0.4e-3;
 /// Most peaks of a response.
@@ -28,6 +31,10 @@ pub(crate) struct Measured {
     pub direct_s: f64,
     /// Later peaks, in seconds from the first sample.
     pub peaks_s: Vec<f64>,
+    /// Their heights over that of the direct sound, in dB.
+    pub peaks_db: Vec<f64>,
+    /// Early energy of the octaves in which single reflections can be told apart.
+    pub early: EarlySamples,
     /// Samples about the direct peak.
     pub pulse: Vec<f64>,
     pub sample_rate_hz: u32,
@@ -63,12 +70,18 @@ impl Measured {
                 })
             })
             .collect();
+        let mut early = EarlySamples::new(bands.len(), direct_s - BEFORE_S, rate);
+        for (band, samples) in filtered.values().iter().enumerate() {
+            if bank.is_complete(band) && bands.nominal_hz(band) >= gates::LOWEST_HZ {
+                early.fill(band, samples, BEFORE_S + PEAKS_S, kernels[band].energy);
+            }
+        }
         let half = (PULSE_S * rate).round() as usize;
         let pulse = (direct.saturating_sub(half)..=direct + half)
             .map(|i| samples.get(i).copied().map_or(0.0, f64::from))
             .collect();
-        let peaks_s = peaks(&smooth, direct, rate);
-        Ok(Self { energies, direct_s, peaks_s, pulse, sample_rate_hz, duration_s })
+        let (peaks_s, peaks_db) = peaks(&smooth, direct, rate);
+        Ok(Self { energies, direct_s, peaks_s, peaks_db, early, pulse, sample_rate_hz, duration_s })
     }
 
     /// Likeness of the direct pulses of two responses, -1 to 1, at the best of small lags.
@@ -136,7 +149,8 @@ fn vertex(values: &[f64], at: usize) -> f64 {
     at as f64 + if curvature < -1e-12 { (0.5 * (a - c) / curvature).clamp(-0.5, 0.5) } else { 0.0 }
 }
 
-fn peaks(smooth: &[f64], direct: usize, rate: f64) -> Vec<f64> {
+/// Times in seconds and heights in dB over the direct sound.
+fn peaks(smooth: &[f64], direct: usize, rate: f64) -> (Vec<f64>, Vec<f64>) {
     let apart = PEAK_DISTANCE_S * rate;
     let end = (direct + (PEAKS_S * rate) as usize).min(smooth.len().saturating_sub(1));
     let floor = smooth[direct] * 10f64.powf(-PEAK_FLOOR_DB / 10.0);
@@ -151,5 +165,7 @@ fn peaks(smooth: &[f64], direct: usize, rate: f64) -> Vec<f64> {
         }
     }
     kept.sort_unstable();
-    kept.into_iter().map(|k| vertex(smooth, k) / rate).collect()
+    let height_db = |k: &usize| 10.0 * (smooth[*k] / smooth[direct]).log10();
+    let heights = kept.iter().map(height_db).collect();
+    (kept.into_iter().map(|k| vertex(smooth, k) / rate).collect(), heights)
 }

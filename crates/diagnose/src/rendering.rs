@@ -3,8 +3,8 @@
 use crate::recording_chain::RecordingChain;
 use crate::{Error, ExtendedModel};
 use sabine_acoustics::{
-    Air, Conditions, Directivity, Error as Cause, ImpulseResponse, Material, MeasuredRoom, OctaveBands,
-    Orientation, PerBand, Receiver, Scene, Source, write_atomically,
+    Air, Conditions, Directivity, Error as Cause, ImpulseResponse, Material, MeasuredRoom, NamedMaterial,
+    OctaveBands, Orientation, PerBand, Receiver, Scene, Source, Triangle, write_atomically,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
@@ -181,9 +181,31 @@ impl ExtendedModel {
     }
 
     fn scene(&self, stated: &Scene, materials: Vec<Material>) -> Result<Scene, Cause> {
-        let scene = stated.with_materials(materials)?;
+        let scene = self.with_sheets(stated.with_materials(materials)?)?;
         let Some(change) = &self.dimensions else { return Ok(scene) };
         change.applied(&scene)
+    }
+
+    /// The scene with the sheets in it, each of a material of its own.
+    fn with_sheets(&self, scene: Scene) -> Result<Scene, Cause> {
+        if self.sheets.is_empty() {
+            return Ok(scene);
+        }
+        let bands = scene.materials()[0].material.bands();
+        let (mut vertices, mut triangles) = (scene.vertices().to_vec(), scene.triangles().to_vec());
+        let mut materials = scene.materials().to_vec();
+        for (number, sheet) in self.sheets.iter().enumerate() {
+            let (first, material) = (vertices.len() as u32, materials.len() as u32);
+            vertices.extend(sheet.corners_m);
+            for corners in [[0, 1, 2], [0, 2, 3]] {
+                triangles.push(Triangle { vertices: corners.map(|c| first + c), material });
+            }
+            materials.push(NamedMaterial {
+                name: format!("sheet_{}", number + 1),
+                material: Material::uniform(bands, sheet.absorption, 0.0)?,
+            });
+        }
+        Scene::new(vertices, triangles, materials)
     }
 
     fn pattern(
@@ -245,6 +267,11 @@ impl ExtendedModel {
         }
         for (name, &gain) in &self.response_gain_db {
             check.each(&format!("response_gain_db.{name}"), &[gain], (-200.0, 200.0), "within 200 dB")?;
+        }
+        for sheet in &self.sheets {
+            let corners = sheet.corners_m.as_flattened();
+            check.each("sheets.corners_m", corners, (-1e5, 1e5), "a finite coordinate")?;
+            check.each("sheets.absorption", &[sheet.absorption], (0.0, 1.0), "between 0 and 1")?;
         }
         for (field, values, limits, range) in [
             (

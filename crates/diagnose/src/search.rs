@@ -1,9 +1,11 @@
 //! Which causes the data speak for.
 
 use crate::Error;
+use crate::OwnEvidence;
 use crate::effect::{Case, Effect, Evidence, Nuisance};
 use crate::energy_model::Before;
 use crate::gauss_newton::Maximum;
+use crate::own_evidence::{self, Fitted};
 use crate::workbench::Workbench;
 use rayon::prelude::*;
 use sabine_acoustics::{Observer, report};
@@ -39,6 +41,8 @@ pub(crate) struct State {
     pub energy: Maximum,
     pub arrivals: Maximum,
     pub polarity: f64,
+    /// What single reflections say for chosen candidates.
+    pub own: Vec<(usize, OwnEvidence)>,
     /// Where the parameters of each chosen case that bears on decays start, and of each that bears on arrivals.
     pub energy_firsts: Vec<usize>,
     pub arrival_firsts: Vec<usize>,
@@ -58,7 +62,7 @@ impl State {
     }
 
     pub fn log_evidence(&self) -> f64 {
-        self.energy.log_evidence + self.arrivals.log_evidence + self.polarity
+        self.energy.log_evidence + self.arrivals.log_evidence + self.polarity + own_evidence::sum(&self.own)
     }
 }
 
@@ -106,7 +110,9 @@ impl<'a> Search<'a> {
         let cases = self.cases_of(chosen, Evidence::Arrivals);
         let (arrivals, arrival_firsts) = self.bench.fit_arrivals(&cases, &self.used)?;
         let polarity = self.bench.polarity(&self.all_cases(chosen), &self.used);
-        Ok(State { chosen: chosen.to_vec(), energy, arrivals, polarity, energy_firsts, arrival_firsts })
+        let fitted = Fitted { energy: &energy, energy_firsts: &energy_firsts, arrivals: &arrivals };
+        let own = own_evidence::own(self, chosen, fitted, &self.used);
+        Ok(State { chosen: chosen.to_vec(), energy, arrivals, polarity, own, energy_firsts, arrival_firsts })
     }
 
     pub fn all_cases(&self, chosen: &[usize]) -> Vec<&'a dyn Case> {
@@ -133,6 +139,9 @@ impl<'a> Search<'a> {
         if turned {
             next.polarity = self.bench.polarity(&self.all_cases(&next.chosen), &self.used);
         }
+        let fitted =
+            Fitted { energy: &next.energy, energy_firsts: &next.energy_firsts, arrivals: &next.arrivals };
+        next.own = own_evidence::own(self, &next.chosen, fitted, &self.used);
         Ok(next)
     }
 

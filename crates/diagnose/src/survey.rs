@@ -1,5 +1,6 @@
 //! What was measured, as effects see it.
 
+use crate::Plane;
 use sabine_acoustics::{Air, Measurement, OctaveBands};
 
 /// One response of the survey.
@@ -45,6 +46,8 @@ pub struct Survey {
     pub(crate) responses: Vec<SurveyedResponse>,
     pub(crate) box_m: [[f64; 3]; 2],
     pub(crate) declared_scattering: f64,
+    pub(crate) planes: Vec<Plane>,
+    pub(crate) material_areas_m2: Vec<f64>,
 }
 
 impl Survey {
@@ -91,6 +94,16 @@ impl Survey {
     /// Two opposite corners of the mesh, in metres.
     pub fn box_m(&self) -> [[f64; 3]; 2] {
         self.box_m
+    }
+
+    /// The largest flat surfaces of the mesh.
+    pub fn planes(&self) -> &[Plane] {
+        &self.planes
+    }
+
+    /// Area of a material in square metres.
+    pub fn material_area_m2(&self, material: usize) -> f64 {
+        self.material_areas_m2[material]
     }
 
     /// Octaves from 1 kHz to a band: -3 for 125 Hz.

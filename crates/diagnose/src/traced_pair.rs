@@ -1,5 +1,9 @@
 //! Traced paths between one source and one receiver, and the energies that they predict.
 
+mod singles;
+
+pub(crate) use singles::Single;
+
 use crate::bins::Bins;
 use crate::hit_groups;
 use crate::kernel::BandKernel;

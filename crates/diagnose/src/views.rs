@@ -77,6 +77,12 @@ impl BandView<'_> {
         (self.state.departure[bin], self.state.departure_products[bin])
     }
 
+    /// Natural logarithm of the change of a bin's energy if each meeting with a material left less, by this logarithm of the share.
+    pub fn change_by_hits(&self, bin: usize, material: usize, ln_kept: f64) -> f64 {
+        let materials = self.survey.materials.len();
+        crate::own_evidence::change_by_hits(self.state, materials, bin, material, ln_kept)
+    }
+
     /// Natural logarithm of the change of a bin's energy if the surfaces scattered more by `extra` (0 to 0.9, share of what
     /// they now reflect specularly) or less (-1 to 0, share of what they now scatter).
     pub fn scattering_change(&self, bin: usize, extra: f64) -> f64 {

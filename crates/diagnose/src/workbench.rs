@@ -9,7 +9,7 @@ use crate::gauss_newton::{Maximum, Prior};
 use crate::kernel::BandKernel;
 use crate::measured::{Measured, PEAKS_S};
 use crate::survey::{Place, Survey, SurveyedResponse};
-use crate::traced_pair::{Arrival, BandState, CELL_S, TracedPair};
+use crate::traced_pair::{Arrival, BandState, CELL_S, Single, TracedPair};
 use crate::traced_room::{prepare, trace, traced_s};
 use crate::{DiagnoseConfig, Error};
 use rayon::prelude::*;
@@ -41,6 +41,8 @@ pub(crate) struct Workbench {
     pub absorption: Vec<Vec<f64>>,
     pub states: Vec<Vec<BandState>>,
     pub ends: Vec<Vec<usize>>,
+    /// Early exact paths of each pair, and their energies by band.
+    pub singles: Vec<(Vec<Single>, Vec<BandState>)>,
     pub direct_s: Vec<f64>,
     pub speed_m_s: Vec<f64>,
     pub arrivals: Vec<Vec<Arrival>>,
@@ -121,7 +123,10 @@ impl Workbench {
         };
         let materials: Vec<Material> = room.scene().materials().iter().map(|m| m.material.clone()).collect();
         let scatterings: Vec<f64> = materials.iter().flat_map(|m| m.scattering().values().to_vec()).collect();
+        let (planes, material_areas_m2) = crate::planes::planes(room.scene());
         let survey = Survey {
+            planes,
+            material_areas_m2,
             bands,
             air: room.air(),
             air_assumed: room.air_assumed(),
@@ -167,6 +172,7 @@ impl Workbench {
             kernels,
             absorption,
             states: Vec::new(),
+            singles: Vec::new(),
             ends: Vec::new(),
             arrivals: Vec::new(),
             reference: Vec::new(),
@@ -200,6 +206,10 @@ impl Workbench {
         let materials = self.expanded_materials()?;
         let one = |pair: &TracedPair| pair.expand(&materials, &self.kernels, self.traced_s, scattering);
         self.states = self.pairs.par_iter().map(one).collect::<Result<_, _>>()?;
+        if scattering {
+            let one = |pair: &TracedPair| pair.singles(&materials, PEAKS_S);
+            self.singles = self.pairs.par_iter().map(one).collect::<Result<_, _>>()?;
+        }
         let bands = self.survey.bands.len();
         self.ends = self
             .states

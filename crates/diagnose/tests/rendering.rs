@@ -71,6 +71,25 @@ fn room_of_fixture() -> (MeasuredRoom, ImpulseResponse) {
     (room, response.unwrap())
 }
 
+/// A level sheet 0.8 m below the talker and 0.6 m below the microphone: its image is 1.4 m lower.
+#[test]
+fn a_sheet_reflects_where_its_image_says() {
+    let text = "[[sheets]]\nabsorption = 0.2\ncorners_m = [[3.4, 1.2, 0.7], [5.0, 1.2, 0.7], [5.0, 3.0, 0.7], [3.4, 3.0, 0.7]]\n";
+    let stated = fixture();
+    let room = extended(text).measured_room(&stated).unwrap();
+    assert_eq!(room.scene().materials().len(), stated.scene().materials().len() + 1);
+    let config = TracerConfig { rays: 500, duration_s: 0.1, ..TracerConfig::default() };
+    let tracer = PathTracer::new(config).unwrap();
+    let away_m = (4.6f64.powi(2) + 1.1f64.powi(2) + 1.4f64.powi(2)).sqrt();
+    let found = |room: &MeasuredRoom| {
+        let (source, receiver) = (&room.sources()[0], &room.receivers()[0]);
+        let paths = tracer.trace(room.scene(), source, receiver, &room.air(), &()).unwrap();
+        let near = |i: &usize| paths.is_exact(*i) && (f64::from(paths.lengths_m()[*i]) - away_m).abs() < 1e-3;
+        (0..paths.len()).filter(near).count()
+    };
+    assert_eq!((found(&room), found(&stated)), (1, 0));
+}
+
 #[test]
 fn a_model_that_changes_nothing_changes_nothing() {
     let (_, response) = room_of_fixture();

@@ -25,7 +25,10 @@ mod config;
 mod coupled_tail;
 mod hidden;
 mod image_field;
+mod missing_surfaces;
 mod noise;
+mod panel;
+mod patch;
 mod random_room;
 mod recorder;
 mod scattered_field;
@@ -33,6 +36,7 @@ mod steep_bands;
 mod stream;
 mod truth;
 mod typical;
+mod unfolded;
 
 pub use config::LabConfig;
 pub use hidden::{End, Fault, Gap, Hidden};

@@ -1,15 +1,16 @@
 //! A measured room that is believed to be another than its file says.
 
 use super::MeasuredRoom;
-use crate::{Air, Error, Receiver, Scene, Source};
+use crate::{Air, Error, MaterialPrior, PerBand, Receiver, Scene, Source};
 
 impl MeasuredRoom {
     /// The same measurement with another model of the room: materials, mesh, air and places may differ, names may not.
-    /// Priors and responses stay as they are.
+    /// Further materials may follow those of the room; they are trusted as far as tables are
+    /// ([`MaterialPrior::TABLE_SD`]). Other priors and the responses stay as they are.
     ///
     /// # Errors
-    /// [`Error::MaterialCount`] and [`Error::UnknownId`] for materials, sources or receivers of other names or in another
-    /// order.
+    /// [`Error::MaterialCount`] for fewer materials; [`Error::UnknownId`] for materials, sources or receivers of other names or in
+    /// another order.
     pub fn with_model(
         &self,
         scene: Scene,
@@ -18,14 +19,14 @@ impl MeasuredRoom {
         receivers: Vec<Receiver>,
     ) -> Result<Self, Error> {
         let (expected, found) = (self.scene.materials().len(), scene.materials().len());
-        if expected != found {
+        if expected > found {
             return Err(Error::MaterialCount { expected, found });
         }
         let names = |scene: &Scene| scene.materials().iter().map(|m| m.name.clone()).collect::<Vec<_>>();
         let of_sources = |all: &[Source]| all.iter().map(|s| s.id.clone()).collect::<Vec<_>>();
         let of_receivers = |all: &[Receiver]| all.iter().map(|r| r.id.clone()).collect::<Vec<_>>();
         for (own, other) in [
-            (names(&self.scene), names(&scene)),
+            (names(&self.scene), names(&scene)[..expected].to_vec()),
             (of_sources(&self.sources), of_sources(&sources)),
             (of_receivers(&self.receivers), of_receivers(&receivers)),
         ] {
@@ -34,7 +35,13 @@ impl MeasuredRoom {
                 return Err(Error::UnknownId { id: id.clone() });
             }
         }
-        Ok(Self { scene, air, sources, receivers, ..self.clone() })
+        let mut priors = self.priors.clone();
+        priors.extend(scene.materials()[expected..].iter().map(|more| {
+            let absorption = more.material.absorption().clone();
+            let absorption_sd = PerBand::uniform(absorption.bands(), MaterialPrior::TABLE_SD);
+            MaterialPrior { absorption: Some(absorption), absorption_sd }
+        }));
+        Ok(Self { scene, air, sources, receivers, priors, ..self.clone() })
     }
 }
 
@@ -52,6 +59,14 @@ mod tests {
         let other = room.with_model(scene, air, sources.clone(), receivers).unwrap();
         assert_eq!(other.sources(), sources);
         assert_eq!(other.responses(), room.responses());
+        let (scene, air, sources, receivers) = parts();
+        let mut materials = scene.materials().to_vec();
+        materials.push(crate::NamedMaterial { name: "more".into(), ..materials[0].clone() });
+        let more = Scene::new(scene.vertices().to_vec(), scene.triangles().to_vec(), materials).unwrap();
+        let wider = room.with_model(more.clone(), air, sources.clone(), receivers.clone()).unwrap();
+        assert_eq!(wider.priors().len(), room.priors().len() + 1);
+        let fewer = wider.with_model(scene, air, sources, receivers);
+        assert!(matches!(fewer, Err(Error::MaterialCount { .. })));
         let (scene, air, sources, mut receivers) = parts();
         receivers.swap(0, 1);
         let wrong = room.with_model(scene, air, sources, receivers);

@@ -4,6 +4,8 @@ mod air_absorption;
 mod background_noise;
 mod channel_fault;
 mod coupled_volume;
+mod extra_reflector;
+mod open_patch;
 mod position_error;
 mod room_dimensions;
 mod sampling_clock;
@@ -19,6 +21,8 @@ pub use air_absorption::AirAbsorption;
 pub use background_noise::BackgroundNoise;
 pub use channel_fault::ChannelFault;
 pub use coupled_volume::CoupledVolume;
+pub use extra_reflector::ExtraReflector;
+pub use open_patch::OpenPatch;
 pub use position_error::PositionError;
 pub use room_dimensions::RoomDimensions;
 pub use sampling_clock::SamplingClock;
@@ -49,6 +53,8 @@ pub fn catalogue() -> Vec<Box<dyn Effect>> {
         Box::new(PositionError),
         Box::new(TimeZero),
         Box::new(ChannelFault),
+        Box::new(ExtraReflector),
+        Box::new(OpenPatch),
     ]
 }
 

@@ -101,6 +101,26 @@ pub enum Hidden {
         /// What.
         fault: Fault,
     },
+    /// A flat panel stands in the room that the mesh does not have.
+    ExtraReflector {
+        /// Its centre in metres.
+        centre_m: [f64; 3],
+        /// Its unit normal.
+        normal: [f64; 3],
+        /// Length of the level side and of the other, in metres.
+        size_m: [f64; 2],
+        /// Share of energy that each octave reflects on either side, 0 to 1; the rest goes through.
+        reflectance: Vec<f64>,
+    },
+    /// A rectangle of a wall is open: what meets the wall there does not come back.
+    OpenPatch {
+        /// Face of the box: x = 0, x = length, y = 0, y = width, floor, ceiling.
+        face: usize,
+        /// Centre in metres.
+        centre_m: [f64; 3],
+        /// Lengths along the two axes of the face in their order, in metres.
+        size_m: [f64; 2],
+    },
     /// Outside the catalogue: the gain swells and sinks while each response is recorded, as depth sin(2 pi t / period + phase).
     GainDrift {
         /// Greatest deviation in dB.
@@ -178,7 +198,7 @@ pub struct Gap {
 
 impl Hidden {
     /// Identifiers of the catalogue's effects.
-    pub const CATALOGUE: [&'static str; 14] = [
+    pub const CATALOGUE: [&'static str; 16] = [
         "transducer_response",
         "air_absorption",
         "source_directivity",
@@ -193,6 +213,8 @@ impl Hidden {
         "position_error",
         "time_zero",
         "channel_fault",
+        "extra_reflector",
+        "open_patch",
     ];
     /// Names of the effects that no catalogue holds.
     pub const OUTSIDE: [&'static str; 3] = ["gain_drift", "dropouts", "foreign_chirp"];
@@ -220,6 +242,8 @@ impl Hidden {
             Self::PositionError { .. } => "position_error",
             Self::TimeZero { .. } => "time_zero",
             Self::ChannelFault { .. } => "channel_fault",
+            Self::ExtraReflector { .. } => "extra_reflector",
+            Self::OpenPatch { .. } => "open_patch",
             Self::GainDrift { .. } => "gain_drift",
             Self::Dropouts { .. } => "dropouts",
             Self::ForeignChirp { .. } => "foreign_chirp",
@@ -273,6 +297,8 @@ impl Hidden {
             | Self::BackgroundNoise { .. }
             | Self::CoupledVolume { .. }
             | Self::Truncation { .. }
+            | Self::ExtraReflector { .. }
+            | Self::OpenPatch { .. }
             | Self::GainDrift { .. }
             | Self::Dropouts { .. }
             | Self::ForeignChirp { .. } => {}

@@ -1,6 +1,8 @@
 //! What mirrors send: image sources, each with a sign of its own.
 
 use super::box_decay::{BoxDecay, LANES};
+use super::panel::{self, Panel};
+use super::patch::{self, Patch};
 use super::stream::{Purpose, key, mix, unit};
 use super::truth::{Medium, Truth};
 use crate::filter::pulse;
@@ -27,7 +29,7 @@ impl Columns {
         (time_s - self.start_s) * self.rate_hz
     }
 
-    fn add_exactly(&mut self, time_s: f64, amplitudes: &[f64]) {
+    pub(crate) fn add_exactly(&mut self, time_s: f64, amplitudes: &[f64]) {
         let (first, values) = pulse(self.position(time_s));
         for (column, amplitude) in self.samples.iter_mut().zip(amplitudes) {
             for (i, value) in (first..).zip(values) {
@@ -72,6 +74,8 @@ pub(crate) fn add_images(
     let exact_s =
         (EXACT_PER_SAMPLE * columns.rate_hz * volume_m3 / (4.0 * PI * medium.speed_m_s.powi(3))).sqrt();
     let share = PULSES_PER_SAMPLE * columns.rate_hz * volume_m3 / (4.0 * PI * medium.speed_m_s);
+    let (panels, patches) = (Panel::all(truth), Patch::all(truth));
+    panel::add_reflections(truth, medium, &panels, pair, columns);
     let weights = decay.weights(medium);
     let mut row = [0.0; LANES];
     let mut amplitudes = vec![0.0; bands];
@@ -99,6 +103,10 @@ pub(crate) fn add_images(
                 if unit(hash) >= kept {
                     continue;
                 }
+                let offset = [x.offset_m, y.offset_m, z.offset_m];
+                if !patches.is_empty() && patch::is_lost(truth, &patches, receiver, offset) {
+                    continue;
+                }
                 let direct = x.index == 0 && y.index == 0 && z.index == 0;
                 // Bits that `unit` does not look at.
                 let sign = if direct || hash & 1 == 0 { 1.0 } else { -1.0 };
@@ -111,6 +119,9 @@ pub(crate) fn add_images(
                     let energy = row[b] * z.walls[b] * (-medium.exponents_per_m[b] * length_m).exp();
                     amplitudes[b] = scale * energy.sqrt() * gains[b] * source.gain(b, cosine);
                 }
+                if !panels.is_empty() && panel::concerns([x.index, y.index, z.index]) {
+                    panel::shade(truth, &panels, receiver, offset, &mut amplitudes);
+                }
                 if time_s < exact_s || kept == 1.0 {
                     columns.add_exactly(time_s, &amplitudes);
                 } else {
@@ -119,6 +130,22 @@ pub(crate) fn add_images(
             }
         }
     }
+}
+
+/// Energy that the walls leave to an image, from the logarithms of what each face mirrors.
+pub(crate) fn wall_energy(log_mirrored: &[f64; 6], index: [i64; 3]) -> f64 {
+    let one = |axis: usize| {
+        let [low, high] = times_met(index[axis]);
+        low * log_mirrored[2 * axis] + high * log_mirrored[2 * axis + 1]
+    };
+    (0..3).map(one).sum::<f64>().exp()
+}
+
+/// How often an image along one axis has met the lower wall and the upper one.
+fn times_met(index: i64) -> [f64; 2] {
+    // Beyond the upper wall an odd image has met that wall once more, and beyond the lower wall the lower.
+    let (more, fewer) = (index.unsigned_abs().div_ceil(2) as f64, (index.unsigned_abs() / 2) as f64);
+    if index > 0 { [fewer, more] } else { [more, fewer] }
 }
 
 /// The images of a source along one axis.
@@ -144,9 +171,7 @@ impl Axis {
         let image = |index: i64| {
             let turned = index % 2 != 0;
             let offset_m = index as f64 * side + if turned { side - source } else { source } - receiver;
-            // Beyond the upper wall an odd image has met that wall once more, and beyond the lower wall the lower.
-            let (more, fewer) = (index.unsigned_abs().div_ceil(2) as f64, (index.unsigned_abs() / 2) as f64);
-            let (low, high) = if index > 0 { (fewer, more) } else { (more, fewer) };
+            let [low, high] = times_met(index);
             let mut walls = [0.0; LANES];
             for (left, logs) in walls.iter_mut().zip(&mirrored) {
                 *left = (low * logs[2 * axis] + high * logs[2 * axis + 1]).exp();

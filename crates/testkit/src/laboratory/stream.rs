@@ -20,6 +20,7 @@ pub(crate) enum Purpose {
     Background,
     Chirp,
     Effect,
+    Panel,
 }
 
 /// Random numbers of a seed for one purpose, and one of many things that need them.

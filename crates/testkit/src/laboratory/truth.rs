@@ -2,6 +2,8 @@
 
 use super::config::check_range;
 use super::hidden::{End, Fault, Hidden};
+use super::panel::{self, Panel};
+use super::patch::Patch;
 use crate::own_air::{energy_exponent_per_m, speed_of_sound_m_s};
 use sabine_acoustics::{Air, Error, OctaveBands, write_atomically};
 use serde::{Deserialize, Serialize};
@@ -237,6 +239,11 @@ impl Truth {
                     exists("response", a, responses).and_then(|()| exists("response", b, responses))
                 }
             },
+            Hidden::ExtraReflector { centre_m, normal, size_m, reflectance } => {
+                each("reflectance", reflectance, 0.0, 1.0, "between 0 and 1")?;
+                panel::check(self, &Panel::new(*centre_m, *normal, *size_m, reflectance.clone()))
+            }
+            Hidden::OpenPatch { face, centre_m, size_m } => Patch::new(*face, *centre_m, *size_m).check(self),
             Hidden::GainDrift { depth_db, period_s, phase_rad } => {
                 check_range("depth (dB)", *depth_db, -40.0, 40.0, "between -40 and 40 dB")?;
                 check_range("period (s)", *period_s, 1e-3, 100.0, "between 0.001 and 100 s")?;

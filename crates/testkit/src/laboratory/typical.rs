@@ -2,6 +2,7 @@
 
 use super::box_decay::BoxDecay;
 use super::hidden::{End, Fault, Gap, Hidden};
+use super::missing_surfaces;
 use super::random_room::face_areas_m2;
 use super::stream::{Purpose, stream};
 use super::truth::Truth;
@@ -72,6 +73,8 @@ impl Hidden {
                 Self::ChannelFault { fault: Fault::Gain { response, gain_db: 10.0 * strength * sign(r) } }
             }
             "channel_fault.swap" => swap(r, truth, strength)?,
+            "extra_reflector" => missing_surfaces::extra_reflector(r, truth, strength),
+            "open_patch" => missing_surfaces::open_patch(r, truth, strength),
             "gain_drift" => Self::GainDrift {
                 depth_db: 4.0 * strength,
                 period_s: 0.15 + 0.15 * unit(r),

@@ -1,0 +1,84 @@
+//! `extra_reflector`: a flat surface that the mesh does not have.
+
+use crate::multilateration::{StrayPeaks, mirrored};
+use crate::{Case, Effect, Evidence, MoreArrival, Parameter, Survey};
+
+/// One plane more: a table, a screen, a cabinet. It is found by where it mirrors the first source (the image of any other source follows).
+/// It reflects for those pairs whose angles are equal at a place within the room; that it does so for all of them is not required,
+/// for it has edges.
+///
+/// Mark: in many responses, a peak that no predicted reflection explains; their distances meet in one image, and their levels agree.
+/// Mimicked by: a wall that stands elsewhere (`room_dimensions`), which takes its predicted reflection away.
+///
+/// The reflectance is that of the peaks' height against the direct sound: of high frequencies, where pulses are short.
+///
+/// Source: I. Dokmanić, R. Parhizkar, A. Walther, Y. M. Lu, M. Vetterli, Acoustic echoes reveal room shape, PNAS 110, 2013 (images from
+/// distances); M. A. Fischler, R. C. Bolles, Random sample consensus, CACM 24, 1981.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ExtraReflector;
+
+/// Standard deviation of an image's distance from the source along each axis, in metres.
+const IMAGE_SD_M: f64 = 2.0;
+/// Farthest image along an axis, in metres.
+const FARTHEST_M: f64 = 20.0;
+/// Usual reflectance and its spread, in dB.
+const REFLECTANCE_DB: (f64, f64) = (-3.0, 3.0);
+
+impl Effect for ExtraReflector {
+    fn id(&self) -> &'static str {
+        "extra_reflector"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "A flat surface stands in the room that its model lacks: a table, a screen, a cabinet."
+    }
+
+    fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {
+        // Three distances leave two places, a fourth decides, and fewer than five cannot contradict.
+        if survey.responses().len() >= 5 { vec![Box::new(*self)] } else { Vec::new() }
+    }
+}
+
+/// The source whose image is sought.
+fn first_m(survey: &Survey) -> [f64; 3] {
+    survey.responses().first().map_or([0.0; 3], |r| survey.sources()[r.source].position_m)
+}
+
+impl Case for ExtraReflector {
+    fn evidence(&self) -> Evidence {
+        Evidence::Arrivals
+    }
+
+    fn parameters(&self, survey: &Survey) -> Vec<Parameter> {
+        let source = first_m(survey);
+        let axis = |(name, at): (&str, f64)| {
+            let bounds = (at - FARTHEST_M, at + FARTHEST_M);
+            Parameter::new(format!("image_{name}"), "m", at, IMAGE_SD_M, bounds).typically(at + 1.0)
+        };
+        let level = Parameter::new("reflectance", "dB", REFLECTANCE_DB.0, REFLECTANCE_DB.1, (-30.0, 6.0));
+        ["x", "y", "z"].into_iter().zip(source).map(axis).chain([level]).collect()
+    }
+
+    fn seeks(&self) -> bool {
+        true
+    }
+
+    fn starts_among(&self, strays: &StrayPeaks<'_>) -> Vec<Vec<f64>> {
+        strays.images().into_iter().map(|[x, y, z]| vec![x, y, z, REFLECTANCE_DB.0]).collect()
+    }
+
+    fn more_arrival(&self, values: &[f64], survey: &Survey, response: usize) -> Option<MoreArrival> {
+        let pair = &survey.responses()[response];
+        let source = survey.sources()[pair.source].position_m;
+        let receiver = survey.receivers()[pair.receiver].position_m;
+        let image = [values[0], values[1], values[2]];
+        let way = mirrored(first_m(survey), image, source, receiver, survey.box_m())?;
+        let direct_m = (0..3).map(|k| (source[k] - receiver[k]).powi(2)).sum::<f64>().sqrt();
+        Some(MoreArrival {
+            length_m: way.length_m,
+            departure: way.departure,
+            arrival: way.arrival,
+            level_db: values[3] + 20.0 * (direct_m / way.length_m).log10(),
+        })
+    }
+}

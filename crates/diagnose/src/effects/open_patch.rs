@@ -1,0 +1,252 @@
+//! `open_patch`: a wall has a hole.
+
+use crate::{BandView, Case, Effect, FoundParameter, Gate, OwnEvidence, Parameter, Plane, Survey};
+
+/// A rectangle of one surface swallows all sound: an open door or window, a duct, a curtain before a recess. One case for each flat
+/// surface of the mesh.
+///
+/// Decays give the area (each meeting with the material survives with one less the share of its area); single first-order reflections
+/// say where it is: those whose mirror points lie in the patch are missing. The two are combined: what decays say of the area is
+/// the prior under which places and sizes are summed over.
+///
+/// Mark: the reflections of some pairs at one wall are missing, those of others are not. Mimicked by: the absorption of that wall
+/// (`surface_absorption`), which weakens all of its reflections alike; a source that hardly radiates towards the wall.
+///
+/// Source: the image of a source in a finite surface is seen only where the line to it crosses the surface (Allen and Berkley 1979; Borish 1984);
+/// edges are not sharp but blurred over some 0.15 m, half a Fresnel zone at 4 kHz.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct OpenPatch;
+
+/// Usual area in square metres: one standard deviation.
+const AREA_SD_M2: f64 = 2.0;
+/// Share of a surface that may be open at most.
+const MOST_SHARE: f64 = 0.7;
+/// Half the blur of an edge in metres.
+const EDGE_M: f64 = 0.15;
+/// Steps of the centre along each side of the surface.
+const STEPS: usize = 24;
+/// Sides of the patch relative to that of a square, and areas that are tried in square metres.
+const ASPECTS: [f64; 3] = [0.75, 1.0, 1.33];
+const AREAS_M2: [f64; 12] = [0.3, 0.5, 0.75, 1.0, 1.4, 1.8, 2.3, 2.9, 3.6, 4.4, 5.4, 6.6];
+/// Mass of the 90 % interval to either side.
+const TAIL: f64 = 0.05;
+
+impl Effect for OpenPatch {
+    fn id(&self) -> &'static str {
+        "open_patch"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "A part of a wall is open (a door, a window, a niche): sound that meets it does not come back."
+    }
+
+    fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {
+        let one = |(index, plane): (usize, &Plane)| -> Box<dyn Case> {
+            Box::new(OneWall { index, plane: plane.clone() })
+        };
+        survey.planes().iter().enumerate().map(one).collect()
+    }
+}
+
+struct OneWall {
+    index: usize,
+    plane: Plane,
+}
+
+impl Case for OneWall {
+    fn subject(&self) -> Option<String> {
+        let [x, y, z] = self.plane.place_m(self.plane.extent_m.map(|[low, high]| 0.5 * (low + high)));
+        Some(format!("surface about {x:.1}, {y:.1}, {z:.1} m"))
+    }
+
+    fn parameters(&self, _: &Survey) -> Vec<Parameter> {
+        let most = MOST_SHARE * self.plane.area_m2;
+        vec![Parameter::new("area", "m2", 0.0, AREA_SD_M2, (0.0, most)).typically(1.5f64.min(most))]
+    }
+
+    fn starts(&self, _: &Survey) -> Vec<Vec<f64>> {
+        vec![vec![0.5], vec![2.0f64.min(0.5 * self.plane.area_m2)]]
+    }
+
+    fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+        let open = (values[0] / view.survey().material_area_m2(self.plane.material)).min(0.95);
+        if open <= 0.0 {
+            return;
+        }
+        for (bin, l) in ln_energy.iter_mut().enumerate() {
+            *l += view.change_by_hits(bin, self.plane.material, (1.0 - open).ln());
+        }
+    }
+
+    fn plane(&self) -> Option<usize> {
+        Some(self.index)
+    }
+
+    fn weighs_gates(&self) -> bool {
+        true
+    }
+
+    fn among_gates(&self, own: &[(f64, f64)], gates: &[Gate]) -> Option<OwnEvidence> {
+        let here: Vec<([f64; 2], f64, f64)> = gates
+            .iter()
+            .filter(|g| g.plane == self.index)
+            .map(|g| (self.plane.within(g.place_m), g.present_nats, g.missing_nats))
+            .collect();
+        let (area, sd) = *own.first()?;
+        let base: f64 = here.iter().map(|g| g.1).sum();
+        // Logarithm of each hypothesis's weight, with its centre and area.
+        let mut all: Vec<(f64, [f64; 2], f64)> = Vec::new();
+        let mut prior_sum = 0.0;
+        for (i, &tried) in AREAS_M2.iter().enumerate() {
+            if tried > MOST_SHARE * self.plane.area_m2 {
+                break;
+            }
+            let low = if i == 0 { 0.0 } else { AREAS_M2[i - 1] };
+            let prior = (-0.5 * ((tried - area) / sd.max(0.05)).powi(2)).exp() * (tried - low);
+            let mut fitting: Vec<(f64, [f64; 2])> = Vec::new();
+            for aspect in ASPECTS {
+                let sides = [tried.sqrt() * aspect, tried.sqrt() / aspect];
+                let fits =
+                    self.plane.extent_m.iter().zip(sides).all(|([low, high], side)| side <= high - low);
+                if !fits {
+                    continue;
+                }
+                for step in 0..STEPS * STEPS {
+                    let centre: [f64; 2] = std::array::from_fn(|k| {
+                        let [low, high] = self.plane.extent_m[k];
+                        let at =
+                            ((if k == 0 { step / STEPS } else { step % STEPS }) as f64 + 0.5) / STEPS as f64;
+                        low + 0.5 * sides[k] + at * (high - low - sides[k])
+                    });
+                    let nats: f64 = here
+                        .iter()
+                        .map(|(place, present, missing)| {
+                            let inside = within(*place, centre, sides);
+                            mixed(*present, *missing, inside) - present
+                        })
+                        .sum();
+                    fitting.push((nats, centre));
+                }
+            }
+            let count = fitting.len() as f64;
+            if count > 0.0 {
+                prior_sum += prior;
+                all.extend(
+                    fitting.into_iter().map(|(nats, c)| (nats + (prior / count).max(1e-300).ln(), c, tried)),
+                );
+            }
+        }
+        let most = all.iter().map(|h| h.0).fold(f64::NEG_INFINITY, f64::max);
+        if !most.is_finite() || prior_sum <= 0.0 || !base.is_finite() {
+            return None;
+        }
+        let sum: f64 = all.iter().map(|h| (h.0 - most).exp()).sum();
+        let nats = most + sum.ln() - prior_sum.ln();
+        let weights: Vec<f64> = all.iter().map(|h| (h.0 - most).exp() / sum).collect();
+        let places: Vec<[f64; 3]> = all.iter().map(|h| self.plane.place_m(h.1)).collect();
+        let interval = |name: &str, unit: &str, value: &dyn Fn(usize) -> f64| {
+            let mut sorted: Vec<(f64, f64)> =
+                weights.iter().enumerate().map(|(i, w)| (value(i), *w)).collect();
+            sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let mean: f64 = sorted.iter().map(|(v, w)| v * w).sum();
+            let at = |mass: f64| {
+                let mut left = mass;
+                let place = sorted.iter().position(|(_, w)| {
+                    left -= w;
+                    left <= 0.0
+                });
+                sorted[place.unwrap_or(sorted.len() - 1)].0
+            };
+            FoundParameter {
+                name: name.to_owned(),
+                value: mean,
+                low: at(TAIL).min(mean),
+                high: at(1.0 - TAIL).max(mean),
+                unit: unit.to_owned(),
+            }
+        };
+        let mut parameters = vec![interval("area", "m2", &|i| all[i].2)];
+        for (k, axis) in ["x", "y", "z"].iter().enumerate() {
+            parameters.push(interval(&format!("centre_{axis}"), "m", &|i| places[i][k]));
+        }
+        Some(OwnEvidence { nats, parameters })
+    }
+}
+
+/// How much of a reflection at a place a patch takes.
+fn within(place: [f64; 2], centre: [f64; 2], sides: [f64; 2]) -> f64 {
+    (0..2)
+        .map(|k| {
+            let inside = 0.5 * sides[k] - (place[k] - centre[k]).abs();
+            (0.5 + 0.5 * inside / EDGE_M).clamp(0.0, 1.0)
+        })
+        .product()
+}
+
+/// Log-probability where it is missing with this probability.
+fn mixed(present: f64, missing: f64, inside: f64) -> f64 {
+    if inside <= 0.0 {
+        present
+    } else if inside >= 1.0 {
+        missing
+    } else {
+        crate::gates::add(present + (1.0 - inside).ln(), missing + inside.ln())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)] // a panic is how a test fails
+    use super::*;
+    use crate::planes::planes;
+    use sabine_acoustics::{Material, OctaveBands, Scene};
+
+    fn wall() -> OneWall {
+        let hard = Material::uniform(OctaveBands::T60, 0.1, 0.0).unwrap();
+        let scene = Scene::shoebox([5.0, 4.0, 3.0], std::array::from_fn(|_| hard.clone())).unwrap();
+        OneWall { index: 0, plane: planes(&scene).0[0].clone() }
+    }
+
+    fn gate(wall: &OneWall, u: f64, v: f64, missing: bool) -> Gate {
+        let [low_u, low_v] = [wall.plane.extent_m[0][0], wall.plane.extent_m[1][0]];
+        let (present_nats, missing_nats) = if missing { (-6.0, 0.0) } else { (0.0, -6.0) };
+        Gate {
+            response: 0,
+            place_m: wall.plane.place_m([low_u + u, low_v + v]),
+            plane: 0,
+            present_nats,
+            missing_nats,
+        }
+    }
+
+    #[test]
+    fn missing_neighbours_are_a_hole_and_scattered_ones_are_not() {
+        let wall = wall();
+        let own = [(2.0, 1.5)];
+        let near = [(1.0, 1.0), (1.4, 1.5), (1.6, 0.9)];
+        let far = [(2.8, 3.0), (1.2, 3.6), (2.8, 0.4), (2.9, 2.1)];
+        let hole: Vec<Gate> = near
+            .iter()
+            .map(|g| gate(&wall, g.0, g.1, true))
+            .chain(far.iter().map(|g| gate(&wall, g.0, g.1, false)))
+            .collect();
+        let found = wall.among_gates(&own, &hole).unwrap();
+        assert!(found.nats > 10.0, "{}", found.nats);
+        let centre: Vec<f64> = found.parameters[1..].iter().map(|p| p.value).collect();
+        let [u, v] = wall.plane.within([centre[0], centre[1], centre[2]]);
+        assert!(
+            (u - wall.plane.extent_m[0][0] - 1.3).abs() < 0.4
+                && (v - wall.plane.extent_m[1][0] - 1.1).abs() < 0.4
+        );
+
+        // As many are missing, but others between them are there.
+        let odd: Vec<Gate> = [(0.4, 0.4, true), (2.8, 3.6, true), (0.5, 3.5, true)]
+            .into_iter()
+            .chain([(0.5, 0.9, false), (1.5, 2.0, false), (2.6, 3.2, false), (0.8, 3.2, false)])
+            .map(|(u, v, missing)| gate(&wall, u, v, missing))
+            .collect();
+        assert!(wall.among_gates(&own, &odd).unwrap().nats < 4.0);
+        let none: Vec<Gate> = near.iter().chain(&far).map(|g| gate(&wall, g.0, g.1, false)).collect();
+        assert!(wall.among_gates(&own, &none).unwrap().nats < 0.0);
+    }
+}
