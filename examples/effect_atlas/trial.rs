@@ -106,6 +106,10 @@ impl Task {
         let found = Diagnoser::new(config)?.with_effects(effects).diagnose(&room, &[], &())?;
         let seconds = started.elapsed().as_secs_f64();
         std::fs::remove_dir_all(folder)?;
+        let outcome = outcome(&found, &hidden);
+        if outcome != Outcome::Right {
+            found.notes.iter().for_each(|note| eprintln!("  {note}"));
+        }
 
         let first = hidden.first().map(Hidden::id);
         let own = found.candidates.iter().find(|c| Some(c.effect.as_str()) == first);
@@ -124,7 +128,7 @@ impl Task {
             shams: self.shams,
             verdict: found.verdict.to_string(),
             answer: answer(&found),
-            outcome: outcome(&found, &hidden),
+            outcome,
             p_value: found.lack_of_fit.p_value,
             d_prime: own.map(|c| c.d_prime),
             nats: own.map(|c| c.nats),

@@ -21,6 +21,8 @@ const FREE_GAIN_DB: f64 = 40.0;
 const STEP: f64 = 1e-4;
 /// Starts that are followed to their top.
 const MOST_STARTS: usize = 2;
+/// Absorption from which a material that may be anything starts.
+const WIDENED_STARTS: [f64; 3] = [0.08, 0.3, 0.7];
 /// Bins in which unknown gains are first read.
 const EARLY_BINS: usize = 8;
 /// Logarithm of measured over predicted energy from which a bin's surprise grows in proportion, no longer exponentially: what no model
@@ -429,6 +431,9 @@ pub(crate) fn fit(
         model.start_gains(&mut first_start);
     }
     let mut starts: Vec<Vec<f64>> = vec![first_start];
+    // Where a material may be anything, the others that made up for it so far mislead: from what is stated of them, too.
+    let mut unstrained: Option<Vec<f64>> = None;
+    let mut more: Vec<Vec<f64>> = Vec::new();
     for (order, case) in cases.iter().enumerate() {
         let first = model.first_of(order);
         let count = case.parameters(data.survey).len();
@@ -444,12 +449,32 @@ pub(crate) fn fit(
                 })
             })
             .collect();
+        if known.is_none() {
+            for (nuisance, _) in case.widens() {
+                let Nuisance::Absorption(material) = nuisance else { continue };
+                let plain = unstrained.get_or_insert_with(|| {
+                    let mut plain = model.start(None);
+                    model.start_gains(&mut plain);
+                    plain
+                });
+                let bands = data.survey.bands.len();
+                more.extend(WIDENED_STARTS.map(|absorption| {
+                    let mut x = plain.clone();
+                    x[material * bands..(material + 1) * bands].fill(absorption);
+                    x
+                }));
+            }
+        }
     }
     // Only the most promising starts are followed.
     let mut ranked: Vec<(f64, Vec<f64>)> =
         starts.into_iter().map(|x| (model.log_likelihood(&x, None), x)).collect();
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
     ranked.truncate(MOST_STARTS);
+    let mut others: Vec<(f64, Vec<f64>)> =
+        more.into_iter().map(|x| (model.log_likelihood(&x, None), x)).collect();
+    others.sort_by(|a, b| b.0.total_cmp(&a.0));
+    ranked.extend(others.into_iter().take(MOST_STARTS));
     let mut best: Option<Maximum> = None;
     for (_, start) in ranked {
         let found = maximise(&model, &start, "decays")?;
