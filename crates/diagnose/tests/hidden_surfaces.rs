@@ -39,7 +39,7 @@ fn a_panel_that_the_mesh_lacks_is_found_and_located() {
     };
     let source = lab.sources()[0].position_m;
     let far: f64 = (0..3).map(|k| normal[k] * (source[k] - centre_m[k])).sum();
-    let found = diagnose(&lab, &[hidden.clone()]);
+    let found = diagnose(&lab, std::slice::from_ref(&hidden));
     let cause = only_cause(&found, "extra_reflector");
     for (k, name) in ["image_x", "image_y", "image_z"].into_iter().enumerate() {
         let truth = source[k] - 2.0 * far * normal[k];
@@ -59,7 +59,7 @@ fn a_hole_in_a_wall_is_found_and_located() {
     let lab = lab(750, 12);
     let hidden = Hidden::random("open_patch", 1.0, &lab, 750).unwrap();
     let Hidden::OpenPatch { face, centre_m, size_m } = hidden else { panic!("{hidden:?}") };
-    let found = diagnose(&lab, &[hidden.clone()]);
+    let found = diagnose(&lab, std::slice::from_ref(&hidden));
     let cause = only_cause(&found, "open_patch");
     let names = ["centre_x", "centre_y", "centre_z"];
     for (k, name) in names.into_iter().enumerate() {

@@ -104,7 +104,7 @@ fn first_reflections(truth: &Truth, face: usize) -> impl Iterator<Item = [f64; 3
     let axis = face / 2;
     truth.sources.iter().flat_map(move |source| {
         truth.receivers_m.iter().filter_map(move |receiver| {
-            let image = if face % 2 == 0 {
+            let image = if face.is_multiple_of(2) {
                 -source.position_m[axis]
             } else {
                 2.0 * truth.size_m[axis] - source.position_m[axis]
