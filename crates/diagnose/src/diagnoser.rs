@@ -111,27 +111,30 @@ impl Diagnoser {
         let mut state = search.state(&found.chosen, Some(&base))?;
         let fold = Folds::new(&bench, &held);
         let mut predicted = predict(&search, &state, &fold, &held, observer)?;
-        // A cause that is at work everywhere must help where it was not fitted.
-        let mut unconfirmed: Vec<&str> = Vec::new();
-        while let Some(worst) = least_confirmed(&search, &state, &predicted.gains) {
-            unconfirmed.push(search.candidates[worst].id);
-            found.drop(worst);
-            state = search.state(&found.chosen, Some(&base))?;
-            predicted = predict(&search, &state, &fold, &held, observer)?;
-        }
         let predicting_s = started.elapsed().as_secs_f64();
 
         let started = Instant::now();
         report(observer, "lack of fit", 0, 2)?;
         let lack_before = lack_of_fit::test(&bench, &[], base.before(), &used)?;
         report(observer, "lack of fit", 1, 2)?;
-        let energy_cases = search.cases_of(&state.chosen, Evidence::Energy);
-        let lack_after = if state.chosen.is_empty() {
-            None
-        } else {
-            Some(lack_of_fit::test(&bench, &energy_cases, state.before(), &used)?)
+        let lack = |state: &State| -> Result<Option<lack_of_fit::Lack>, Error> {
+            let cases = search.cases_of(&state.chosen, Evidence::Energy);
+            let test = || lack_of_fit::test(&bench, &cases, state.before(), &used);
+            (!state.chosen.is_empty()).then(test).transpose()
         };
+        let mut lack_after = lack(&state)?;
+        // Where chance does not explain what a cause that is at work everywhere leaves, the cause must help where it was not fitted.
+        let mut unconfirmed: Vec<&str> = Vec::new();
+        while lack_after.as_ref().is_some_and(|l| l.p_value < self.config.significance) {
+            let Some(worst) = least_confirmed(&search, &state, &predicted.gains) else { break };
+            unconfirmed.push(search.candidates[worst].id);
+            found.drop(worst);
+            state = search.state(&found.chosen, Some(&base))?;
+            predicted = predict(&search, &state, &fold, &held, observer)?;
+            lack_after = lack(&state)?;
+        }
         let lack_after = lack_after.as_ref().unwrap_or(&lack_before);
+        let energy_cases = search.cases_of(&state.chosen, Evidence::Energy);
         let free_alone = base.energy.log_evidence + lack_before.discrepancy_nats;
         // A name must beat the discrepancy that has none. Causes that do not bear on decays are beyond its reach.
         let beaten = !energy_cases.is_empty()
