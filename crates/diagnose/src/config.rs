@@ -39,7 +39,7 @@ impl Default for DiagnoseConfig {
             rays: 3000,
             seed: 0,
             image_order: 3,
-            range_db: 40.0,
+            range_db: 35.0,
             position_sd_m: 0.01,
             gain_sd_db: 0.4,
             naming_nats: 3.0,
