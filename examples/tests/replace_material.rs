@@ -24,7 +24,7 @@ fn run(arguments: &[&str]) -> Output {
 fn plaster_on_the_ceiling_shortens_the_decay_and_makes_it_clearer() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
-    let output = run(&["--rays", "4000", "--duration-s", "2", "--out", out.to_str().unwrap()]);
+    let output = run(&["--rays", "40000", "--duration-s", "2", "--out", out.to_str().unwrap()]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let change: Value = serde_json::from_slice(&std::fs::read(out.join("change.json")).unwrap()).unwrap();
     let row = |name: &str| {
