@@ -111,8 +111,9 @@ impl Diagnoser {
         let search = Search::new(&bench, &cases, self.effects.len(), used.clone());
         let base = search.state(&[], None)?;
         let mut state = search.state(&found.chosen, Some(&base))?;
-        let fold = Folds::new(&bench, &held);
-        let mut predicted = predict(&search, &state, &fold, &held, observer)?;
+        // Receivers that are held out have no say in what is named: causes are confirmed among the others.
+        let in_turn = Folds::in_turn(&bench);
+        let mut predicted = predict(&search, &state, &in_turn, observer)?;
         let predicting_s = started.elapsed().as_secs_f64();
 
         let started = Instant::now();
@@ -132,7 +133,7 @@ impl Diagnoser {
             unconfirmed.push(search.candidates[worst].id);
             found.drop(worst);
             state = search.state(&found.chosen, Some(&base))?;
-            predicted = predict(&search, &state, &fold, &held, observer)?;
+            predicted = predict(&search, &state, &in_turn, observer)?;
             lack_after = lack(&state)?;
         }
         let lack_after = lack_after.as_ref().unwrap_or(&lack_before);
@@ -161,7 +162,10 @@ impl Diagnoser {
         if verdict == Verdict::Unexplained && !state.chosen.is_empty() {
             unseated = state.chosen.iter().map(|&c| search.candidates[c].id).collect();
             state = base.clone();
-            predicted = predict(&search, &state, &fold, &held, observer)?;
+            predicted = predict(&search, &state, &in_turn, observer)?;
+        }
+        if !held.is_empty() {
+            predicted = predict(&search, &state, &Folds::never_fitted(&bench, &held), observer)?;
         }
         let testing_s = started.elapsed().as_secs_f64();
 

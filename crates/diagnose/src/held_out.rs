@@ -24,34 +24,45 @@ pub(crate) struct Folds {
     /// Pairs fitted, and pairs predicted.
     splits: Vec<(Vec<bool>, Vec<usize>)>,
     receivers: Vec<usize>,
+    /// Whether no fit ever sees them.
+    never_fitted: bool,
 }
 
 impl Folds {
-    pub fn new(bench: &Workbench, held: &[usize]) -> Self {
+    /// Receivers that no fit sees.
+    pub fn never_fitted(bench: &Workbench, held: &[usize]) -> Self {
+        let groups = held.iter().map(|&r| vec![r]).collect();
+        Self::new(bench, groups, &|_| bench.fitted.clone(), true)
+    }
+
+    /// Groups of the receivers that are fitted, each left out in turn; none with fewer than two.
+    pub fn in_turn(bench: &Workbench) -> Self {
         let responses = &bench.survey.responses;
-        let mut receivers: Vec<usize> = responses.iter().map(|r| r.receiver).collect();
+        let fitted = responses.iter().zip(&bench.fitted).filter(|(_, fitted)| **fitted);
+        let mut receivers: Vec<usize> = fitted.map(|(r, _)| r.receiver).collect();
         receivers.sort_unstable();
         receivers.dedup();
-        let never = !held.is_empty();
-        let groups: Vec<Vec<usize>> = if never {
-            held.iter().map(|&r| vec![r]).collect()
-        } else if receivers.len() < 2 {
-            Vec::new()
-        } else {
-            let count = receivers.len().min(FOLDS);
-            (0..count).map(|g| receivers.iter().copied().skip(g).step_by(count).collect()).collect()
+        let count = if receivers.len() < 2 { 0 } else { receivers.len().min(FOLDS) };
+        let groups = (0..count).map(|g| receivers.iter().copied().skip(g).step_by(count).collect()).collect();
+        let rest = |group: &[usize]| {
+            let used = responses.iter().zip(&bench.fitted);
+            used.map(|(r, fitted)| *fitted && !group.contains(&r.receiver)).collect()
         };
-        let splits = groups
-            .iter()
-            .map(|group| {
-                let out = |r: usize| if never { held.contains(&r) } else { group.contains(&r) };
-                let used = responses.iter().map(|r| !out(r.receiver)).collect();
-                let pairs =
-                    (0..responses.len()).filter(|&p| group.contains(&responses[p].receiver)).collect();
-                (used, pairs)
-            })
-            .collect();
-        Self { splits, receivers: groups.into_iter().flatten().collect() }
+        Self::new(bench, groups, &rest, false)
+    }
+
+    fn new(
+        bench: &Workbench,
+        groups: Vec<Vec<usize>>,
+        used: &dyn Fn(&[usize]) -> Vec<bool>,
+        never_fitted: bool,
+    ) -> Self {
+        let responses = &bench.survey.responses;
+        let pairs = |group: &[usize]| {
+            (0..responses.len()).filter(|&p| group.contains(&responses[p].receiver)).collect()
+        };
+        let splits = groups.iter().map(|group| (used(group), pairs(group))).collect();
+        Self { splits, receivers: groups.into_iter().flatten().collect(), never_fitted }
     }
 }
 
@@ -80,7 +91,6 @@ pub(crate) fn predict(
     search: &Search<'_>,
     state: &State,
     folds: &Folds,
-    held: &[usize],
     observer: &dyn Observer,
 ) -> Result<Predicted, Error> {
     let bench = search.bench;
@@ -157,7 +167,7 @@ pub(crate) fn predict(
     let three = |value: fn(&Errors) -> f64| [value(&errors[0]), value(&errors[1]), value(&errors[2])];
     let held_out = HeldOut {
         receivers: folds.receivers.iter().map(|&r| bench.survey.receivers[r].id.clone()).collect(),
-        never_fitted: !held.is_empty(),
+        never_fitted: folds.never_fitted,
         db_rmse: three(|e| e.db_rmse),
         t20_jnd: three(|e| e.t20_jnd),
         c50_jnd: three(|e| e.c50_jnd),
