@@ -2,6 +2,7 @@
 
 use crate::AnyError;
 use crate::sham::{IDS, Sham};
+use sabine::acoustics::TimeZero;
 use sabine::diagnose::{Cause, DiagnoseConfig, Diagnoser, Diagnosis, Verdict, catalogue};
 use sabine_testkit::{Fault, Hidden, LabConfig, Laboratory};
 use serde::{Deserialize, Serialize};
@@ -85,7 +86,11 @@ impl Task {
 
     /// Hides, diagnoses and compares. The folder is used for the room and cleared afterwards.
     pub fn run(&self, folder: &Path) -> Result<Trial, AnyError> {
-        let config = LabConfig { seed: self.seed, receivers: self.receivers, ..LabConfig::default() };
+        // A recording that begins before the emission must say so.
+        let early = self.hidden.iter().any(|id| id == "nonlinear_distortion");
+        let time_zero = if early { TimeZero::Common } else { TimeZero::Emission };
+        let config =
+            LabConfig { seed: self.seed, receivers: self.receivers, time_zero, ..LabConfig::default() };
         let lab = Laboratory::new(config)?;
         let hidden: Vec<Hidden> = self
             .hidden
@@ -212,6 +217,14 @@ fn true_parameters(hidden: &Hidden, lab: &Laboratory) -> Result<Vec<(String, f64
         Hidden::RoomDimensions { scale } => by_axis("scale", scale.map(|s| 100.0 * (s - 1.0))),
         Hidden::PositionError { offset_m, .. } => by_axis("offset", *offset_m),
         Hidden::TimeZero { latency_s } => vec![("latency".into(), 1000.0 * latency_s)],
+        Hidden::NonlinearDistortion { sweep_s, from_hz, to_hz, quadratic, cubic, .. } => {
+            let level = |name: &str, amplitude: f64| (name.to_owned(), 20.0 * amplitude.abs().log10());
+            vec![
+                ("second_harmonic_lead".into(), sweep_s / (to_hz / from_hz).ln() * 2f64.ln()),
+                level("second_harmonic_1_khz", 0.5 * quadratic),
+                level("third_harmonic_1_khz", 0.25 * cubic),
+            ]
+        }
         Hidden::ChannelFault { fault: Fault::Gain { gain_db, .. } } => vec![("gain".into(), *gain_db)],
         _ => Vec::new(),
     })

@@ -1,6 +1,6 @@
 //! A named physical cause of a misfit, and the cases in which it can come.
 
-use crate::{ArrivalView, BandView, Dimensions, FoundParameter, Gate, StrayPeaks, Survey};
+use crate::{ArrivalView, BandView, Dimensions, FoundParameter, Gate, LeadIns, StrayPeaks, Survey};
 
 /// A parameter of an effect.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,7 +61,7 @@ pub enum Nuisance {
     ResponseGain(usize),
 }
 
-/// What part of the data an effect bears on. Decays and arrival times are fitted separately: no effect needs both at once.
+/// What part of the data an effect bears on. They are fitted separately: no effect needs several at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Evidence {
     /// Energy over time in octaves.
@@ -70,6 +70,15 @@ pub enum Evidence {
     Arrivals,
     /// Which response is which, or its sign: both of the above and polarity.
     Assignment,
+    /// What comes before the direct sound: [`Case::before_direct`] weighs it.
+    LeadIn,
+}
+
+impl Evidence {
+    /// Whether a case with this evidence takes part in the fit of decays or of arrivals.
+    pub(crate) fn concerns(self, fit: Self) -> bool {
+        self == fit || self == Self::Assignment
+    }
 }
 
 /// Where in the chain from loudspeaker to file an effect sits: earlier ones are applied first.
@@ -87,7 +96,7 @@ pub enum Stage {
     Recorder,
 }
 
-/// What single reflections say for a cause.
+/// What single reflections, or the time before the direct sound, say for a cause.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OwnEvidence {
     /// Logarithm of how much more probable they are with the cause than without, its parameters summed over.
@@ -186,6 +195,11 @@ pub trait Case: Send + Sync {
 
     /// What single reflections say for it, given its parameters (value and standard deviation) from the fit of the decays.
     fn among_gates(&self, _own: &[(f64, f64)], _gates: &[Gate]) -> Option<OwnEvidence> {
+        None
+    }
+
+    /// What the responses that count (a flag for each) say for it before their direct sounds, its parameters included.
+    fn before_direct(&self, _lead_ins: &LeadIns, _used: &[bool]) -> Option<OwnEvidence> {
         None
     }
 

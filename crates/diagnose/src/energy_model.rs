@@ -52,7 +52,7 @@ pub(crate) struct EnergyData<'a> {
 }
 
 /// Logarithm of the Gamma density of unit shape at a ratio, relative to its top; straight beyond [`SURPRISE`].
-fn log_density(ln_ratio: f64) -> f64 {
+pub(crate) fn log_density(ln_ratio: f64) -> f64 {
     let z = ln_ratio.min(SURPRISE);
     z - z.exp() + 1.0 + (1.0 - SURPRISE.exp()) * (ln_ratio - z)
 }

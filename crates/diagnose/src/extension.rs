@@ -34,7 +34,7 @@ pub(crate) fn extended_model(bench: &Workbench, search: &Search<'_>, state: &Sta
         let (id, case) = (search.candidates[candidate].id, search.candidates[candidate].case);
         model.causes.push(id.to_owned());
         let values: Vec<f64> = match case.evidence() {
-            Evidence::Assignment => Vec::new(),
+            Evidence::Assignment | Evidence::LeadIn => Vec::new(),
             _ => {
                 let (maximum, first) = place_of(search, state, candidate);
                 maximum.values[first..first + case.parameters(survey).len()].to_vec()

@@ -23,8 +23,11 @@ pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -
             unit: unit.to_owned(),
         });
     };
-    let (maximum, first) = place_of(search, state, candidate);
     let own = state.own.iter().find(|(c, _)| *c == candidate);
+    if case.evidence() == Evidence::LeadIn {
+        return own.map(|(_, own)| own.parameters.clone()).unwrap_or_default();
+    }
+    let (maximum, first) = place_of(search, state, candidate);
     for (i, p) in case.parameters(&bench.survey).into_iter().enumerate() {
         push(p.name, maximum.values[first + i], maximum.sd(first + i), p.bounds, p.unit);
     }

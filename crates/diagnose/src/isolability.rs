@@ -173,6 +173,8 @@ pub(crate) fn would_decide(a: &str, b: &str) -> &'static str {
         "Measure two distances with a laser: between the far walls, and from the loudspeaker to a microphone."
     } else if has("channel_fault") {
         "Exchange the microphone's cable and channel with a neighbour's and measure again."
+    } else if has("nonlinear_distortion") {
+        "Turn the loudspeaker down by 10 dB and measure again: distortion falls faster than the sound."
     } else if has("open_patch") {
         "Close what may be open and measure again, or measure where other first reflections meet that wall."
     } else if has("extra_reflector") {

@@ -45,6 +45,7 @@
 //! | claim | test |
 //! |---|---|
 //! | hidden effects are named, null rooms are not | `tests/hidden_effects.rs` |
+//! | harmonics before the direct sound are found, noise there is not taken for them | `tests/hidden_distortion.rs` |
 //! | panels and holes are found and located | `tests/hidden_surfaces.rs` |
 //! | evidence and bounds of the fit against closed forms | unit tests of the fit |
 //! | spread, groups of paths, octave shares against closed forms | unit tests of their modules |
@@ -78,6 +79,7 @@ mod hit_groups;
 mod isolability;
 mod kernel;
 mod lack_of_fit;
+mod lead_in;
 mod measured;
 mod multilateration;
 mod naming;
@@ -108,6 +110,7 @@ pub use effects::*;
 pub use error::Error;
 pub use extended_model::{CoupledDecay, Dimensions, ExtendedModel, Sheet};
 pub use gates::Gate;
+pub use lead_in::LeadIns;
 pub use multilateration::{StrayPeak, StrayPeaks};
 pub use planes::Plane;
 pub use rendering::ExtendedRoom;

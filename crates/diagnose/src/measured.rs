@@ -3,6 +3,7 @@
 use crate::bins::Bins;
 use crate::gates::{self, EarlySamples};
 use crate::kernel::BandKernel;
+use crate::lead_in::{self, LeadInBand};
 use sabine_acoustics::{FilterBank, ImpulseResponse, NoReading, OctaveBands, Onset};
 
 /// The direct sound's largest sample is looked for so long after the onset, in seconds.
@@ -37,6 +38,8 @@ pub(crate) struct Measured {
     pub early: EarlySamples,
     /// Samples about the direct peak.
     pub pulse: Vec<f64>,
+    /// What comes before the direct sound.
+    pub lead_in: Vec<LeadInBand>,
     pub sample_rate_hz: u32,
     pub duration_s: f64,
 }
@@ -81,7 +84,9 @@ impl Measured {
             .map(|i| samples.get(i).copied().map_or(0.0, f64::from))
             .collect();
         let (peaks_s, peaks_db) = peaks(&smooth, direct, rate);
-        Ok(Self { energies, direct_s, peaks_s, peaks_db, early, pulse, sample_rate_hz, duration_s })
+        let complete = |band: usize| bank.is_complete(band);
+        let lead_in = lead_in::of_response(filtered.values(), &complete, bands, direct_s * rate, rate);
+        Ok(Self { energies, direct_s, peaks_s, peaks_db, early, pulse, lead_in, sample_rate_hz, duration_s })
     }
 
     /// Likeness of the direct pulses of two responses, -1 to 1, at the best of small lags.

@@ -104,7 +104,7 @@ impl Diagnoser {
                 (moved, warmer_k, resized, state.energy.values)
             };
             // With the cause at work the materials are others: what is compared, and with which spread, follows them.
-            if cases[best.best].2.evidence() != Evidence::Arrivals {
+            if cases[best.best].2.evidence().concerns(Evidence::Energy) {
                 bench.expand_about(&absorption)?;
             }
             if warmer_k != 0.0 {
@@ -120,7 +120,7 @@ impl Diagnoser {
                 .chosen
                 .iter()
                 .map(|&c| &*cases[c].2)
-                .filter(|c| c.evidence() != Evidence::Arrivals)
+                .filter(|c| c.evidence().concerns(Evidence::Energy))
                 .collect();
             bench.calibrate_dispersion(&chosen, used)?;
         }

@@ -1,4 +1,4 @@
-//! Evidence of causes that neither decays nor arrival times can weigh: from single reflections.
+//! Evidence of causes that neither decays nor arrival times can weigh: from single reflections, and from before the direct sound.
 
 use crate::arrival_model;
 use crate::effect::{Case, Evidence};
@@ -46,36 +46,37 @@ fn shifts(bench: &Workbench, model: &arrival_model::ArrivalModel<'_>, values: &[
         .collect()
 }
 
-/// Evidence of each chosen cause from single reflections of the responses that are used.
+/// Evidence of each chosen cause from what comes before the direct sound, or from single reflections, of the responses that are used.
 pub(crate) fn own(
     search: &Search<'_>,
     chosen: &[usize],
     fitted: Fitted<'_>,
     used: &[bool],
 ) -> Vec<(usize, OwnEvidence)> {
+    let before_direct =
+        |c: usize| Some((c, search.candidates[c].case.before_direct(&search.bench.lead_ins, used)?));
+    let mut found: Vec<(usize, OwnEvidence)> = chosen.iter().copied().filter_map(before_direct).collect();
     let weighing: Vec<usize> =
         chosen.iter().copied().filter(|&c| search.candidates[c].case.weighs_gates()).collect();
     if weighing.is_empty() {
-        return Vec::new();
+        return found;
     }
     let mut gates = gates(search, chosen, fitted);
     gates.retain(|g| used[g.response]);
     let of_energy: Vec<usize> = chosen
         .iter()
         .copied()
-        .filter(|&c| search.candidates[c].case.evidence() != Evidence::Arrivals)
+        .filter(|&c| search.candidates[c].case.evidence().concerns(Evidence::Energy))
         .collect();
-    weighing
-        .into_iter()
-        .filter_map(|c| {
-            let order = of_energy.iter().position(|&o| o == c)?;
-            let first = *fitted.energy_firsts.get(order)?;
-            let count = search.candidates[c].case.parameters(&search.bench.survey).len();
-            let own: Vec<(f64, f64)> =
-                (first..first + count).map(|i| (fitted.energy.values[i], fitted.energy.sd(i))).collect();
-            Some((c, search.candidates[c].case.among_gates(&own, &gates)?))
-        })
-        .collect()
+    found.extend(weighing.into_iter().filter_map(|c| {
+        let order = of_energy.iter().position(|&o| o == c)?;
+        let first = *fitted.energy_firsts.get(order)?;
+        let count = search.candidates[c].case.parameters(&search.bench.survey).len();
+        let own: Vec<(f64, f64)> =
+            (first..first + count).map(|i| (fitted.energy.values[i], fitted.energy.sd(i))).collect();
+        Some((c, search.candidates[c].case.among_gates(&own, &gates)?))
+    }));
+    found
 }
 
 /// Nats of all of them.

@@ -99,8 +99,7 @@ impl<'a> Search<'a> {
     }
 
     pub fn cases_of(&self, chosen: &[usize], part: Evidence) -> Vec<&'a dyn Case> {
-        let wanted = |e: Evidence| e == part || e == Evidence::Assignment;
-        chosen.iter().map(|&c| self.candidates[c].case).filter(|c| wanted(c.evidence())).collect()
+        chosen.iter().map(|&c| self.candidates[c].case).filter(|c| c.evidence().concerns(part)).collect()
     }
 
     pub fn state(&self, chosen: &[usize], near: Option<&State>) -> Result<State, Error> {
@@ -127,12 +126,12 @@ impl<'a> Search<'a> {
         let mut next = State { chosen, ..state.clone() };
         let evidence = case.evidence();
         let turned = case.inverted().is_some();
-        if evidence != Evidence::Arrivals && !turned {
+        if evidence.concerns(Evidence::Energy) && !turned {
             let cases = self.cases_of(&next.chosen, Evidence::Energy);
             (next.energy, next.energy_firsts) =
                 self.bench.fit_energy(&cases, &self.used, Some(state.before()))?;
         }
-        if evidence != Evidence::Energy && !turned {
+        if evidence.concerns(Evidence::Arrivals) && !turned {
             let cases = self.cases_of(&next.chosen, Evidence::Arrivals);
             (next.arrivals, next.arrival_firsts) = self.bench.fit_arrivals(&cases, &self.used)?;
         }
@@ -206,7 +205,9 @@ impl<'a> Search<'a> {
     /// and one for each free parameter (Wilks 1938; Wald 1943). What is known of materials and places beforehand counts as data: without
     /// the effect they are strained.
     fn d_prime(&self, state: &State, next: &State, candidate: usize) -> f64 {
-        let likelihood = |s: &State| s.energy.log_posterior + s.arrivals.log_posterior + s.polarity;
+        let likelihood = |s: &State| {
+            s.energy.log_posterior + s.arrivals.log_posterior + s.polarity + own_evidence::sum(&s.own)
+        };
         let case = self.candidates[candidate].case;
         let widened: usize = case
             .widens()

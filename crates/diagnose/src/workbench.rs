@@ -11,7 +11,7 @@ use crate::measured::{Measured, PEAKS_S};
 use crate::survey::{Place, Survey, SurveyedResponse};
 use crate::traced_pair::{Arrival, BandState, CELL_S, Single, TracedPair};
 use crate::traced_room::{prepare, trace, traced_s};
-use crate::{DiagnoseConfig, Error};
+use crate::{DiagnoseConfig, Error, LeadIns};
 use rayon::prelude::*;
 use sabine_acoustics::{
     Air, ImpulseResponse, Material, MaterialPrior, MeasuredRoom, Observer, PerBand, Receiver, Scene, Source,
@@ -33,6 +33,7 @@ pub(crate) struct Workbench {
     pub fitted: Vec<bool>,
     pub config: DiagnoseConfig,
     pub measured: Vec<Measured>,
+    pub lead_ins: LeadIns,
     pub materials: Vec<Material>,
     pub priors: Vec<Vec<Prior>>,
     pub pairs: Vec<TracedPair>,
@@ -165,6 +166,7 @@ impl Workbench {
             dispersion: vec![1.0; bands.len()],
             config: config.clone(),
             survey,
+            lead_ins: LeadIns::new(measured.iter_mut().map(|m| std::mem::take(&mut m.lead_in)).collect()),
             measured,
             materials,
             priors,

@@ -23,6 +23,7 @@
 mod box_decay;
 mod config;
 mod coupled_tail;
+mod distortion;
 mod hidden;
 mod image_field;
 mod missing_surfaces;
@@ -222,6 +223,7 @@ impl Laboratory {
         };
         let (mut responses, energies): (Vec<Vec<f64>>, Vec<BandEnergies>) =
             (0..truth.responses()).into_par_iter().map(render).unzip();
+        distortion::add_harmonics(truth, rate_hz, &mut responses);
         let noise = Noise::new(truth, &energies, samples);
         responses.par_iter_mut().enumerate().for_each(|(index, samples)| {
             noise.add(truth, index, self.bands, self.config.sample_rate_hz, samples);

@@ -5,6 +5,7 @@ mod background_noise;
 mod channel_fault;
 mod coupled_volume;
 mod extra_reflector;
+mod nonlinear_distortion;
 mod open_patch;
 mod position_error;
 mod room_dimensions;
@@ -22,6 +23,7 @@ pub use background_noise::BackgroundNoise;
 pub use channel_fault::ChannelFault;
 pub use coupled_volume::CoupledVolume;
 pub use extra_reflector::ExtraReflector;
+pub use nonlinear_distortion::NonlinearDistortion;
 pub use open_patch::OpenPatch;
 pub use position_error::PositionError;
 pub use room_dimensions::RoomDimensions;
@@ -55,6 +57,7 @@ pub fn catalogue() -> Vec<Box<dyn Effect>> {
         Box::new(ChannelFault),
         Box::new(ExtraReflector),
         Box::new(OpenPatch),
+        Box::new(NonlinearDistortion),
     ]
 }
 

@@ -121,6 +121,22 @@ pub enum Hidden {
         /// Lengths along the two axes of the face in their order, in metres.
         size_m: [f64; 2],
     },
+    /// The loudspeaker is driven too hard while it plays an exponential sweep at full scale: the harmonics of the sweep come before the
+    /// direct sound. To be measured in a room that declares a common latency, for the recording begins before the emission.
+    NonlinearDistortion {
+        /// Length of the sweep in seconds, 0.1 to 60.
+        sweep_s: f64,
+        /// Its first frequency in Hz.
+        from_hz: f64,
+        /// Its last frequency in Hz.
+        to_hz: f64,
+        /// Factor of the squared signal, -1 to 1: the second harmonic has half of it.
+        quadratic: f64,
+        /// Factor of the cubed signal, -1 to 1: the third harmonic has a quarter of it.
+        cubic: f64,
+        /// How long before the emission the recordings begin, in seconds, 0 to 5.
+        lead_in_s: f64,
+    },
     /// Outside the catalogue: the gain swells and sinks while each response is recorded, as depth sin(2 pi t / period + phase).
     GainDrift {
         /// Greatest deviation in dB.
@@ -198,7 +214,7 @@ pub struct Gap {
 
 impl Hidden {
     /// Identifiers of the catalogue's effects.
-    pub const CATALOGUE: [&'static str; 16] = [
+    pub const CATALOGUE: [&'static str; 17] = [
         "transducer_response",
         "air_absorption",
         "source_directivity",
@@ -215,6 +231,7 @@ impl Hidden {
         "channel_fault",
         "extra_reflector",
         "open_patch",
+        "nonlinear_distortion",
     ];
     /// Names of the effects that no catalogue holds.
     pub const OUTSIDE: [&'static str; 3] = ["gain_drift", "dropouts", "foreign_chirp"];
@@ -244,6 +261,7 @@ impl Hidden {
             Self::ChannelFault { .. } => "channel_fault",
             Self::ExtraReflector { .. } => "extra_reflector",
             Self::OpenPatch { .. } => "open_patch",
+            Self::NonlinearDistortion { .. } => "nonlinear_distortion",
             Self::GainDrift { .. } => "gain_drift",
             Self::Dropouts { .. } => "dropouts",
             Self::ForeignChirp { .. } => "foreign_chirp",
@@ -286,6 +304,9 @@ impl Hidden {
             }
             Self::TimeZero { latency_s } => {
                 truth.latencies_s.iter_mut().for_each(|l| *l += latency_s);
+            }
+            Self::NonlinearDistortion { lead_in_s, .. } => {
+                truth.latencies_s.iter_mut().for_each(|l| *l += lead_in_s);
             }
             Self::ChannelFault { fault: Fault::Polarity { response } } => {
                 truth.inverted[*response] = !truth.inverted[*response];

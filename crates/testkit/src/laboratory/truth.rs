@@ -244,6 +244,15 @@ impl Truth {
                 panel::check(self, &Panel::new(*centre_m, *normal, *size_m, reflectance.clone()))
             }
             Hidden::OpenPatch { face, centre_m, size_m } => Patch::new(*face, *centre_m, *size_m).check(self),
+            Hidden::NonlinearDistortion { sweep_s, from_hz, to_hz, quadratic, cubic, lead_in_s } => {
+                check_range("length of the sweep (s)", *sweep_s, 0.1, 60.0, "between 0.1 and 60 s")?;
+                check_range("first frequency (Hz)", *from_hz, 1.0, 20e3, "between 1 Hz and 20 kHz")?;
+                check_range("last frequency (Hz)", *to_hz, 2.0 * from_hz, 96e3, "an octave above the first")?;
+                for factor in [quadratic, cubic] {
+                    check_range("factor of a power", *factor, -1.0, 1.0, "between -1 and 1")?;
+                }
+                check_range("lead-in (s)", *lead_in_s, 0.0, 5.0, "between 0 and 5 s")
+            }
             Hidden::GainDrift { depth_db, period_s, phase_rad } => {
                 check_range("depth (dB)", *depth_db, -40.0, 40.0, "between -40 and 40 dB")?;
                 check_range("period (s)", *period_s, 1e-3, 100.0, "between 0.001 and 100 s")?;

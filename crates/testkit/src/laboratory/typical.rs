@@ -75,6 +75,7 @@ impl Hidden {
             "channel_fault.swap" => swap(r, truth, strength)?,
             "extra_reflector" => missing_surfaces::extra_reflector(r, truth, strength),
             "open_patch" => missing_surfaces::open_patch(r, truth, strength),
+            "nonlinear_distortion" => nonlinear_distortion(r, strength),
             "gain_drift" => Self::GainDrift {
                 depth_db: 4.0 * strength,
                 period_s: 0.15 + 0.15 * unit(r),
@@ -182,6 +183,23 @@ fn swap(r: &mut Pcg64Mcg, truth: &Truth, strength: f64) -> Result<Hidden, Error>
     let a = r.random_range(0..responses);
     let b = (a + r.random_range(1..responses)) % responses;
     Ok(Hidden::ChannelFault { fault: Fault::Swap { a, b: if strength > 0.0 { b } else { a } } })
+}
+
+/// A sweep of 3 to 5 s; harmonics at -28 to -36 and -34 to -42 dB for strength 1.
+fn nonlinear_distortion(r: &mut Pcg64Mcg, strength: f64) -> Hidden {
+    let (from_hz, to_hz) = (40.0f64, 20_000.0f64);
+    let sweep_s = 3.0 + 2.0 * unit(r);
+    let growth_s = sweep_s / (to_hz / from_hz).ln();
+    let factor = |level_db: f64| (strength * 10f64.powf(level_db / 20.0)).min(1.0);
+    Hidden::NonlinearDistortion {
+        sweep_s,
+        from_hz,
+        to_hz,
+        quadratic: sign(r) * 2.0 * factor(-32.0 + 8.0 * (unit(r) - 0.5)),
+        cubic: -4.0 * factor(-38.0 + 8.0 * (unit(r) - 0.5)),
+        // Both harmonics are within the recording.
+        lead_in_s: growth_s * 3f64.ln() + 0.1,
+    }
 }
 
 /// Three gaps in each response, before it has fallen by 25 dB.
