@@ -82,6 +82,9 @@ pub struct Sheet {
     pub absorption: f64,
 }
 
+/// A coupled volume fills within this time, in seconds.
+pub(crate) const BUILD_UP_S: f64 = 0.02;
+
 /// The second decay of a coupled volume.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

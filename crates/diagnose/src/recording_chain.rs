@@ -1,13 +1,12 @@
 //! What happens to a response after propagation: sound that joins, loudspeaker and microphone, noise, recorder.
 
+use crate::extended_model::BUILD_UP_S;
 use crate::{Error, ExtendedModel};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use sabine_acoustics::{FilterBank, ImpulseResponse, OctaveBands};
 
-/// The coupled room fills within this time, as in the effect `coupled_volume`.
-const BUILD_UP_S: f64 = 0.02;
 /// Rates of energy are laid down on a grid of this step and interpolated between.
 const STEP_S: f64 = 2e-3;
 /// Rounds in which filters' overlap is made up for.

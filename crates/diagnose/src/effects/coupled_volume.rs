@@ -1,6 +1,7 @@
 //! `coupled_volume`: a neighbouring room gives back what it has stored.
 
 use super::add_energy;
+use crate::extended_model::BUILD_UP_S;
 use crate::{BandView, Case, Effect, Parameter, Stage, Survey};
 
 /// A second decay with one decay time and level, each with a slope over the octaves; its level changes from place to place
@@ -12,9 +13,6 @@ use crate::{BandView, Case, Effect, Parameter, Stage, Survey};
 /// Source: Cremer and Müller, Principles and Applications of Room Acoustics, 1982, II.3; Xiang and Goggans, JASA 110, 2001.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CoupledVolume;
-
-/// The coupled room fills within this time.
-const BUILD_UP_S: f64 = 0.02;
 
 impl Effect for CoupledVolume {
     fn id(&self) -> &'static str {

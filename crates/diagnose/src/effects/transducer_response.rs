@@ -45,7 +45,7 @@ impl Effect for TransducerResponse {
     }
 
     fn explanation(&self) -> &'static str {
-        "The loudspeaker or the microphone favours some octaves over others, alike in every response."
+        "The loudspeaker or the microphone favours some octaves over others, alike in every response. Gains are relative to 1 kHz unless levels are absolute."
     }
 
     fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
