@@ -303,7 +303,9 @@ fn least_confirmed(search: &Search<'_>, state: &State, gains: &[HeldOutGain]) ->
     // A few positions leave a wide interval: a gain in the mean counts where the decays come nearer, too.
     let helps = |gain: &HeldOutGain| {
         let nearer = gain.db_rmse_after < NEARER * gain.db_rmse_before;
-        gain.low > 0.0 || (gain.nats_per_bin > 0.0 && nearer)
+        // Likelier bins under decays that lie farther off: the cause stands for something else.
+        let farther = gain.db_rmse_after > gain.db_rmse_before;
+        (gain.low > 0.0 && !farther) || (gain.nats_per_bin > 0.0 && nearer)
     };
     let doubtful = state.chosen.iter().zip(gains).filter(|(c, gain)| everywhere(c) && !helps(gain));
     doubtful.min_by(|a, b| a.1.nats_per_bin.total_cmp(&b.1.nats_per_bin)).map(|(c, _)| *c)
