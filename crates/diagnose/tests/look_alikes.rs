@@ -1,0 +1,64 @@
+//! What a diagnosis must not be sure of: effects that no catalogue holds, and causes that the measurement cannot tell apart. And two
+//! causes at once, which it can.
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
+use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, Verdict};
+use sabine_testkit::{Hidden, LabConfig, Laboratory};
+
+fn lab(seed: u64, receivers: usize) -> Laboratory {
+    Laboratory::new(LabConfig { seed, receivers, ..LabConfig::default() }).unwrap()
+}
+
+fn diagnose(lab: &Laboratory, hidden: &[Hidden], config: DiagnoseConfig) -> Diagnosis {
+    let folder = tempfile::tempdir().unwrap();
+    let room = lab.write(hidden, &folder.path().join("room"), None).unwrap();
+    Diagnoser::new(config).unwrap().diagnose(&room, &[], &()).unwrap()
+}
+
+fn few_rays() -> DiagnoseConfig {
+    DiagnoseConfig { rays: 2000, ..DiagnoseConfig::default() }
+}
+
+fn named(found: &Diagnosis) -> Vec<&str> {
+    let mut named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
+    named.sort_unstable();
+    named
+}
+
+#[test]
+fn what_no_catalogue_holds_gets_no_name() {
+    for (id, seed) in [("gain_drift", 901), ("dropouts", 902), ("foreign_chirp", 901)] {
+        let lab = lab(seed, 8);
+        let found = diagnose(&lab, &[Hidden::random(id, 1.0, &lab, seed).unwrap()], few_rays());
+        assert_eq!(found.verdict, Verdict::Unexplained, "{id}: {:?}", named(&found));
+        assert!(found.causes.is_empty() && found.lack_of_fit.p_value < 0.01, "{id}: {:?}", found.lack_of_fit);
+        // Where it shows is said all the same.
+        assert!(!found.residuals.is_empty());
+    }
+}
+
+#[test]
+fn two_causes_are_both_found() {
+    let lab = lab(921, 8);
+    let hidden = ["time_zero", "background_noise"].map(|id| Hidden::random(id, 1.0, &lab, 921).unwrap());
+    let found = diagnose(&lab, &hidden, few_rays());
+    assert_eq!(found.verdict, Verdict::Explained, "{:?}", found.lack_of_fit);
+    assert_eq!(named(&found), ["background_noise", "time_zero"]);
+    for cause in &found.causes {
+        assert!(cause.held_out_gain.as_ref().unwrap().low > 0.0, "{cause:?}");
+    }
+}
+
+/// A clock that runs fast and air that is colder stretch all arrival times alike.
+#[test]
+fn a_clock_and_a_temperature_come_as_a_set() {
+    let lab = lab(931, 24);
+    // Places are as good as the laboratory's are: 5 mm.
+    let config = DiagnoseConfig { position_sd_m: 0.005, ..few_rays() };
+    let found = diagnose(&lab, &[Hidden::SamplingClock { ppm: 900.0 }], config);
+    assert_eq!(found.verdict, Verdict::Ambiguous, "{:?} {:?}", named(&found), found.candidates);
+    let mut set: Vec<&str> = found.alternatives.iter().map(String::as_str).collect();
+    set.sort_unstable();
+    assert_eq!(set, ["sampling_clock", "sound_speed"]);
+    assert!(found.would_decide.iter().any(|w| w.contains("loopback")), "{:?}", found.would_decide);
+}
