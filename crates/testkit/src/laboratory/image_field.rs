@@ -1,6 +1,7 @@
 //! What mirrors send: image sources, each with a sign of its own.
 
 use super::box_decay::{BoxDecay, LANES};
+use super::local_reaction::LocalReaction;
 use super::panel::{self, Panel};
 use super::patch::{self, Patch};
 use super::stream::{Purpose, key, mix, unit};
@@ -76,6 +77,7 @@ pub(crate) fn add_images(
     let share = PULSES_PER_SAMPLE * columns.rate_hz * volume_m3 / (4.0 * PI * medium.speed_m_s);
     let (panels, patches) = (Panel::all(truth), Patch::all(truth));
     panel::add_reflections(truth, medium, &panels, pair, columns);
+    let local = LocalReaction::of(truth);
     let weights = decay.weights(medium);
     let mut row = [0.0; LANES];
     let mut amplitudes = vec![0.0; bands];
@@ -115,8 +117,13 @@ pub(crate) fn add_images(
                     + z.departure * source.axis[2];
                 let cosine = along / length_m;
                 let scale = sign / length_m / kept.sqrt();
+                let met = [x.index, y.index, z.index].map(times_met);
+                let met = [met[0][0], met[0][1], met[1][0], met[1][1], met[2][0], met[2][1]];
                 for b in 0..bands {
-                    let energy = row[b] * z.walls[b] * (-medium.exponents_per_m[b] * length_m).exp();
+                    let by_angle =
+                        local.as_ref().map_or(1.0, |l| l.factor(b, met, offset.map(|o| o / length_m)));
+                    let energy =
+                        by_angle * row[b] * z.walls[b] * (-medium.exponents_per_m[b] * length_m).exp();
                     amplitudes[b] = scale * energy.sqrt() * gains[b] * source.gain(b, cosine);
                 }
                 if !panels.is_empty() && panel::concerns([x.index, y.index, z.index]) {
