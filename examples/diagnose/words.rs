@@ -24,6 +24,7 @@ pub fn effect(id: &str) -> String {
         "time_zero" => "Latency left in",
         "channel_fault" => "Fault of one channel",
         "extra_reflector" => "A surface that the model lacks",
+        "angle_dependent_absorption" => "Walls absorb by angle",
         "open_patch" => "An opening in a wall",
         "nonlinear_distortion" => "Loudspeaker overdriven",
         other => return other.replace('_', " "),

@@ -153,7 +153,7 @@ pub use onset::Onset;
 pub use orientation::Orientation;
 pub use parameters::{BandParameters, RoomParameters};
 pub use path_parameters::PathParameters;
-pub use paths::{Contribution, PathSet, Reflection};
+pub use paths::{Contribution, Incidence, PathSet, Reflection};
 pub use progress::{Observer, report};
 pub use resample::{resample, resample_response};
 pub use scene::{NamedMaterial, Receiver, Scene, Source, Triangle};

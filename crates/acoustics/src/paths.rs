@@ -1,5 +1,9 @@
 //! Traced paths: the seam between a tracer and everything after it.
 
+mod incidence;
+
+pub use incidence::Incidence;
+
 use crate::packed_direction::{pack_direction, unpack_direction};
 use crate::reweighting::{LANES, Lanes, exp, sums_along};
 use crate::{
@@ -64,6 +68,10 @@ pub struct PathSet {
     max_length_m: f64,
     parents: Vec<u32>,
     events: Vec<u16>,
+    /// Angle of each reflection.
+    incidences: Vec<u8>,
+    /// What some of these angles refer to.
+    axes: [[f64; 3]; 3],
     lengths_m: Vec<f32>,
     log_weights: Vec<f32>,
     chains: Vec<u32>,
@@ -85,7 +93,7 @@ impl PathSet {
     pub const DIRECT: u32 = 0;
     /// Number of independent batches into which a tracer splits its rays, for Monte-Carlo standard errors.
     pub const BATCHES: u8 = 32;
-    /// Bytes kept for each contribution; a reflection takes six more, shared by all chains that pass through it.
+    /// Bytes kept for each contribution; a reflection takes seven more, shared by all chains that pass through it.
     pub const BYTES_PER_CONTRIBUTION: usize = 25;
 
     /// No paths yet, between surfaces of `materials` kinds, all paths up to `max_length_m` being looked for.
@@ -99,6 +107,8 @@ impl PathSet {
             max_length_m,
             parents: vec![0],
             events: vec![0],
+            incidences: vec![incidence::NONE],
+            axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             lengths_m: Vec::new(),
             log_weights: Vec::new(),
             chains: Vec::new(),
@@ -119,6 +129,7 @@ impl PathSet {
         assert!((material as usize) < self.materials, "unknown material {material}");
         self.parents.push(chain);
         self.events.push((material as u16) << 1 | u16::from(reflection == Reflection::Scattered));
+        self.incidences.push(incidence::NONE);
         (self.parents.len() - 1) as u32
     }
 
@@ -157,18 +168,23 @@ impl PathSet {
         });
     }
 
-    /// Appends the paths of another set between the same surfaces; weights stay as they are.
+    /// Appends the paths of another set between the same surfaces; weights stay as they are. Axes (see [`Incidence::Axis`]) are those of the set
+    /// that has any contribution so far, or else of the other.
     ///
     /// # Panics
     /// If the sets have different numbers of materials.
     pub fn append(&mut self, other: &PathSet) {
         assert_eq!(self.materials, other.materials, "paths of different scenes");
         let before = self.len();
+        if before == 0 {
+            self.axes = other.axes;
+        }
         self.diffractions.extend(other.diffractions.iter().map(|(i, d)| (before + i, d.clone())));
         let offset = self.parents.len() as u32 - 1;
         let shifted = |chain: u32| if chain == Self::DIRECT { chain } else { chain + offset };
         self.parents.extend(other.parents[1..].iter().map(|&p| shifted(p)));
         self.events.extend_from_slice(&other.events[1..]);
+        self.incidences.extend_from_slice(&other.incidences[1..]);
         self.lengths_m.extend_from_slice(&other.lengths_m);
         self.log_weights.extend_from_slice(&other.log_weights);
         self.chains.extend(other.chains.iter().map(|&c| shifted(c)));
@@ -259,11 +275,13 @@ impl PathSet {
                 renamed[chain] = count as u32;
                 self.parents[count] = renamed[self.parents[chain] as usize];
                 self.events[count] = self.events[chain];
+                self.incidences[count] = self.incidences[chain];
                 count += 1;
             }
         }
         self.parents.truncate(count);
         self.events.truncate(count);
+        self.incidences.truncate(count);
         for chain in self.chains.iter_mut().chain(&mut self.tails) {
             *chain = renamed[*chain as usize];
         }

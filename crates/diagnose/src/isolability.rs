@@ -175,6 +175,8 @@ pub(crate) fn would_decide(a: &str, b: &str) -> &'static str {
         "Exchange the microphone's cable and channel with a neighbour's and measure again."
     } else if has("nonlinear_distortion") {
         "Turn the loudspeaker down by 10 dB and measure again: distortion falls faster than the sound."
+    } else if has("angle_dependent_absorption") {
+        "Measure close to the walls and along them, where sound grazes, with the source in another place."
     } else if has("open_patch") {
         "Close what may be open and measure again, or measure where other first reflections meet that wall."
     } else if has("extra_reflector") {

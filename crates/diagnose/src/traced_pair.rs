@@ -1,7 +1,9 @@
 //! Traced paths between one source and one receiver, and the energies that they predict.
 
+mod local_reaction;
 mod singles;
 
+use local_reaction::LOCAL_GRID;
 pub(crate) use singles::Single;
 
 use crate::bins::Bins;
@@ -82,19 +84,30 @@ pub(crate) struct BandState {
     pub variance: Vec<f64>,
     /// Logarithm of the change of energy, `[grid][bin]`; empty until tabulated.
     scattering: Vec<Vec<f64>>,
+    /// The same for walls that react locally by a share.
+    local_reaction: Vec<Vec<f64>>,
 }
 
 impl BandState {
     pub fn scattering_change(&self, bin: usize, extra: f64) -> f64 {
-        if self.scattering.is_empty() {
-            return 0.0;
-        }
-        let x = extra.clamp(SCATTERING_GRID[0], SCATTERING_GRID[SCATTERING_GRID.len() - 1]);
-        let upper = SCATTERING_GRID.iter().position(|&g| g >= x).unwrap_or(1).max(1);
-        let (low, high) = (SCATTERING_GRID[upper - 1], SCATTERING_GRID[upper]);
-        let share = (x - low) / (high - low);
-        self.scattering[upper - 1][bin] * (1.0 - share) + self.scattering[upper][bin] * share
+        between(&SCATTERING_GRID, &self.scattering, bin, extra)
     }
+
+    pub fn local_reaction_change(&self, bin: usize, share: f64) -> f64 {
+        between(&LOCAL_GRID, &self.local_reaction, bin, share)
+    }
+}
+
+/// What a table, `[grid][bin]`, says between the places of its grid; nothing as long as it is empty.
+fn between(grid: &[f64], table: &[Vec<f64>], bin: usize, x: f64) -> f64 {
+    if table.is_empty() {
+        return 0.0;
+    }
+    let x = x.clamp(grid[0], grid[grid.len() - 1]);
+    let upper = grid.iter().position(|&g| g >= x).unwrap_or(1).max(1);
+    let (low, high) = (grid[upper - 1], grid[upper]);
+    let share = (x - low) / (high - low);
+    table[upper - 1][bin] * (1.0 - share) + table[upper][bin] * share
 }
 
 impl TracedPair {
@@ -199,6 +212,8 @@ impl TracedPair {
             for (state, table) in states.iter_mut().zip(table) {
                 state.scattering = table;
             }
+            let local = self.local_reaction(materials, &energies, &states, kernels, duration_s);
+            states.iter_mut().zip(local).for_each(|(state, local)| state.local_reaction = local);
         }
         Ok(states)
     }
@@ -356,6 +371,7 @@ impl TracedPair {
             departure_products: Vec::with_capacity(count),
             variance: Vec::with_capacity(count),
             scattering: Vec::new(),
+            local_reaction: Vec::new(),
         };
         for bin in 0..count {
             let s = &sums[bin * COLUMNS..(bin + 1) * COLUMNS];

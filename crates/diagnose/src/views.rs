@@ -83,6 +83,12 @@ impl BandView<'_> {
         crate::own_evidence::change_by_hits(self.state, materials, bin, material, ln_kept)
     }
 
+    /// Natural logarithm of the change of a bin's energy if the walls reacted locally by a share (-0.5 to 1.3; 1 is all of it): each
+    /// reflection's logarithm moves by so much from that of random-incidence absorption towards that of a real impedance.
+    pub fn local_reaction_change(&self, bin: usize, share: f64) -> f64 {
+        self.state.local_reaction_change(bin, share)
+    }
+
     /// Natural logarithm of the change of a bin's energy if the surfaces scattered more by `extra` (0 to 0.9, share of what
     /// they now reflect specularly) or less (-1 to 0, share of what they now scatter).
     pub fn scattering_change(&self, bin: usize, extra: f64) -> f64 {

@@ -4,7 +4,7 @@ use crate::random::generator;
 use crate::surfaces::Surfaces;
 use crate::vector::{Vec3, dot, scale};
 use rand::Rng;
-use sabine_acoustics::{Contribution, NamedMaterial, PathSet, Reflection};
+use sabine_acoustics::{Contribution, Incidence, NamedMaterial, PathSet, Reflection};
 use std::collections::HashMap;
 
 /// Two directions are parallel or at right angles if the sine or cosine between them is below this.
@@ -84,6 +84,7 @@ impl Cuboid {
         materials: &[NamedMaterial],
         seed: u64,
     ) {
+        paths.set_axes(self.axes);
         let max_length_m = paths.max_length_m();
         let local = |p: Vec3| -> Vec3 { std::array::from_fn(|k| dot(self.axes[k], p)) };
         let room =
@@ -190,7 +191,12 @@ impl Cuboid {
             shorter[last] -= 1;
         };
         for face in missing.into_iter().rev() {
-            chain = paths.reflect(chain, self.materials[face], Reflection::Specular);
+            chain = paths.reflect_at(
+                chain,
+                self.materials[face],
+                Reflection::Specular,
+                Incidence::Axis((face / 2) as u8),
+            );
             shorter[face] += 1;
             known.insert(shorter, chain);
         }

@@ -3,10 +3,10 @@
 use crate::mesh_scene::MeshScene;
 use crate::random::{direction, generator};
 use crate::surfaces::Plane;
-use crate::vector::{Vec3, along, mirror, norm, scale, sub};
+use crate::vector::{Vec3, along, dot, mirror, norm, scale, sub};
 use crate::walk::{before_hit, next_hit, visible};
 use rayon::prelude::*;
-use sabine_acoustics::{Contribution, PathSet, RayScene, Reflection};
+use sabine_acoustics::{Contribution, Incidence, PathSet, RayScene, Reflection};
 use std::collections::BTreeSet;
 
 /// Up to so many sequences of planes are all tried; of more, only those that rays find.
@@ -89,6 +89,8 @@ fn candidates(
 pub(crate) struct ExactPath {
     image: Vec3,
     materials: Vec<u32>,
+    /// Cosine of incidence of each reflection.
+    cosines: Vec<f64>,
     pub length_m: f64,
     departure: Vec3,
     pub arrival: Vec3,
@@ -97,10 +99,10 @@ pub(crate) struct ExactPath {
 impl ExactPath {
     /// Adds the path to a set.
     pub fn push_to(&self, paths: &mut PathSet) {
-        let chain = self
-            .materials
-            .iter()
-            .fold(PathSet::DIRECT, |chain, &material| paths.reflect(chain, material, Reflection::Specular));
+        let chain =
+            self.materials.iter().zip(&self.cosines).fold(PathSet::DIRECT, |chain, (&material, &cosine)| {
+                paths.reflect_at(chain, material, Reflection::Specular, Incidence::Cosine(cosine))
+            });
         paths.push(Contribution {
             length_m: self.length_m,
             log_weight: -2.0 * self.length_m.ln(),
@@ -134,6 +136,7 @@ pub(crate) fn validated(
     let image = images[sequence.len()];
     let length_m = norm(sub(image, receiver));
     let mut materials = Vec::with_capacity(sequence.len());
+    let mut cosines = Vec::with_capacity(sequence.len());
     let mut point = receiver;
     let mut arrival = None;
     for (i, &id) in sequence.iter().enumerate().rev() {
@@ -161,14 +164,23 @@ pub(crate) fn validated(
         };
         arrival.get_or_insert(heading);
         materials.push(material);
+        cosines.push(dot(heading, plane.normal).abs());
         point = before_hit(point, heading, distance.min(hit.distance));
     }
     if !visible(scene, point, source) {
         return None;
     }
     materials.reverse();
+    cosines.reverse();
     let out = sub(point, source);
-    Some(ExactPath { image, materials, length_m, departure: scale(out, 1.0 / norm(out)), arrival: arrival? })
+    Some(ExactPath {
+        image,
+        materials,
+        cosines,
+        length_m,
+        departure: scale(out, 1.0 / norm(out)),
+        arrival: arrival?,
+    })
 }
 
 /// Adds the direct path and all specular paths of up to `order` reflections to `paths`.

@@ -9,7 +9,7 @@ use crate::techniques::{Use, Ways};
 use crate::vector::{Vec3, dot, norm, scale, sub};
 use crate::walk::{Sphere, before_hit, next_hit, reflected, visible};
 use rand::Rng;
-use sabine_acoustics::{Contribution, PathSet, Reflection};
+use sabine_acoustics::{Contribution, Incidence, PathSet, Reflection};
 use std::f64::consts::PI;
 
 /// The ends of the paths.
@@ -41,6 +41,8 @@ pub(crate) struct Arrival {
     /// Towards the side from which the ray came.
     pub normal: Vec3,
     pub material: u32,
+    /// Cosine of the angle between the ray and the normal.
+    pub cosine: f64,
     pub travelled_m: f64,
     /// Of the reflections before this one.
     pub mixture: EventMixture,
@@ -85,7 +87,9 @@ impl Walk {
             let arrival = &self.arrivals[self.chains.len() - 1];
             let scattered = arrival.area_m2.is_some();
             let reflection = if scattered { Reflection::Scattered } else { Reflection::Specular };
-            let longer = paths.reflect(self.chains[self.chains.len() - 1], arrival.material, reflection);
+            let incidence = Incidence::Cosine(arrival.cosine);
+            let last = self.chains[self.chains.len() - 1];
+            let longer = paths.reflect_at(last, arrival.material, reflection, incidence);
             self.chains.push(longer);
         }
         self.chains[depth]
@@ -233,9 +237,9 @@ impl<'a> Tracing<'a> {
             let reflection = if scattered { Reflection::Scattered } else { Reflection::Specular };
             let normal = surface.normal_against(heading);
             let point = before_hit(origin, heading, hit.distance);
+            let cosine_in = -dot(heading, normal);
             let mut ways_here = ways;
             if !mirrored {
-                let cosine_in = -dot(heading, normal);
                 if ever_scattered {
                     ways_here.inner_stretch(stretch_m, cosine_out * cosine_in);
                 } else {
@@ -251,6 +255,7 @@ impl<'a> Tracing<'a> {
                 point,
                 normal,
                 material,
+                cosine: cosine_in.clamp(0.0, 1.0),
                 travelled_m,
                 mixture,
                 ways: ways_here,

@@ -11,7 +11,7 @@
 //! noise adds up over a response to -63 dB of the response's energy in the octave where it is worst. Responses end
 //! when the slowest octave has fallen by 65 dB.
 //!
-//! What it does **not** do: phase at walls, standing waves, diffraction, rooms other than boxes. The particles' first
+//! What it does **not** do: phase at walls (nor angle, but where that is the effect), standing waves, diffraction, rooms other than boxes. The particles' first
 //! passages are blurred by the time that sound takes across a sphere of 1 m.
 //!
 //! Order of events: the room, the source, the way, the microphone (noise joins here), the channel, the recorder. An effect changes the
@@ -26,6 +26,7 @@ mod coupled_tail;
 mod distortion;
 mod hidden;
 mod image_field;
+mod local_reaction;
 mod missing_surfaces;
 mod noise;
 mod panel;

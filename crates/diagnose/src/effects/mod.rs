@@ -1,6 +1,7 @@
 //! The catalogue: one file an effect.
 
 mod air_absorption;
+mod angle_dependent_absorption;
 mod background_noise;
 mod channel_fault;
 mod coupled_volume;
@@ -19,6 +20,7 @@ mod transducer_response;
 mod truncation;
 
 pub use air_absorption::AirAbsorption;
+pub use angle_dependent_absorption::AngleDependentAbsorption;
 pub use background_noise::BackgroundNoise;
 pub use channel_fault::ChannelFault;
 pub use coupled_volume::CoupledVolume;
@@ -57,6 +59,7 @@ pub fn catalogue() -> Vec<Box<dyn Effect>> {
         Box::new(ChannelFault),
         Box::new(ExtraReflector),
         Box::new(OpenPatch),
+        Box::new(AngleDependentAbsorption),
         Box::new(NonlinearDistortion),
     ]
 }

@@ -65,6 +65,7 @@ impl TracedPair {
                     .collect(),
                 variance: vec![0.0; singles.len()],
                 // A share more of each reflection is scattered, and lost to the mirror; what was scattered never comes back as one.
+                local_reaction: Vec::new(),
                 scattering: SCATTERING_GRID
                     .iter()
                     .map(|extra| {

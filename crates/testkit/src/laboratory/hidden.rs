@@ -121,6 +121,12 @@ pub enum Hidden {
         /// Lengths along the two axes of the face in their order, in metres.
         size_m: [f64; 2],
     },
+    /// All walls react locally: what they reflect depends on the angle, by a share (in the logarithm) between the same at all angles and that
+    /// of a real impedance with the same random-incidence absorption.
+    AngleDependentAbsorption {
+        /// The share, 0 to 1.
+        share: f64,
+    },
     /// The loudspeaker is driven too hard while it plays an exponential sweep at full scale: the harmonics of the sweep come before the
     /// direct sound. To be measured in a room that declares a common latency, for the recording begins before the emission.
     NonlinearDistortion {
@@ -214,7 +220,7 @@ pub struct Gap {
 
 impl Hidden {
     /// Identifiers of the catalogue's effects.
-    pub const CATALOGUE: [&'static str; 17] = [
+    pub const CATALOGUE: [&'static str; 18] = [
         "transducer_response",
         "air_absorption",
         "source_directivity",
@@ -232,6 +238,7 @@ impl Hidden {
         "extra_reflector",
         "open_patch",
         "nonlinear_distortion",
+        "angle_dependent_absorption",
     ];
     /// Names of the effects that no catalogue holds.
     pub const OUTSIDE: [&'static str; 3] = ["gain_drift", "dropouts", "foreign_chirp"];
@@ -262,6 +269,7 @@ impl Hidden {
             Self::ExtraReflector { .. } => "extra_reflector",
             Self::OpenPatch { .. } => "open_patch",
             Self::NonlinearDistortion { .. } => "nonlinear_distortion",
+            Self::AngleDependentAbsorption { .. } => "angle_dependent_absorption",
             Self::GainDrift { .. } => "gain_drift",
             Self::Dropouts { .. } => "dropouts",
             Self::ForeignChirp { .. } => "foreign_chirp",
@@ -320,6 +328,7 @@ impl Hidden {
             | Self::Truncation { .. }
             | Self::ExtraReflector { .. }
             | Self::OpenPatch { .. }
+            | Self::AngleDependentAbsorption { .. }
             | Self::GainDrift { .. }
             | Self::Dropouts { .. }
             | Self::ForeignChirp { .. } => {}

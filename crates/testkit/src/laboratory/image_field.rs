@@ -1,6 +1,7 @@
 //! What mirrors send: image sources, each with a sign of its own.
 
 use super::box_decay::{BoxDecay, LANES};
+use super::local_reaction::LocalReaction;
 use super::panel::{self, Panel};
 use super::patch::{self, Patch};
 use super::stream::{Purpose, key, mix, unit};
@@ -76,8 +77,10 @@ pub(crate) fn add_images(
     let share = PULSES_PER_SAMPLE * columns.rate_hz * volume_m3 / (4.0 * PI * medium.speed_m_s);
     let (panels, patches) = (Panel::all(truth), Patch::all(truth));
     panel::add_reflections(truth, medium, &panels, pair, columns);
+    let local = LocalReaction::of(truth);
     let weights = decay.weights(medium);
     let mut row = [0.0; LANES];
+    let mut by_angle = [1.0; LANES];
     let mut amplitudes = vec![0.0; bands];
     for x in &axes[0].images {
         let row_x = mix(seed ^ x.index as u64);
@@ -97,13 +100,19 @@ pub(crate) fn add_images(
                 let time_s = length_m / medium.speed_m_s;
                 let hash = mix(row_seed ^ z.index as u64);
                 let mut worth = *weights.at(time_s);
-                (0..LANES).for_each(|b| worth[b] *= row[b] * z.walls[b]);
+                let offset = [x.offset_m, y.offset_m, z.offset_m];
+                if let Some(local) = &local {
+                    let met = [x.index, y.index, z.index].map(times_met);
+                    let met = [met[0][0], met[0][1], met[1][0], met[1][1], met[2][0], met[2][1]];
+                    let cosines = offset.map(|o| o / length_m);
+                    (0..bands).for_each(|b| by_angle[b] = local.factor(b, met, cosines));
+                }
+                (0..LANES).for_each(|b| worth[b] *= by_angle[b] * row[b] * z.walls[b]);
                 let strongest = worth.into_iter().fold(0.0, f64::max);
                 let kept = (share * strongest / square).min(1.0);
                 if unit(hash) >= kept {
                     continue;
                 }
-                let offset = [x.offset_m, y.offset_m, z.offset_m];
                 if !patches.is_empty() && patch::is_lost(truth, &patches, receiver, offset) {
                     continue;
                 }
@@ -116,7 +125,8 @@ pub(crate) fn add_images(
                 let cosine = along / length_m;
                 let scale = sign / length_m / kept.sqrt();
                 for b in 0..bands {
-                    let energy = row[b] * z.walls[b] * (-medium.exponents_per_m[b] * length_m).exp();
+                    let energy =
+                        by_angle[b] * row[b] * z.walls[b] * (-medium.exponents_per_m[b] * length_m).exp();
                     amplitudes[b] = scale * energy.sqrt() * gains[b] * source.gain(b, cosine);
                 }
                 if !panels.is_empty() && panel::concerns([x.index, y.index, z.index]) {

@@ -244,6 +244,9 @@ impl Truth {
                 panel::check(self, &Panel::new(*centre_m, *normal, *size_m, reflectance.clone()))
             }
             Hidden::OpenPatch { face, centre_m, size_m } => Patch::new(*face, *centre_m, *size_m).check(self),
+            Hidden::AngleDependentAbsorption { share } => {
+                check_range("share of local reaction", *share, 0.0, 1.0, "between 0 and 1")
+            }
             Hidden::NonlinearDistortion { sweep_s, from_hz, to_hz, quadratic, cubic, lead_in_s } => {
                 check_range("length of the sweep (s)", *sweep_s, 0.1, 60.0, "between 0.1 and 60 s")?;
                 check_range("first frequency (Hz)", *from_hz, 1.0, 20e3, "between 1 Hz and 20 kHz")?;

@@ -75,6 +75,7 @@ impl Hidden {
             "channel_fault.swap" => swap(r, truth, strength)?,
             "extra_reflector" => missing_surfaces::extra_reflector(r, truth, strength),
             "open_patch" => missing_surfaces::open_patch(r, truth, strength),
+            "angle_dependent_absorption" => Self::AngleDependentAbsorption { share: strength.min(1.0) },
             "nonlinear_distortion" => nonlinear_distortion(r, strength),
             "gain_drift" => Self::GainDrift {
                 depth_db: 4.0 * strength,
