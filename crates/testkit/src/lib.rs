@@ -10,6 +10,7 @@
 //! - [`Phonons`]: particles in any closed mesh, as energy with standard errors and as pressure: the truth behind the
 //!   recording in `fixtures/`.
 //! - [`Laboratory`]: random rooms, measured with any of the effects of [`Hidden`] at work.
+//! - [`ScreenedRoom`]: random rooms with a screen, measured by [`WaveGrid`].
 //! - [`assert_close`], [`assert_all_close`], [`assert_within_standard_errors`], [`read_golden`]: tolerances that say what they allow.
 //!
 //! What it does **not** do: run fast, read files of users, or follow diffraction but in [`WaveGrid`].
@@ -46,7 +47,10 @@ mod wave_grid;
 
 pub use box_modes::BoxModes;
 pub use brute_force::BruteForceRays;
-pub use laboratory::{End, Fault, Gap, Hidden, LabConfig, Laboratory, TrueMaterial, TrueSource, Truth};
+pub use laboratory::{
+    End, Fault, Gap, Hidden, LabConfig, Laboratory, ScreenedConfig, ScreenedRoom, TrueMaterial, TrueSource,
+    Truth,
+};
 pub use phonons::{PhononConfig, PhononEnergy, Phonons};
 pub use shoebox::{Image, ShoeboxImages};
 pub use tolerance::{assert_all_close, assert_close, assert_within_standard_errors, read_golden};

@@ -132,6 +132,11 @@ impl WaveGrid {
         self.cells.map(|n| n as f64 * self.cell_m)
     }
 
+    /// Side of a cell in metres.
+    pub fn cell_m(&self) -> f64 {
+        self.cell_m
+    }
+
     /// The middle of a cell in metres.
     pub fn centre_m(&self, cell: [usize; 3]) -> Vec3 {
         cell.map(|i| (i as f64 + 0.5) * self.cell_m)
