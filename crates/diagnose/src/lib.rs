@@ -64,6 +64,7 @@ mod config;
 mod diagnoser;
 mod diagnosis;
 mod discrepancy;
+mod edges;
 mod effect;
 mod effects;
 mod energy_model;

@@ -4,6 +4,7 @@ mod air_absorption;
 mod background_noise;
 mod channel_fault;
 mod coupled_volume;
+mod edge_diffraction;
 mod extra_reflector;
 mod open_patch;
 mod position_error;
@@ -21,6 +22,7 @@ pub use air_absorption::AirAbsorption;
 pub use background_noise::BackgroundNoise;
 pub use channel_fault::ChannelFault;
 pub use coupled_volume::CoupledVolume;
+pub use edge_diffraction::EdgeDiffraction;
 pub use extra_reflector::ExtraReflector;
 pub use open_patch::OpenPatch;
 pub use position_error::PositionError;
@@ -55,6 +57,7 @@ pub fn catalogue() -> Vec<Box<dyn Effect>> {
         Box::new(ChannelFault),
         Box::new(ExtraReflector),
         Box::new(OpenPatch),
+        Box::new(EdgeDiffraction),
     ]
 }
 
