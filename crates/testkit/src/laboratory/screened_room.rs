@@ -17,7 +17,7 @@ use std::path::Path;
 /// Side of the cells in metres, by and large.
 const CELL_M: f64 = 0.031;
 /// Sample rate of the responses, and what is kept of them, in Hz.
-const RATE_HZ: u32 = 8000;
+const RATE_HZ: u32 = 6000;
 const PASS_HZ: [f64; 4] = [60.0, 130.0, 1800.0, 2600.0];
 /// Octaves of the material tables.
 const OCTAVES_HZ: (f64, f64) = (250.0, 1000.0);
@@ -52,7 +52,7 @@ pub struct ScreenedConfig {
 ///
 /// Sides of 4.2 to 5.2 m, 3.2 to 4 m, height 2.4 to 2.8 m; walls locally reacting, the same at all frequencies, with a random-incidence
 /// absorption of 0.2 to 0.6. The screen is rigid, 1.4 to 1.8 m high, and leaves 0.5 to 0.9 m free on either side; it is in the
-/// mesh. Octaves of 250 Hz to 1 kHz at 8 kHz; air of 18 to 24 C that loses nothing.
+/// mesh. Octaves of 250 Hz to 1 kHz at 6 kHz; air of 18 to 24 C that loses nothing.
 ///
 /// Not told, as in [`Laboratory`](crate::Laboratory): microphones differ by 0.3 dB, receivers are 5 mm from where they are said to
 /// be, tables are 0.03 from the truth in each octave, white noise at -60 dB.
