@@ -465,7 +465,8 @@ fn align_shadowed(
         let kernels = &kernels[&samples[i].sample_rate_hz()];
         if let Ok(found) = Measured::read(&samples[i], survey.bands, kernels, begin_s) {
             survey.responses[i].direct_s = begin_s;
-            measured[i] = found;
+            // What comes first has another shape than a direct sound: its sign says nothing.
+            measured[i] = Measured { pulse: Vec::new(), ..found };
         }
     }
 }
