@@ -6,6 +6,7 @@ use super::stream::{Purpose, stream};
 use crate::box_modes::BoxModes;
 use crate::geometry::Vec3;
 use crate::own_air::speed_of_sound_m_s;
+use crate::phonons::{PhononConfig, Phonons};
 use crate::wave_grid::{ThinScreen, WaveGrid};
 use rand_pcg::Pcg64Mcg;
 use sabine_acoustics::{
@@ -39,6 +40,9 @@ const NEAR_M: f64 = 1.5;
 const TRIES: usize = 20_000;
 /// How far responses fall before they end (by Eyring), in dB.
 const FALL_DB: f64 = 55.0;
+/// Particles in each octave for each receiver, and the radius of the sphere about it in metres.
+const PARTICLES: u32 = 20_000;
+const PARTICLE_RADIUS_M: f64 = 0.25;
 /// Energy of the recorder's noise relative to the response's own, in dB.
 const FLOOR_DB: f64 = -60.0;
 
@@ -173,11 +177,30 @@ impl ScreenedRoom {
             .collect()
     }
 
-    /// Writes the measured room into a new folder.
+    /// What particles would measure in the same room, that fly straight and bend nowhere.
+    ///
+    /// # Errors
+    /// What [`Phonons`] give.
+    pub fn straight_responses(&self) -> Result<Vec<ImpulseResponse>, Error> {
+        let declared = &self.declared;
+        let config = PhononConfig {
+            particles: PARTICLES,
+            detector_radius_m: PARTICLE_RADIUS_M,
+            duration_s: self.duration_s,
+            seed: self.seed,
+        };
+        let particles = Phonons::new(&declared.scene, config)?;
+        let respond = |receiver: &Receiver| {
+            particles.impulse_response(&declared.source, receiver, &declared.air, RATE_HZ)
+        };
+        declared.receivers.iter().map(respond).collect()
+    }
+
+    /// Writes the room measured in this way, receiver by receiver, into a new folder.
     ///
     /// # Errors
     /// As [`NewRoom::write`].
-    pub fn write(&self, folder: &Path) -> Result<MeasuredRoom, Error> {
+    pub fn write(&self, responses: Vec<ImpulseResponse>, folder: &Path) -> Result<MeasuredRoom, Error> {
         let declared = &self.declared;
         let entry = |(samples, receiver): (ImpulseResponse, &Receiver)| NewResponse {
             source: declared.source.id.clone(),
@@ -194,7 +217,7 @@ impl ScreenedRoom {
             measurement: Measurement { time_zero: TimeZero::Emission, levels: Levels::Common },
             sources: vec![declared.source.clone()],
             receivers: declared.receivers.clone(),
-            responses: self.responses()?.into_iter().zip(&declared.receivers).map(entry).collect(),
+            responses: responses.into_iter().zip(&declared.receivers).map(entry).collect(),
         }
         .write(folder)
     }
