@@ -41,8 +41,8 @@ const TRIES: usize = 20_000;
 /// How far responses fall before they end (by Eyring), in dB.
 const FALL_DB: f64 = 55.0;
 /// Particles in each octave for each receiver, and the radius of the sphere about it in metres.
-const PARTICLES: u32 = 20_000;
-const PARTICLE_RADIUS_M: f64 = 0.25;
+const PARTICLES: u32 = 60_000;
+const PARTICLE_RADIUS_M: f64 = 0.12;
 /// Energy of the recorder's noise relative to the response's own, in dB.
 const FLOOR_DB: f64 = -60.0;
 
