@@ -27,6 +27,7 @@ pub fn effect(id: &str) -> String {
         "angle_dependent_absorption" => "Walls absorb by angle",
         "open_patch" => "An opening in a wall",
         "nonlinear_distortion" => "Loudspeaker overdriven",
+        "edge_diffraction" => "Sound bends around edges",
         other => return other.replace('_', " "),
     };
     known.to_owned()

@@ -73,8 +73,11 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error + Send + Sync>> {
     let speech = read_audio(&speech_path, channel)?;
     let dry = read_audio(&dry_path, channel)?;
     let mut room = MeasuredRoom::read(&room_path)?;
+    let mut diffraction = false;
     if let Some(model) = &arguments.model {
-        room = ExtendedModel::read(model)?.room(&room)?.measured_room(&room)?;
+        let extended = ExtendedModel::read(model)?.room(&room)?;
+        diffraction = extended.diffraction;
+        room = extended.measured_room(&room)?;
     }
     let first = |ids: Vec<&str>| ids.first().map(ToString::to_string).unwrap_or_default();
     let source =
@@ -91,6 +94,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error + Send + Sync>> {
         receiver: &receiver,
     };
     let mut config = MatchConfig { seed: arguments.seed, ..MatchConfig::default() };
+    config.tracer.diffraction |= diffraction;
     if let Some(rays) = arguments.rays {
         config.tracer.rays = rays;
     }

@@ -14,10 +14,12 @@ use crate::views::ArrivalView;
 use crate::{Error, Survey};
 use sabine_acoustics::TimeZero;
 
-/// How well the time of a direct sound can be read: a third of a sample at 16 kHz.
+/// How well the time of a direct sound can be read at [`READ_HZ`]: a third of a sample. Slower recordings are read worse.
 const DIRECT_SD_S: f64 = 2.5e-5;
 /// The same of a reflection, whose neighbours pull at its peak.
 const REFLECTION_SD_S: f64 = 5e-5;
+/// Sample rate from which times are read as well as that.
+const READ_HZ: f64 = 16e3;
 /// Share of peaks that belong to no predicted reflection.
 const STRAY_SHARE: f64 = 0.4;
 /// Share of all peaks' worth that one peak has in which a surface that the mesh lacks is seen: two of three responses show it.
@@ -169,6 +171,7 @@ impl<'a> ArrivalModel<'a> {
     fn pair_likelihood(&self, values: &[f64], pair: usize, mut slopes: Option<&mut Slopes>) -> f64 {
         let Some((direct, later)) = self.data.arrivals[pair].split_first() else { return 0.0 };
         let measured = &self.data.measured[self.assignment[pair]];
+        let direct_sd_s = DIRECT_SD_S * measured.slowness();
         let mut push = |found: &[(usize, f64)], residual: f64, sd: f64, share: f64| {
             let Some(slopes) = slopes.as_deref_mut() else { return };
             let weight = share / (sd * sd);
@@ -182,15 +185,15 @@ impl<'a> ArrivalModel<'a> {
         let (time_s, found) = self.time(values, pair, direct, true);
         let residual = measured.direct_s - time_s;
         let Some(width_s) = self.width_s else {
-            push(&found, residual, DIRECT_SD_S, 1.0);
-            return -0.5 * (residual / DIRECT_SD_S).powi(2);
+            push(&found, residual, direct_sd_s, 1.0);
+            return -0.5 * (residual / direct_sd_s).powi(2);
         };
-        let sd = DIRECT_SD_S.hypot(width_s);
+        let sd = direct_sd_s.hypot(width_s);
         let (right, wrong) = ((1.0 - MISREAD_SHARE) * normal(residual, sd), MISREAD_SHARE / PEAKS_S);
         push(&found, residual, sd, right / (right + wrong));
         let mut value = (right + wrong).ln();
 
-        let sd = REFLECTION_SD_S.hypot(width_s);
+        let sd = (REFLECTION_SD_S * measured.slowness()).hypot(width_s);
         let amplitude: f64 = later.iter().map(|a| a.energy.sqrt()).sum();
         if amplitude <= 0.0 {
             return value;
@@ -308,6 +311,13 @@ fn offered(model: &mut ArrivalModel<'_>, neutral: &[f64]) -> Vec<Vec<f64>> {
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
     model.width_s = None;
     ranked.into_iter().take(MOST_STARTS).map(|(_, x)| x).collect()
+}
+
+impl Measured {
+    /// By how much worse times are read than at [`READ_HZ`] or above.
+    fn slowness(&self) -> f64 {
+        (READ_HZ / f64::from(self.sample_rate_hz)).max(1.0)
+    }
 }
 
 /// A model that is ready to be looked at with fitted values.

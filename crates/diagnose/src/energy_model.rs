@@ -250,7 +250,7 @@ impl<'a> EnergyModel<'a> {
         (ln_energy, slopes)
     }
 
-    fn view(&self, pair: usize, band: usize) -> BandView<'_> {
+    fn view(&self, pair: usize, band: usize, gain_db: f64) -> BandView<'_> {
         BandView {
             survey: self.data.survey,
             pair,
@@ -259,6 +259,7 @@ impl<'a> EnergyModel<'a> {
             state: &self.data.states[pair][band],
             direct_s: self.data.direct_s[pair],
             reference: self.data.reference[band],
+            gain: (gain_db * LN_PER_DB).exp(),
         }
     }
 
@@ -272,7 +273,8 @@ impl<'a> EnergyModel<'a> {
     /// Logarithm of the predicted energy in the bins of a pair and band, as many as are compared.
     pub fn predicted(&self, values: &[f64], pair: usize, band: usize, count: usize) -> Vec<f64> {
         let (mut ln_energy, _) = self.paths(values, pair, band, count);
-        self.apply(values, &self.view(pair, band), self.gain_db(values, pair), &mut ln_energy);
+        let gain_db = self.gain_db(values, pair);
+        self.apply(values, &self.view(pair, band, gain_db), gain_db, &mut ln_energy);
         ln_energy
     }
 
@@ -305,10 +307,10 @@ impl<'a> EnergyModel<'a> {
         let count = energies.len();
         let bands = self.data.survey.bands.len();
         let m = self.data.absorption.len();
-        let view = self.view(pair, band);
+        let gain_db = self.gain_db(values, pair);
+        let view = self.view(pair, band, gain_db);
         let (paths, path_slopes) = self.paths(values, pair, band, count);
         let mut predicted = paths.clone();
-        let gain_db = self.gain_db(values, pair);
         self.apply(values, &view, gain_db, &mut predicted);
         let silence = SILENCE * self.data.reference[band];
         let dispersion = self.data.dispersion[band];
@@ -323,7 +325,10 @@ impl<'a> EnergyModel<'a> {
         let through = self.through(values, &view, gain_db, &paths);
         let mut rows: Vec<Vec<f64>> =
             (0..m).map(|k| (0..count).map(|bin| path_slopes[bin * m + k] * through[bin]).collect()).collect();
-        let gain: Vec<f64> = through.iter().map(|t| t * LN_PER_DB).collect();
+        // What bends around edges has the same gain.
+        let gained =
+            if view.state.bent.is_empty() { through } else { self.with_gain(values, &view, gain_db, &paths) };
+        let gain: Vec<f64> = gained.iter().map(|t| t * LN_PER_DB).collect();
         if let Some(index) = self.common_gain {
             columns.push(index);
             rows.push(gain.clone());
@@ -364,6 +369,17 @@ impl<'a> EnergyModel<'a> {
         let at = |offset: f64| {
             let mut moved: Vec<f64> = paths.iter().map(|p| p + offset).collect();
             self.apply(values, view, gain_db, &mut moved);
+            moved
+        };
+        at(STEP).iter().zip(at(-STEP)).map(|(up, down)| (up - down) / (2.0 * STEP)).collect()
+    }
+
+    /// The same of a change of the gain, with which goes what does not come along the paths.
+    fn with_gain(&self, values: &[f64], view: &BandView<'_>, gain_db: f64, paths: &[f64]) -> Vec<f64> {
+        let at = |offset: f64| {
+            let mut moved: Vec<f64> = paths.iter().map(|p| p + offset).collect();
+            let view = BandView { gain: view.gain * offset.exp(), ..*view };
+            self.apply(values, &view, gain_db + offset / LN_PER_DB, &mut moved);
             moved
         };
         at(STEP).iter().zip(at(-STEP)).map(|(up, down)| (up - down) / (2.0 * STEP)).collect()

@@ -66,6 +66,9 @@ pub struct ExtendedModel {
     /// Responses that were exchanged.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub exchanged: Vec<[String; 2]>,
+    /// Sound bends around the edges of the mesh, as theory has it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub diffraction: bool,
     /// Flat surfaces that the mesh lacks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sheets: Vec<Sheet>,

@@ -95,6 +95,7 @@ pub(crate) fn extended_model(bench: &Workbench, search: &Search<'_>, state: &Sta
                     model.sheets.extend(sheets::hole(plane, inside, &found));
                 }
             }
+            "edge_diffraction" => model.diffraction = true,
             "time_zero" => model.latency_s = Some(1e-3 * values[0]),
             "position_error" => {
                 let offset: Vec<f64> = parameters(search, state, candidate).iter().map(|p| p.value).collect();

@@ -138,6 +138,7 @@ pub(crate) fn gates(
                     state,
                     direct_s: bench.direct_s[pair],
                     reference: bench.reference[band],
+                    gain: 1.0,
                 };
                 let mut ln = fitted(state, bench, absorption, band);
                 for (case, own) in cases.iter().zip(values).filter(|(c, _)| c.stage() == Stage::Room) {

@@ -16,7 +16,7 @@
 //!
 //! # Does not
 //! - see what is not in its [`catalogue`]: then the verdict is [`Verdict::Unexplained`] and the residuals show where it sits.
-//! - diffract or solve waves: effects that need it are not built.
+//! - solve waves, or follow sound around more than one edge.
 //! - change scattering, geometry or air to make a fit look better: only what is named changes.
 //! - tell apart what the data cannot: a sampling clock and a temperature scale all times alike, and come out as a set.
 //!
@@ -49,6 +49,7 @@
 //! | panels and holes are found and located | `tests/hidden_surfaces.rs` |
 //! | evidence and bounds of the fit against closed forms | unit tests of the fit |
 //! | spread, groups of paths, octave shares against closed forms | unit tests of their modules |
+//! | what bends around a screen is found in finite differences of the wave equation, and not where sound goes straight | `tests/hidden_edges.rs` |
 //! | rendering from the extended model against closed forms | `tests/rendering.rs` |
 //!
 //! `docs/validation/diagnose.md` has the figures, `cargo run --release --example effect_atlas` makes them.
@@ -65,6 +66,7 @@ mod config;
 mod diagnoser;
 mod diagnosis;
 mod discrepancy;
+mod edges;
 mod effect;
 mod effects;
 mod energy_model;

@@ -52,13 +52,27 @@ impl Measured {
     ) -> Result<Self, NoReading> {
         let sample_rate_hz = response.sample_rate_hz();
         let rate = f64::from(sample_rate_hz);
-        let samples = response.samples();
-        let onset = Onset::find(samples, sample_rate_hz)?;
-        let smooth = smoothed_energy(samples, rate);
+        let onset = Onset::find(response.samples(), sample_rate_hz)?;
+        let smooth = smoothed_energy(response.samples(), rate);
         let end = (onset.index + (DIRECT_S * rate).ceil() as usize + 1).min(smooth.len());
         let largest = (onset.index..end).max_by(|&a, &b| smooth[a].total_cmp(&smooth[b]));
         let direct = largest.unwrap_or(onset.index);
         let direct_s = vertex(&smooth, direct) / rate;
+        Self::read(response, bands, kernels, direct_s)
+    }
+
+    /// With times from an instant (seconds from the first sample) other than that of its direct sound, which it need not have.
+    pub fn read(
+        response: &ImpulseResponse,
+        bands: OctaveBands,
+        kernels: &[BandKernel],
+        direct_s: f64,
+    ) -> Result<Self, NoReading> {
+        let sample_rate_hz = response.sample_rate_hz();
+        let rate = f64::from(sample_rate_hz);
+        let samples = response.samples();
+        let smooth = smoothed_energy(samples, rate);
+        let direct = ((direct_s * rate).round().max(0.0) as usize).min(smooth.len().saturating_sub(1));
         let bank = FilterBank::new(bands, sample_rate_hz).map_err(|_| NoReading::NoOnset)?;
         let filtered = bank.analyse(samples);
         let duration_s = samples.len() as f64 / rate;

@@ -28,6 +28,8 @@ pub struct ExtendedRoom {
     pub sources: Vec<Source>,
     /// Receivers where they stand, likewise.
     pub receivers: Vec<Receiver>,
+    /// Whether sound bends around edges: for [`TracerConfig::diffraction`](sabine_propagate::TracerConfig::diffraction).
+    pub diffraction: bool,
     /// Pattern and axis of each source; `None` is omnidirectional.
     pub directivities: Vec<Option<(Directivity, Orientation)>>,
     chain: RecordingChain,
@@ -177,7 +179,8 @@ impl ExtendedModel {
         let directivities =
             sources.iter().map(|source| self.pattern(source, own, bands)).collect::<Result<_, Fault>>()?;
         let chain = RecordingChain::new(self.clone(), own);
-        Ok(ExtendedRoom { scene, air, attenuation, sources, receivers, directivities, chain })
+        let diffraction = self.diffraction;
+        Ok(ExtendedRoom { scene, air, attenuation, sources, receivers, diffraction, directivities, chain })
     }
 
     fn scene(&self, stated: &Scene, materials: Vec<Material>) -> Result<Scene, Cause> {

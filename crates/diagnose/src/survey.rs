@@ -48,6 +48,7 @@ pub struct Survey {
     pub(crate) declared_scattering: f64,
     pub(crate) planes: Vec<Plane>,
     pub(crate) material_areas_m2: Vec<f64>,
+    pub(crate) bent: Vec<usize>,
 }
 
 impl Survey {
@@ -99,6 +100,11 @@ impl Survey {
     /// The largest flat surfaces of the mesh.
     pub fn planes(&self) -> &[Plane] {
         &self.planes
+    }
+
+    /// Responses (indices) whose source and receiver do not see each other, with an edge of the mesh between them.
+    pub fn bent_responses(&self) -> &[usize] {
+        &self.bent
     }
 
     /// Area of a material in square metres.

@@ -1,8 +1,10 @@
 //! Traced paths between one source and one receiver, and the energies that they predict.
 
+mod bent;
 mod local_reaction;
 mod singles;
 
+pub(crate) use bent::BentEnergy;
 use local_reaction::LOCAL_GRID;
 pub(crate) use singles::Single;
 
@@ -48,9 +50,11 @@ pub(crate) struct Arrival {
 /// Paths of one pair with what does not change from fit to fit.
 pub(crate) struct TracedPair {
     paths: PathSet,
+    /// Paths around edges, where the direct line is blocked; not part of the prediction as traced.
+    bent: Option<PathSet>,
     pub air: Air,
     pub speed_m_s: f64,
-    /// Time of flight of the direct sound, or of the shortest path where that is blocked.
+    /// Time of flight of the direct sound, or of the shortest path where that is blocked, those around edges included.
     pub direct_s: f64,
     /// Hits of each path on each material.
     hits: Vec<f32>,
@@ -82,6 +86,8 @@ pub(crate) struct BandState {
     pub departure_products: Vec<[f64; 6]>,
     /// Expected variance of a measured bin about the prediction, as a share of its energy squared.
     pub variance: Vec<f64>,
+    /// What bends around edges.
+    pub bent: BentEnergy,
     /// Logarithm of the change of energy, `[grid][bin]`; empty until tabulated.
     scattering: Vec<Vec<f64>>,
     /// The same for walls that react locally by a share.
@@ -112,9 +118,10 @@ fn between(grid: &[f64], table: &[Vec<f64>], bin: usize, x: f64) -> f64 {
 
 impl TracedPair {
     /// `stated` are the materials as far as they are known: they say which paths matter.
-    pub fn new(paths: PathSet, air: Air, stated: &[Material]) -> Result<Self, Error> {
+    pub fn new(paths: PathSet, bent: Option<PathSet>, air: Air, stated: &[Material]) -> Result<Self, Error> {
         let speed_m_s = air.speed_of_sound_m_s();
-        let shortest = paths.lengths_m().iter().copied().fold(f32::INFINITY, f32::min);
+        let around = bent.as_ref().map_or(&[][..], |bent| bent.lengths_m());
+        let shortest = paths.lengths_m().iter().chain(around).copied().fold(f32::INFINITY, f32::min);
         let direct = (0..paths.len()).find(|&i| paths.is_direct(i)).map(|i| paths.lengths_m()[i]);
         let direct_s = f64::from(direct.unwrap_or(shortest)) / speed_m_s;
         let materials = paths.materials();
@@ -131,7 +138,7 @@ impl TracedPair {
         let energies = paths.energies(stated, &air)?;
         let weights: Vec<f32> = (0..paths.len()).map(|i| energies.iter().map(|e| e[i]).sum()).collect();
         let groups = hit_groups::group(&times_s, &weights, &hits, materials);
-        Ok(Self { paths, air, speed_m_s, direct_s, hits, departures, times_s, groups })
+        Ok(Self { paths, bent, air, speed_m_s, direct_s, hits, departures, times_s, groups })
     }
 
     /// The same paths in other air.
@@ -187,6 +194,8 @@ impl TracedPair {
                 }
             }
         }
+        let bent = self.bent_energies(materials, kernels, duration_s)?;
+        states.iter_mut().zip(bent).for_each(|(state, bent)| state.bent = bent);
         if scattering {
             let mut table: Vec<Vec<Vec<f64>>> = vec![Vec::new(); bands.len()];
             for (place, &extra) in SCATTERING_GRID.iter().enumerate() {
@@ -370,6 +379,7 @@ impl TracedPair {
             departure: Vec::with_capacity(count),
             departure_products: Vec::with_capacity(count),
             variance: Vec::with_capacity(count),
+            bent: BentEnergy::default(),
             scattering: Vec::new(),
             local_reaction: Vec::new(),
         };

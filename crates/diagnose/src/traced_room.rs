@@ -1,5 +1,6 @@
 //! The measured room traced: one set of paths for each response, good for any material.
 
+use crate::edges::Edges;
 use crate::measured::Measured;
 use crate::survey::Survey;
 use crate::traced_pair::{TracedPair, scattering_more};
@@ -74,7 +75,7 @@ pub(crate) fn trace(
     room: &MeasuredRoom,
     survey: &Survey,
     materials: &[Material],
-    (tracer, prepared): (&PathTracer, &PreparedScene),
+    (tracer, prepared, edges): (&PathTracer, &PreparedScene, Option<&Edges>),
     observer: &dyn Observer,
 ) -> Result<Vec<TracedPair>, Error> {
     let mut found: Vec<TracedPair> = Vec::new();
@@ -82,7 +83,9 @@ pub(crate) fn trace(
         report(observer, "tracing", i as u64, survey.responses.len() as u64)?;
         let (source, receiver) = (&room.sources()[response.source], &room.receivers()[response.receiver]);
         let paths = tracer.trace_prepared(prepared, source, receiver, &response.air, &())?;
-        found.push(TracedPair::new(paths, response.air, materials)?);
+        let places_m = [source.position_m, receiver.position_m];
+        let bent = Edges::paths(edges, places_m, paths.max_length_m());
+        found.push(TracedPair::new(paths, bent, response.air, materials)?);
     }
     Ok(found)
 }

@@ -13,6 +13,8 @@ pub struct BandView<'a> {
     pub(crate) state: &'a BandState,
     pub(crate) direct_s: f64,
     pub(crate) reference: f64,
+    /// Factor of the gains on all energy of the room.
+    pub(crate) gain: f64,
 }
 
 impl BandView<'_> {
@@ -69,6 +71,11 @@ impl BandView<'_> {
     /// Energy of a typical early bin of this band, the mean over all pairs: what levels of added sound refer to.
     pub fn reference_energy(&self) -> f64 {
         self.reference
+    }
+
+    /// Energy that bends around edges of the mesh into a bin, by theory; none of it is in the prediction as traced.
+    pub fn bent_energy(&self, bin: usize) -> f64 {
+        self.gain * self.state.bent.of(self.band, bin)
     }
 
     /// Energy-weighted mean of the unit vectors in which the paths of a bin leave the source, and of their products

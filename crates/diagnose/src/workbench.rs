@@ -2,6 +2,7 @@
 
 use crate::arrival_model::{self, ArrivalData};
 use crate::discrepancy::FreeDiscrepancy;
+use crate::edges::Edges;
 use crate::effect::{Case, Nuisance};
 use crate::energy_model::{self, ABSORPTION, Before, BinResidual, EnergyData, EnergyModel};
 use crate::extended_model::Dimensions;
@@ -15,7 +16,7 @@ use crate::{DiagnoseConfig, Error, LeadIns};
 use rayon::prelude::*;
 use sabine_acoustics::{
     Air, ImpulseResponse, Material, MaterialPrior, MeasuredRoom, Observer, PerBand, Receiver, Scene, Source,
-    report,
+    TimeZero, report,
 };
 use sabine_propagate::{PathTracer, PreparedScene};
 use std::collections::BTreeMap;
@@ -57,6 +58,7 @@ pub(crate) struct Workbench {
     scene: Scene,
     tracer: PathTracer,
     prepared: PreparedScene,
+    edges: Option<Edges>,
     sources: Vec<Source>,
     receivers: Vec<Receiver>,
     pub seconds: BTreeMap<&'static str, f64>,
@@ -117,7 +119,8 @@ impl Workbench {
             return Err(Error::NothingToCompare { responses: total });
         }
         // Any rate does for what a filter does over time, as long as it holds the highest band.
-        let kernels = kernels.into_iter().next_back().map(|(_, k)| k).unwrap_or_default();
+        let kernels_by_rate = kernels;
+        let kernels = kernels_by_rate.values().next_back().cloned().unwrap_or_default();
         let vertices = room.scene().vertices();
         let corner = |fold: fn(f64, f64) -> f64, from: f64| {
             std::array::from_fn(|k| vertices.iter().map(|v| v[k]).fold(from, fold))
@@ -125,9 +128,10 @@ impl Workbench {
         let materials: Vec<Material> = room.scene().materials().iter().map(|m| m.material.clone()).collect();
         let scatterings: Vec<f64> = materials.iter().flat_map(|m| m.scattering().values().to_vec()).collect();
         let (planes, material_areas_m2) = crate::planes::planes(room.scene());
-        let survey = Survey {
+        let mut survey = Survey {
             planes,
             material_areas_m2,
+            bent: Vec::new(),
             bands,
             air: room.air(),
             air_assumed: room.air_assumed(),
@@ -150,7 +154,10 @@ impl Workbench {
         let priors: Vec<Vec<Prior>> = room.priors().iter().map(absorption_priors).collect();
         let traced_s = traced_s(&survey, &measured, config.range_db);
         let (scene, tracer, prepared) = prepare(room, &survey, &materials, config, traced_s)?;
-        let pairs = trace(room, &survey, &materials, (&tracer, &prepared), observer)?;
+        let edges = Edges::find(&scene)?;
+        let pairs = trace(room, &survey, &materials, (&tracer, &prepared, edges.as_ref()), observer)?;
+        align_shadowed(&mut survey, &mut measured, &pairs, &samples, &kernels_by_rate);
+        survey.bent = (0..pairs.len()).filter(|&p| pairs[p].is_bent()).collect();
         let absorption = materials
             .iter()
             .map(|m| m.absorption().values().iter().map(|a| a.clamp(ABSORPTION.0, ABSORPTION.1)).collect())
@@ -184,6 +191,7 @@ impl Workbench {
             scene,
             tracer,
             prepared,
+            edges,
             sources: room.sources().to_vec(),
             receivers: room.receivers().to_vec(),
             seconds: BTreeMap::from([("trace", started.elapsed().as_secs_f64())]),
@@ -378,7 +386,9 @@ impl Workbench {
 
     /// Traces everything anew in a room of another size. Arrival times stay relative to the stated one.
     pub fn resize(&mut self, dimensions: &Dimensions) -> Result<(), Error> {
-        self.prepared = self.tracer.prepare(&dimensions.applied(&self.scene)?)?;
+        let resized = dimensions.applied(&self.scene)?;
+        self.prepared = self.tracer.prepare(&resized)?;
+        self.edges = Edges::find(&resized)?;
         for source in 0..self.sources.len() {
             self.retrace(Nuisance::SourcePosition(source))?;
         }
@@ -397,7 +407,9 @@ impl Workbench {
             let ends = (&self.sources[response.source], &self.receivers[response.receiver]);
             if let Ok(paths) = self.tracer.trace_prepared(&self.prepared, ends.0, ends.1, &response.air, &())
             {
-                self.pairs[pair] = TracedPair::new(paths, response.air, &self.materials)?;
+                let places_m = [ends.0.position_m, ends.1.position_m];
+                let bent = Edges::paths(self.edges.as_ref(), places_m, paths.max_length_m());
+                self.pairs[pair] = TracedPair::new(paths, bent, response.air, &self.materials)?;
                 self.direct_s[pair] = self.pairs[pair].direct_s;
                 self.set_air(pair)?;
             }
@@ -429,6 +441,35 @@ impl Workbench {
         self.dispersion =
             dispersion(&residuals, self.survey.bands.len()).iter().map(|d| d.max(1.0)).collect();
         Ok(())
+    }
+}
+
+/// Where the direct line is blocked, the first sound is weak and easily missed: the time axis of such a response begins when its first path
+/// should come, by the times of the direct sounds of others.
+fn align_shadowed(
+    survey: &mut Survey,
+    measured: &mut [Measured],
+    pairs: &[TracedPair],
+    samples: &[ImpulseResponse],
+    kernels: &BTreeMap<u32, Vec<BandKernel>>,
+) {
+    if survey.measurement.time_zero == TimeZero::PerResponse {
+        return;
+    }
+    let in_sight = (0..pairs.len()).filter(|&p| pairs[p].has_direct());
+    let late_s: Vec<f64> = in_sight.map(|p| measured[p].direct_s - pairs[p].direct_s).collect();
+    if late_s.is_empty() && survey.measurement.time_zero != TimeZero::Emission {
+        return;
+    }
+    let late_s = median(late_s);
+    for (i, pair) in pairs.iter().enumerate().filter(|(_, pair)| !pair.has_direct()) {
+        let begin_s = pair.direct_s + late_s;
+        let kernels = &kernels[&samples[i].sample_rate_hz()];
+        if let Ok(found) = Measured::read(&samples[i], survey.bands, kernels, begin_s) {
+            survey.responses[i].direct_s = begin_s;
+            // What comes first has another shape than a direct sound: its sign says nothing.
+            measured[i] = Measured { pulse: Vec::new(), ..found };
+        }
     }
 }
 

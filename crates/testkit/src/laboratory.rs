@@ -34,6 +34,7 @@ mod patch;
 mod random_room;
 mod recorder;
 mod scattered_field;
+mod screened_room;
 mod steep_bands;
 mod stream;
 mod truth;
@@ -42,6 +43,7 @@ mod unfolded;
 
 pub use config::LabConfig;
 pub use hidden::{End, Fault, Gap, Hidden};
+pub use screened_room::{ScreenedConfig, ScreenedRoom};
 pub use truth::{TrueMaterial, TrueSource, Truth};
 
 use box_decay::BoxDecay;

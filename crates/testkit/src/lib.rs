@@ -5,13 +5,15 @@
 //!
 //! - [`ShoeboxImages`]: all image sources of a box, as energy, as pressure and as a [`PathSet`](sabine_acoustics::PathSet).
 //! - [`BoxModes`]: standing waves of a box whose walls have an impedance, exactly.
+//! - [`WaveGrid`]: the wave equation in a box with thin screens, by finite differences.
 //! - [`BruteForceRays`]: every ray against every triangle.
 //! - [`Phonons`]: particles in any closed mesh, as energy with standard errors and as pressure: the truth behind the
 //!   recording in `fixtures/`.
 //! - [`Laboratory`]: random rooms, measured with any of the effects of [`Hidden`] at work.
+//! - [`ScreenedRoom`]: random rooms with a screen, measured by [`WaveGrid`].
 //! - [`assert_close`], [`assert_all_close`], [`assert_within_standard_errors`], [`read_golden`]: tolerances that say what they allow.
 //!
-//! What it does **not** do: run fast, read files of users, or follow diffraction.
+//! What it does **not** do: run fast, read files of users, or follow diffraction but in [`WaveGrid`].
 //!
 //! ```
 //! use sabine_acoustics::{Material, OctaveBands, Receiver, Scene, Source};
@@ -41,10 +43,15 @@ mod own_air;
 mod phonons;
 mod shoebox;
 mod tolerance;
+mod wave_grid;
 
 pub use box_modes::BoxModes;
 pub use brute_force::BruteForceRays;
-pub use laboratory::{End, Fault, Gap, Hidden, LabConfig, Laboratory, TrueMaterial, TrueSource, Truth};
+pub use laboratory::{
+    End, Fault, Gap, Hidden, LabConfig, Laboratory, ScreenedConfig, ScreenedRoom, TrueMaterial, TrueSource,
+    Truth,
+};
 pub use phonons::{PhononConfig, PhononEnergy, Phonons};
 pub use shoebox::{Image, ShoeboxImages};
 pub use tolerance::{assert_all_close, assert_close, assert_within_standard_errors, read_golden};
+pub use wave_grid::{GridResponse, ThinScreen, WaveGrid};

@@ -5,6 +5,7 @@ mod angle_dependent_absorption;
 mod background_noise;
 mod channel_fault;
 mod coupled_volume;
+mod edge_diffraction;
 mod extra_reflector;
 mod nonlinear_distortion;
 mod open_patch;
@@ -24,6 +25,7 @@ pub use angle_dependent_absorption::AngleDependentAbsorption;
 pub use background_noise::BackgroundNoise;
 pub use channel_fault::ChannelFault;
 pub use coupled_volume::CoupledVolume;
+pub use edge_diffraction::EdgeDiffraction;
 pub use extra_reflector::ExtraReflector;
 pub use nonlinear_distortion::NonlinearDistortion;
 pub use open_patch::OpenPatch;
@@ -61,6 +63,7 @@ pub fn catalogue() -> Vec<Box<dyn Effect>> {
         Box::new(OpenPatch),
         Box::new(AngleDependentAbsorption),
         Box::new(NonlinearDistortion),
+        Box::new(EdgeDiffraction),
     ]
 }
 

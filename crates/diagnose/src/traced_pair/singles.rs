@@ -1,6 +1,6 @@
 //! Early paths one by one.
 
-use super::{BandState, SCATTERING_GRID, TracedPair};
+use super::{BandState, BentEnergy, SCATTERING_GRID, TracedPair};
 use crate::bins::Bins;
 use sabine_acoustics::{Conditions, Error, Material};
 
@@ -64,6 +64,7 @@ impl TracedPair {
                     })
                     .collect(),
                 variance: vec![0.0; singles.len()],
+                bent: BentEnergy::default(),
                 // A share more of each reflection is scattered, and lost to the mirror; what was scattered never comes back as one.
                 local_reaction: Vec::new(),
                 scattering: SCATTERING_GRID

@@ -29,8 +29,8 @@ const FALL_DB: f64 = 65.0;
 /// Margin after that, in seconds.
 pub(crate) const MARGIN_S: f64 = 0.06;
 /// Standard deviation of a microphone's gain in dB, and of a receiver's place along each axis in metres.
-const GAIN_SD_DB: f64 = 0.3;
-const PLACE_SD_M: f64 = 0.005;
+pub(crate) const GAIN_SD_DB: f64 = 0.3;
+pub(crate) const PLACE_SD_M: f64 = 0.005;
 
 /// What is said about the room.
 pub(crate) struct Declared {
@@ -246,10 +246,10 @@ pub(crate) fn face_areas_m2([x, y, z]: [f64; 3]) -> [f64; 6] {
     [y * z, y * z, x * z, x * z, x * y, x * y]
 }
 
-fn unit(random: &mut Pcg64Mcg) -> f64 {
+pub(crate) fn unit(random: &mut Pcg64Mcg) -> f64 {
     random.random()
 }
 
-fn normal(random: &mut Pcg64Mcg) -> f64 {
+pub(crate) fn normal(random: &mut Pcg64Mcg) -> f64 {
     random.sample(StandardNormal)
 }

@@ -1,0 +1,60 @@
+//! Sound that bends around a screen, hidden in what finite differences of the wave equation measure: found at receivers in its
+//! shadow; not where the screen is away, nor where sound goes straight though the screen is there.
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
+use sabine_acoustics::ImpulseResponse;
+use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis};
+use sabine_testkit::{ScreenedConfig, ScreenedRoom};
+
+const ROOM: ScreenedConfig = ScreenedConfig { seed: 7, receivers: 16, screen: true };
+
+fn diagnose(room: &ScreenedRoom, responses: Vec<ImpulseResponse>, diagnoser: &Diagnoser) -> Diagnosis {
+    let folder = tempfile::tempdir().unwrap();
+    let room = room.write(responses, &folder.path().join("room")).unwrap();
+    let found = diagnoser.diagnose(&room, &[], &()).unwrap();
+    eprintln!("{:?} {:?} {:?}", found.verdict, found.lack_of_fit, found.seconds);
+    for c in found.candidates.iter().filter(|c| c.nats > 0.0 || c.effect == "edge_diffraction") {
+        eprintln!("{} {:?} {:.1} nats, beside {:?}", c.effect, c.subject, c.nats, c.nats_beside_causes);
+    }
+    for c in &found.causes {
+        eprintln!("named {} {:.1} nats {:?} {:?}", c.effect, c.nats, c.parameters, c.held_out_gain);
+    }
+    found
+}
+
+/// Early reflections in a room that is no cuboid come by rays: with few, what they miss is put down to other causes.
+fn diagnoser() -> Diagnoser {
+    Diagnoser::new(DiagnoseConfig { rays: 10_000, ..DiagnoseConfig::default() }).unwrap()
+}
+
+#[test]
+fn what_bends_around_a_screen_is_found() {
+    let room = ScreenedRoom::new(ROOM).unwrap();
+    let found = diagnose(&room, room.responses().unwrap(), &diagnoser());
+    let cause = found.causes.iter().find(|c| c.effect == "edge_diffraction").unwrap();
+    let gain = cause.held_out_gain.clone().unwrap();
+    assert!(gain.low > 0.0, "{gain:?}");
+    // Found: 1 to 2 dB; what is reflected before or after the edge makes it more than theory says.
+    let level = &cause.parameters[0];
+    assert!(level.value.abs() < 3.0 && level.high - level.low < 6.0, "{level:?}");
+    assert!(found.model.diffraction);
+}
+
+#[test]
+fn where_there_is_no_screen_nothing_bends() {
+    let room = ScreenedRoom::new(ScreenedConfig { screen: false, ..ROOM }).unwrap();
+    // It has no edge, so that the effect has no case: few others are needed to see that.
+    let few = diagnoser().with_only(&["edge_diffraction", "scattering"].map(str::to_owned)).unwrap();
+    let found = diagnose(&room, room.responses().unwrap(), &few);
+    assert!(found.causes.iter().all(|c| c.effect != "edge_diffraction"));
+    assert!(found.candidates.iter().all(|c| c.effect != "edge_diffraction"));
+}
+
+#[test]
+fn where_sound_goes_straight_past_a_screen_nothing_bends() {
+    let room = ScreenedRoom::new(ROOM).unwrap();
+    let found = diagnose(&room, room.straight_responses().unwrap(), &diagnoser());
+    assert!(found.causes.iter().all(|c| c.effect != "edge_diffraction"));
+    let edges = found.candidates.iter().find(|c| c.effect == "edge_diffraction").unwrap();
+    assert!(edges.nats < 0.0, "{edges:?}");
+}
