@@ -121,6 +121,11 @@ pub enum Hidden {
         /// Lengths along the two axes of the face in their order, in metres.
         size_m: [f64; 2],
     },
+    /// Standing waves: below a frequency the response is the sum of the box's modes.
+    RoomModes {
+        /// Middle of the crossover to the images in Hz, 0 (none) to 1000.
+        below_hz: f64,
+    },
     /// Outside the catalogue: the gain swells and sinks while each response is recorded, as depth sin(2 pi t / period + phase).
     GainDrift {
         /// Greatest deviation in dB.
@@ -198,7 +203,7 @@ pub struct Gap {
 
 impl Hidden {
     /// Identifiers of the catalogue's effects.
-    pub const CATALOGUE: [&'static str; 16] = [
+    pub const CATALOGUE: [&'static str; 17] = [
         "transducer_response",
         "air_absorption",
         "source_directivity",
@@ -215,6 +220,7 @@ impl Hidden {
         "channel_fault",
         "extra_reflector",
         "open_patch",
+        "room_modes",
     ];
     /// Names of the effects that no catalogue holds.
     pub const OUTSIDE: [&'static str; 3] = ["gain_drift", "dropouts", "foreign_chirp"];
@@ -244,6 +250,7 @@ impl Hidden {
             Self::ChannelFault { .. } => "channel_fault",
             Self::ExtraReflector { .. } => "extra_reflector",
             Self::OpenPatch { .. } => "open_patch",
+            Self::RoomModes { .. } => "room_modes",
             Self::GainDrift { .. } => "gain_drift",
             Self::Dropouts { .. } => "dropouts",
             Self::ForeignChirp { .. } => "foreign_chirp",
@@ -299,6 +306,7 @@ impl Hidden {
             | Self::Truncation { .. }
             | Self::ExtraReflector { .. }
             | Self::OpenPatch { .. }
+            | Self::RoomModes { .. }
             | Self::GainDrift { .. }
             | Self::Dropouts { .. }
             | Self::ForeignChirp { .. } => {}

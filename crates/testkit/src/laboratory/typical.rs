@@ -3,6 +3,7 @@
 use super::box_decay::BoxDecay;
 use super::hidden::{End, Fault, Gap, Hidden};
 use super::missing_surfaces;
+use super::modal_field;
 use super::random_room::face_areas_m2;
 use super::stream::{Purpose, stream};
 use super::truth::Truth;
@@ -75,6 +76,9 @@ impl Hidden {
             "channel_fault.swap" => swap(r, truth, strength)?,
             "extra_reflector" => missing_surfaces::extra_reflector(r, truth, strength),
             "open_patch" => missing_surfaces::open_patch(r, truth, strength),
+            "room_modes" => {
+                Self::RoomModes { below_hz: strength * modal_field::typical_below_hz(truth, decay_s) }
+            }
             "gain_drift" => Self::GainDrift {
                 depth_db: 4.0 * strength,
                 period_s: 0.15 + 0.15 * unit(r),
