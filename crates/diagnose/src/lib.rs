@@ -67,6 +67,7 @@ mod discrepancy;
 mod effect;
 mod effects;
 mod energy_model;
+mod energy_spread;
 mod error;
 mod extended_model;
 mod extension;

@@ -48,6 +48,8 @@ pub struct Survey {
     pub(crate) declared_scattering: f64,
     pub(crate) planes: Vec<Plane>,
     pub(crate) material_areas_m2: Vec<f64>,
+    /// Lowest octaves for which there is a wave solution.
+    pub(crate) octaves_of_modes: usize,
 }
 
 impl Survey {

@@ -82,6 +82,8 @@ pub(crate) struct BandState {
     pub variance: Vec<f64>,
     /// Logarithm of the change of energy, `[grid][bin]`; empty until tabulated.
     scattering: Vec<Vec<f64>>,
+    /// Logarithm of a wave solution's energy over that of the paths, both as the filter passes them; empty where there is none.
+    pub waves: Vec<f64>,
 }
 
 impl BandState {
@@ -356,6 +358,7 @@ impl TracedPair {
             departure_products: Vec::with_capacity(count),
             variance: Vec::with_capacity(count),
             scattering: Vec::new(),
+            waves: Vec::new(),
         };
         for bin in 0..count {
             let s = &sums[bin * COLUMNS..(bin + 1) * COLUMNS];

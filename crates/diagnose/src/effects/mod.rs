@@ -8,6 +8,7 @@ mod extra_reflector;
 mod open_patch;
 mod position_error;
 mod room_dimensions;
+mod room_modes;
 mod sampling_clock;
 mod scattering;
 mod sound_speed;
@@ -25,6 +26,7 @@ pub use extra_reflector::ExtraReflector;
 pub use open_patch::OpenPatch;
 pub use position_error::PositionError;
 pub use room_dimensions::RoomDimensions;
+pub use room_modes::RoomModes;
 pub use sampling_clock::SamplingClock;
 pub use scattering::Scattering;
 pub use sound_speed::SoundSpeed;
@@ -55,6 +57,7 @@ pub fn catalogue() -> Vec<Box<dyn Effect>> {
         Box::new(ChannelFault),
         Box::new(ExtraReflector),
         Box::new(OpenPatch),
+        Box::new(RoomModes),
     ]
 }
 
