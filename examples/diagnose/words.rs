@@ -25,6 +25,7 @@ pub fn effect(id: &str) -> String {
         "channel_fault" => "Fault of one channel",
         "extra_reflector" => "A surface that the model lacks",
         "open_patch" => "An opening in a wall",
+        "room_modes" => "Standing waves in the lowest octaves",
         other => return other.replace('_', " "),
     };
     known.to_owned()

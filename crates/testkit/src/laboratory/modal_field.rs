@@ -24,9 +24,9 @@ const FADE: f64 = 1.3;
 const LEFT_OUT: f64 = 1e-5;
 /// Most that a wall takes: the formula for its admittance ends there.
 const MOST_ABSORPTION: f64 = 0.9;
-/// Bounds of the crossover in a typical case, in Hz: a sixth of an octave above the lowest octave (125 Hz), and what can still be
-/// summed in good time.
-const TYPICAL_HZ: (f64, f64) = (200.0, 400.0);
+/// Bounds of the crossover in a typical case, in Hz: just above all that a filter for the lowest octave (125 Hz) lets in, and what can
+/// still be summed in good time.
+const TYPICAL_HZ: (f64, f64) = (280.0, 400.0);
 /// The least distance along some axis between a source and a receiver, in metres: closer, the sum has too many terms.
 const LEAST_APART_M: f64 = 0.21;
 
