@@ -3,8 +3,9 @@
 //! In each time bin the measured energy E is Gamma distributed about the predicted M with shape 1 / (relative variance), as
 //! the energy of band-limited noise is (Kuttruff, Room Acoustics, 6th ed., 3.5), and the prediction's own Monte-Carlo error makes it wider.
 
+mod spread;
+
 use crate::effect::{Case, Nuisance, Parameter, Stage};
-use crate::energy_spread;
 use crate::gauss_newton::{Maximum, Model, Prior, Slopes, maximise};
 use crate::measured::Measured;
 use crate::traced_pair::BandState;
@@ -277,17 +278,6 @@ impl<'a> EnergyModel<'a> {
         ln_energy
     }
 
-    /// Expected relative variances of the bins of a pair and band, dispersion left out.
-    fn variances(&self, values: &[f64], pair: usize, band: usize, count: usize) -> Vec<f64> {
-        let mut variances = self.data.states[pair][band].variance[..count].to_vec();
-        let view = self.view(pair, band);
-        for placed in &self.effects {
-            let own = &values[placed.first..placed.first + placed.parameters.len()];
-            placed.case.variance(own, &view, &mut variances);
-        }
-        variances
-    }
-
     /// All compared bins of the given pairs.
     pub fn residuals(&self, values: &[f64], pairs: impl Iterator<Item = usize>) -> Vec<BinResidual> {
         let mut found = Vec::new();
@@ -325,19 +315,13 @@ impl<'a> EnergyModel<'a> {
         self.apply(values, &view, gain_db, &mut predicted);
         let silence = SILENCE * self.data.reference[band];
         let dispersion = self.data.dispersion[band];
-        let stated = &self.data.states[pair][band].variance;
         let variances = self.variances(values, pair, band, count);
         let shape = |bin: usize| 1.0 / (variances[bin] * dispersion);
-        // Of the normalisation only what an effect changes.
-        let top = |bin: usize, shape: f64| {
-            let changed = variances[bin] < stated[bin];
-            let before = 1.0 / (stated[bin] * dispersion);
-            if changed { energy_spread::ln_top(shape) - energy_spread::ln_top(before) } else { 0.0 }
-        };
         let ln_ratio: Vec<f64> =
             energies.iter().zip(&predicted).map(|(e, p)| e.max(silence).ln() - p).collect();
-        let one = |(bin, &z): (usize, &f64)| shape(bin) * log_density(z) + top(bin, shape(bin));
-        let value = ln_ratio.iter().enumerate().map(one).sum();
+        let one = |(bin, &z): (usize, &f64)| shape(bin) * log_density(z);
+        let likelihood: f64 = ln_ratio.iter().enumerate().map(one).sum();
+        let value = likelihood + self.tops((pair, band), &variances);
         let Some(slopes) = slopes else { return value };
 
         // Columns that matter in this band, and the change of the predicted logarithm with each.
@@ -380,54 +364,6 @@ impl<'a> EnergyModel<'a> {
         }
         self.add_spread_slopes(values, (pair, band), &variances, &ln_ratio, slopes);
         value
-    }
-
-    /// Adds what the likelihood owes to the spread's change with the parameters of effects. Mean and shape of a Gamma distribution
-    /// share no information.
-    fn add_spread_slopes(
-        &self,
-        values: &[f64],
-        (pair, band): (usize, usize),
-        variances: &[f64],
-        ln_ratio: &[f64],
-        slopes: &mut Slopes,
-    ) {
-        let mut rows: Vec<(usize, Vec<f64>)> = Vec::new();
-        for placed in &self.effects {
-            for (i, p) in placed.parameters.iter().enumerate() {
-                if p.band.is_some_and(|own| own != band) {
-                    continue;
-                }
-                let index = placed.first + i;
-                let prior = self.priors[index];
-                let at = |offset: f64| {
-                    let mut moved = values.to_vec();
-                    moved[index] = (moved[index] + offset * prior.sd).clamp(prior.low, prior.high);
-                    (moved[index], self.variances(&moved, pair, band, variances.len()))
-                };
-                let ((high, up), (low, down)) = (at(STEP), at(-STEP));
-                if high > low && up != down {
-                    // Of the logarithm of the shape.
-                    let slope = |(u, d): (&f64, &f64)| -(u / d).ln() / (high - low);
-                    rows.push((index, up.iter().zip(&down).map(slope).collect()));
-                }
-            }
-        }
-        if rows.is_empty() {
-            return;
-        }
-        for (bin, variance) in variances.iter().enumerate() {
-            let shape = 1.0 / (variance * self.data.dispersion[band]);
-            let value = |shape: f64| shape * log_density(ln_ratio[bin]) + energy_spread::ln_top(shape);
-            let pull = (value(shape * (1.0 + STEP)) - value(shape * (1.0 - STEP))) / (2.0 * STEP);
-            let weight = energy_spread::information(shape);
-            for (a, own) in &rows {
-                slopes.gradient[*a] += pull * own[bin];
-                for (b, other) in &rows {
-                    slopes.information[(*a, *b)] += weight * own[bin] * other[bin];
-                }
-            }
-        }
     }
 
     /// How much of a change of the paths' energy comes through the effects.

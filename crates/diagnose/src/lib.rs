@@ -16,7 +16,7 @@
 //!
 //! # Does not
 //! - see what is not in its [`catalogue`]: then the verdict is [`Verdict::Unexplained`] and the residuals show where it sits.
-//! - diffract or solve waves: effects that need it are not built.
+//! - diffract: effects that need it are not built. Waves are solved for the octaves below the Schroeder frequency alone.
 //! - change scattering, geometry or air to make a fit look better: only what is named changes.
 //! - tell apart what the data cannot: a sampling clock and a temperature scale all times alike, and come out as a set.
 //!
@@ -67,7 +67,6 @@ mod discrepancy;
 mod effect;
 mod effects;
 mod energy_model;
-mod energy_spread;
 mod error;
 mod extended_model;
 mod extension;
