@@ -28,6 +28,7 @@ pub fn effect(id: &str) -> String {
         "open_patch" => "An opening in a wall",
         "nonlinear_distortion" => "Loudspeaker overdriven",
         "edge_diffraction" => "Sound bends around edges",
+        "room_modes" => "Standing waves in the lowest octaves",
         other => return other.replace('_', " "),
     };
     known.to_owned()

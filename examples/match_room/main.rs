@@ -23,7 +23,8 @@ struct Arguments {
     #[arg(long, value_name = "DIR")]
     room: Option<PathBuf>,
     /// extended_model.toml of `diagnose`: the simulation starts from its materials, air, dimensions and places. Loudspeaker,
-    /// noise and recorder of that measurement are left out: the speech has its own
+    /// noise and recorder of that measurement are left out: the speech has its own. Where it names standing waves, --wave-below
+    /// is theirs
     #[arg(long, value_name = "F.toml")]
     model: Option<PathBuf>,
     /// Source in the room file [default: its first]
@@ -44,6 +45,10 @@ struct Arguments {
     /// Number of rays to trace [default: 40000]
     #[arg(long)]
     rays: Option<usize>,
+    /// Below this frequency the room is a solution of the wave equation, from an omnidirectional source. Its time grows with the
+    /// fourth power of the frequency
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    wave_below: Option<f64>,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/match_room")]
     out: PathBuf,
@@ -74,8 +79,11 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error + Send + Sync>> {
     let dry = read_audio(&dry_path, channel)?;
     let mut room = MeasuredRoom::read(&room_path)?;
     let mut diffraction = false;
+    let mut wave_below_hz = arguments.wave_below;
     if let Some(model) = &arguments.model {
-        let extended = ExtendedModel::read(model)?.room(&room)?;
+        let model = ExtendedModel::read(model)?;
+        wave_below_hz = wave_below_hz.or(model.wave_below_hz);
+        let extended = model.room(&room)?;
         diffraction = extended.diffraction;
         room = extended.measured_room(&room)?;
     }
@@ -93,7 +101,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error + Send + Sync>> {
         source: &source,
         receiver: &receiver,
     };
-    let mut config = MatchConfig { seed: arguments.seed, ..MatchConfig::default() };
+    let mut config = MatchConfig { seed: arguments.seed, wave_below_hz, ..MatchConfig::default() };
     config.tracer.diffraction |= diffraction;
     if let Some(rays) = arguments.rays {
         config.tracer.rays = rays;
@@ -134,6 +142,12 @@ fn print_summary(summary: &MatchSummary, out: &Path) {
         "T60 reached   {} s",
         row(&summary.t60_reached_s, |t| t.map_or("-".to_owned(), |t| format!("{t:.2}")))
     );
+    if let Some(waves) = &summary.waves {
+        println!(
+            "waves below {} Hz: {} voxels; {:+.1} dB against the paths about there, joined with {:+.1} dB",
+            waves.below_hz, waves.voxels, waves.level_difference_db, waves.gain_db
+        );
+    }
     for warning in &summary.warnings {
         println!("note: {warning}");
     }

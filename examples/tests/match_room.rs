@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
+use sabine::acoustics::{Channel, ImpulseResponse, read_audio};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -103,6 +104,48 @@ fn the_fixture_is_matched_within_ten_percent_of_every_target() {
     // What was written can be read again as tables of a room.
     let tables: toml::Table = std::fs::read_to_string(out.join("materials.toml")).unwrap().parse().unwrap();
     assert_eq!(tables["materials"].as_table().unwrap().len(), 8);
+}
+
+#[test]
+fn waves_take_the_low_end_and_leave_the_rest() {
+    let folder = tempfile::tempdir().unwrap();
+    let heard = |name: &str, more: &[&str]| {
+        let out = folder.path().join(name);
+        let output = run(&[&["--rays", "4000", "--out", out.to_str().unwrap()], more].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let json: Value = serde_json::from_slice(&std::fs::read(out.join("match.json")).unwrap()).unwrap();
+        let audio = read_audio(out.join("impulse_response.wav"), Channel::Mono).unwrap();
+        (json, ImpulseResponse::from(audio))
+    };
+    let (plain, paths) = heard("paths", &[]);
+    let (json, joined) = heard("waves", &["--wave-below", "100"]);
+    assert!(plain["waves"].is_null());
+    let number = |key: &str| json["waves"][key].as_f64().unwrap();
+    assert!(number("below_hz") == 100.0 && number("voxels") > 1000.0, "{}", json["waves"]);
+    assert!(number("level_difference_db").abs() < 8.0 && number("gain_db").abs() < 6.1, "{}", json["waves"]);
+    assert!(json["seconds"]["waves"].as_f64().unwrap() > 0.0);
+    // The fit is to the paths, so the same materials are found.
+    assert_eq!(plain["materials"], json["materials"]);
+    let energy = |response: &ImpulseResponse, hz: f64| {
+        let rate = f64::from(response.sample_rate_hz());
+        let turn = |i: usize| std::f64::consts::TAU * hz * i as f64 / rate;
+        let sum = response.samples().iter().enumerate().fold((0.0, 0.0), |(re, im), (i, &s)| {
+            (re + f64::from(s) * turn(i).cos(), im + f64::from(s) * turn(i).sin())
+        });
+        sum.0 * sum.0 + sum.1 * sum.1
+    };
+    let off_db = |from_hz: f64| {
+        let at = |i: i32| from_hz + 2.0 * f64::from(i);
+        let off = (0..15).map(|i| 10.0 * (energy(&joined, at(i)) / energy(&paths, at(i))).log10().abs());
+        off.sum::<f64>() / 15.0
+    };
+    assert!(off_db(200.0) < 0.2, "{} dB above", off_db(200.0));
+    // Two fields that have nothing in common but their energy differ by 6 dB on the average.
+    assert!(off_db(35.0) > 2.0, "{} dB below", off_db(35.0));
+
+    let out = folder.path().join("refused");
+    refuses(&["--wave-below", "-1"], &out, &["crossover_hz"]);
+    refuses(&["--wave-below", "3500"], &out, &["would fit"]);
 }
 
 #[test]

@@ -29,6 +29,8 @@ pub struct DiagnoseConfig {
     pub most_causes: usize,
     /// Simulated measurements behind the calibration of the lack of fit, 10 to 1000.
     pub simulations: usize,
+    /// Solve the wave equation in the octaves below the Schroeder frequency: seconds for each source, twice or more.
+    pub wave_solutions: bool,
     /// Go on with a mesh that leaks.
     pub allow_leaks: bool,
 }
@@ -46,6 +48,7 @@ impl Default for DiagnoseConfig {
             significance: 0.01,
             most_causes: 3,
             simulations: 16,
+            wave_solutions: true,
             allow_leaks: false,
         }
     }

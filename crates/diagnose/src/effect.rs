@@ -163,6 +163,10 @@ pub trait Case: Send + Sync {
     /// energy alone.
     fn energy(&self, _values: &[f64], _view: &BandView<'_>, _ln_energy: &mut [f64]) {}
 
+    /// Changes the expected variance of the bins of one band and pair, as a share of their energy squared: it is less where the
+    /// case predicts what else is left to chance.
+    fn variance(&self, _values: &[f64], _view: &BandView<'_>, _variance: &mut [f64]) {}
+
     /// Seconds by which an arrival comes later.
     fn delay_s(&self, _values: &[f64], _arrival: &ArrivalView<'_>) -> f64 {
         0.0

@@ -3,6 +3,8 @@
 //! In each time bin the measured energy E is Gamma distributed about the predicted M with shape 1 / (relative variance), as
 //! the energy of band-limited noise is (Kuttruff, Room Acoustics, 6th ed., 3.5), and the prediction's own Monte-Carlo error makes it wider.
 
+mod spread;
+
 use crate::effect::{Case, Nuisance, Parameter, Stage};
 use crate::gauss_newton::{Maximum, Model, Prior, Slopes, maximise};
 use crate::measured::Measured;
@@ -286,6 +288,7 @@ impl<'a> EnergyModel<'a> {
                 let Some(energies) = self.compared(pair, band) else { continue };
                 let predicted = self.predicted(values, pair, band, energies.len());
                 let silence = SILENCE * self.data.reference[band];
+                let variances = self.variances(values, pair, band, energies.len());
                 for (bin, (&e, &ln_predicted)) in energies.iter().zip(&predicted).enumerate() {
                     found.push(BinResidual {
                         pair,
@@ -293,7 +296,7 @@ impl<'a> EnergyModel<'a> {
                         bin,
                         ln_ratio: e.max(silence).ln() - ln_predicted,
                         ln_predicted,
-                        variance: self.data.states[pair][band].variance[bin],
+                        variance: variances[bin],
                     });
                 }
             }
@@ -314,10 +317,13 @@ impl<'a> EnergyModel<'a> {
         self.apply(values, &view, gain_db, &mut predicted);
         let silence = SILENCE * self.data.reference[band];
         let dispersion = self.data.dispersion[band];
-        let shape = |bin: usize| 1.0 / (self.data.states[pair][band].variance[bin] * dispersion);
+        let variances = self.variances(values, pair, band, count);
+        let shape = |bin: usize| 1.0 / (variances[bin] * dispersion);
         let ln_ratio: Vec<f64> =
             energies.iter().zip(&predicted).map(|(e, p)| e.max(silence).ln() - p).collect();
-        let value = ln_ratio.iter().enumerate().map(|(bin, &z)| shape(bin) * log_density(z)).sum();
+        let one = |(bin, &z): (usize, &f64)| shape(bin) * log_density(z);
+        let likelihood: f64 = ln_ratio.iter().enumerate().map(one).sum();
+        let value = likelihood + self.tops((pair, band), &variances);
         let Some(slopes) = slopes else { return value };
 
         // Columns that matter in this band, and the change of the predicted logarithm with each.
@@ -361,6 +367,7 @@ impl<'a> EnergyModel<'a> {
                 }
             }
         }
+        self.add_spread_slopes(values, (pair, band), &variances, &ln_ratio, slopes);
         value
     }
 

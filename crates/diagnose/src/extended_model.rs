@@ -42,6 +42,10 @@ pub struct ExtendedModel {
     /// The decay of a coupled volume.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coupled: Option<CoupledDecay>,
+    /// Below this frequency in Hz responses are those of the wave equation; [`ExtendedRoom::finish`](crate::ExtendedRoom::finish) takes
+    /// them as they come: whoever renders joins them ([`Crossover`](sabine_propagate::wave::Crossover)).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wave_below_hz: Option<f64>,
     /// End of the response and length of its fade, in seconds from the first sample.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truncation: Option<[f64; 2]>,

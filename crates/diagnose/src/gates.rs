@@ -268,7 +268,7 @@ fn gamma(energy: f64, (mean, variance): (f64, f64)) -> f64 {
 }
 
 /// Logarithm of the Gamma function (Stirling's series after recurrence; Abramowitz and Stegun 1964, 6.1.41).
-fn ln_gamma(x: f64) -> f64 {
+pub(crate) fn ln_gamma(x: f64) -> f64 {
     let (mut x, mut below) = (x, 0.0);
     while x < 8.0 {
         below += x.ln();

@@ -181,6 +181,8 @@ pub(crate) fn would_decide(a: &str, b: &str) -> &'static str {
         "Close what may be open and measure again, or measure where other first reflections meet that wall."
     } else if has("extra_reflector") {
         "Take out (or cover) what stands in the room and measure again."
+    } else if has("room_modes") {
+        "Measure with the source in another place: standing waves change with it, loudspeakers and walls do not."
     } else if has("scattering") {
         "Measure at more positions, some of them close to the walls."
     } else {

@@ -16,7 +16,7 @@
 //!
 //! # Does not
 //! - see what is not in its [`catalogue`]: then the verdict is [`Verdict::Unexplained`] and the residuals show where it sits.
-//! - solve waves, or follow sound around more than one edge.
+//! - follow sound around more than one edge. Waves are solved for the octaves below the Schroeder frequency alone.
 //! - change scattering, geometry or air to make a fit look better: only what is named changes.
 //! - tell apart what the data cannot: a sampling clock and a temperature scale all times alike, and come out as a set.
 //!

@@ -124,7 +124,7 @@ impl Measured {
 }
 
 /// Energy of each bin from squared samples; bin edges fall between samples.
-fn energies(samples: &[f32], direct: f64, rate: f64, bins: Bins, unit: f64) -> Vec<f64> {
+pub(crate) fn energies(samples: &[f32], direct: f64, rate: f64, bins: Bins, unit: f64) -> Vec<f64> {
     let mut sum = 0.0;
     let mut before = vec![0.0];
     before.extend(samples.iter().map(|&x| {

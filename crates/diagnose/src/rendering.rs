@@ -285,6 +285,7 @@ impl ExtendedModel {
             ),
             ("temperature_c", one(self.temperature_c), (-20.0, 50.0), "between -20 and 50 C"),
             ("clock_ppm", one(self.clock_ppm), (-2e4, 2e4), "within 20000 ppm"),
+            ("wave_below_hz", one(self.wave_below_hz), (20.0, 3500.0), "between 20 and 3,500 Hz"),
             ("latency_s", one(self.latency_s), (-10.0, 10.0), "within 10 s"),
             (
                 "truncation",

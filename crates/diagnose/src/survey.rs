@@ -49,6 +49,8 @@ pub struct Survey {
     pub(crate) planes: Vec<Plane>,
     pub(crate) material_areas_m2: Vec<f64>,
     pub(crate) bent: Vec<usize>,
+    /// Lowest octaves for which there is a wave solution.
+    pub(crate) octaves_of_modes: usize,
 }
 
 impl Survey {

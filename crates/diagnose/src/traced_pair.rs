@@ -92,6 +92,8 @@ pub(crate) struct BandState {
     scattering: Vec<Vec<f64>>,
     /// The same for walls that react locally by a share.
     local_reaction: Vec<Vec<f64>>,
+    /// Logarithm of a wave solution's energy over that of the paths, both as the filter passes them; empty where there is none.
+    pub waves: Vec<f64>,
 }
 
 impl BandState {
@@ -382,6 +384,7 @@ impl TracedPair {
             bent: BentEnergy::default(),
             scattering: Vec::new(),
             local_reaction: Vec::new(),
+            waves: Vec::new(),
         };
         for bin in 0..count {
             let s = &sums[bin * COLUMNS..(bin + 1) * COLUMNS];

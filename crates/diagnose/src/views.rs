@@ -101,6 +101,17 @@ impl BandView<'_> {
     pub fn scattering_change(&self, bin: usize, extra: f64) -> f64 {
         self.state.scattering_change(bin, extra)
     }
+
+    /// Natural logarithm of a bin's energy in the solution of the wave equation over that of the paths, both behind the octave's
+    /// filter; 0 where there is no solution.
+    pub fn wave_change(&self, bin: usize) -> f64 {
+        self.state.waves.get(bin).copied().unwrap_or(0.0)
+    }
+
+    /// Whether there is a solution of the wave equation in this octave.
+    pub fn has_waves(&self) -> bool {
+        !self.state.waves.is_empty()
+    }
 }
 
 /// One predicted arrival: the direct sound or a specular reflection.

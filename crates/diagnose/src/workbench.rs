@@ -1,5 +1,7 @@
 //! Everything that a diagnosis compares, and fits of any set of causes to it.
 
+mod waves;
+
 use crate::arrival_model::{self, ArrivalData};
 use crate::discrepancy::FreeDiscrepancy;
 use crate::edges::Edges;
@@ -56,6 +58,8 @@ pub(crate) struct Workbench {
     warmer_k: f64,
     /// What is traced: the mesh, with scattering spread over the bands.
     scene: Scene,
+    /// The same at the size that was found.
+    resized: Option<Scene>,
     tracer: PathTracer,
     prepared: PreparedScene,
     edges: Option<Edges>,
@@ -149,6 +153,11 @@ impl Workbench {
                 .collect(),
             responses,
             box_m: [corner(f64::min, f64::INFINITY), corner(f64::max, f64::NEG_INFINITY)],
+            octaves_of_modes: if config.wave_solutions {
+                waves::octaves_of_modes(room.scene(), &materials, &room.air())
+            } else {
+                0
+            },
             declared_scattering: scatterings.iter().sum::<f64>() / scatterings.len() as f64,
         };
         let priors: Vec<Vec<Prior>> = room.priors().iter().map(absorption_priors).collect();
@@ -189,6 +198,7 @@ impl Workbench {
             traced_s,
             warmer_k: 0.0,
             scene,
+            resized: None,
             tracer,
             prepared,
             edges,
@@ -239,7 +249,7 @@ impl Workbench {
                 (early.iter().sum::<f64>() / early.len().max(1) as f64).max(1e-30)
             })
             .collect();
-        Ok(())
+        if scattering { self.tabulate_waves(&materials) } else { Ok(()) }
     }
 
     /// Expands about fitted absorption.
@@ -389,6 +399,7 @@ impl Workbench {
         let resized = dimensions.applied(&self.scene)?;
         self.prepared = self.tracer.prepare(&resized)?;
         self.edges = Edges::find(&resized)?;
+        self.resized = Some(resized);
         for source in 0..self.sources.len() {
             self.retrace(Nuisance::SourcePosition(source))?;
         }

@@ -89,12 +89,14 @@ pub use sabine_propagate as propagate;
 pub mod guide;
 
 mod error;
+mod low_end;
 mod matching;
 mod recording;
 mod summary;
 mod warning;
 
 pub use error::Error;
+pub use low_end::JoinedWaves;
 pub use matching::{DECAY_STEP_S, MatchConfig, MatchInput, RoomMatch, match_room, match_room_with};
 pub use recording::Recording;
 pub use summary::{MatchSummary, MaterialChange, UnreachableBand, materials_toml};

@@ -1,5 +1,6 @@
 //! The main job: from speech and a rough room to sound that belongs there.
 
+use crate::low_end::{JoinedWaves, LowEnd};
 use crate::{Error, Recording, Warning};
 use sabine_acoustics::{
     Air, EnergyDecayCurve, Estimate, FilterBank, ImpulseResponse, Material, MeasuredRoom, Observer,
@@ -44,6 +45,10 @@ pub struct MatchConfig {
     /// Level of the bands from 8 kHz on, in dB: the speech that was listened to holds nothing there (Tang et al. 2020,
     /// section 3.3). `None` leaves them as the simulation has them.
     pub above_8_khz_db: Option<f64>,
+    /// Below this frequency in Hz (20 to 3,500) the response is a solution of the wave equation
+    /// ([`WaveSolver`](sabine_propagate::wave::WaveSolver)) with the fitted materials, from an omnidirectional source; its time grows with
+    /// the fourth power of the frequency. The fit is to the paths.
+    pub wave_below_hz: Option<f64>,
 }
 
 impl Default for MatchConfig {
@@ -56,6 +61,7 @@ impl Default for MatchConfig {
             duration_factor: 1.25,
             largest_eq_db: 20.0,
             above_8_khz_db: Some(-50.0),
+            wave_below_hz: None,
         }
     }
 }
@@ -81,6 +87,8 @@ pub struct RoomMatch {
     pub eq_simulated_db: PerBand<f64>,
     /// Pressure response of the simulation with the fitted materials; the equalisation filter is not applied to it.
     pub response: ImpulseResponse,
+    /// What joining it to waves at low frequencies found, where that was asked for.
+    pub waves: Option<JoinedWaves>,
     /// What the decay slopes cannot give.
     pub eq_filter: EqFilter,
     /// The dry sound in the room, aligned with the dry sound (the filter's own delay is taken out).
@@ -211,12 +219,6 @@ fn match_targets(
     let scene = room.scene().with_materials(materials_before.clone())?;
     let longest_s = targets.t60_s().values().iter().map(|t| t.value).fold(0.0, f64::max);
     let duration_s = (config.duration_factor * longest_s).clamp(DURATION_S.0, DURATION_S.1);
-    let paths = tracer(duration_s)?.trace(&scene, source, receiver, &air, observer)?;
-    if paths.is_empty() {
-        return Err(Error::NoPath { source_id: source.id.clone(), receiver: receiver.id.clone() });
-    }
-    clock.lap("trace");
-
     let sample_rate_hz = match input.dry.signal.sample_rate_hz() {
         rate if rate >= LOWEST_RATE_HZ => rate,
         from_hz => {
@@ -224,12 +226,19 @@ fn match_targets(
             STANDARD_RATE_HZ
         }
     };
+    let low_end = config.wave_below_hz.map(|hz| LowEnd::new(hz, sample_rate_hz, room, source)).transpose()?;
+    let paths = tracer(duration_s)?.trace(&scene, source, receiver, &air, observer)?;
+    if paths.is_empty() {
+        return Err(Error::NoPath { source_id: source.id.clone(), receiver: receiver.id.clone() });
+    }
+    clock.lap("trace");
+
     let renderer =
         PressureRenderer::new(RenderConfig { sample_rate_hz, seed: config.seed, ..RenderConfig::default() })?;
     let fitter = MaterialFitter::new(config.fit.clone())?;
     let mut aim = targets.t60_s().clone();
     let mut corrections = 0;
-    let (fit, response, parameters) = loop {
+    let (fit, mut response, mut parameters) = loop {
         let fit = fitter.fit_t60(&[&paths], &materials_before, &priors, &air, &aim, observer)?;
         clock.lap("fit");
         let response = renderer.render(&paths, &fit.materials, &air)?;
@@ -242,6 +251,13 @@ fn match_targets(
             _ => break (fit, response, parameters),
         }
     };
+    let mut waves = None;
+    if let Some(low_end) = low_end {
+        let (joined, found) = low_end.join((source, receiver), &fit.materials, &air, &response, observer)?;
+        parameters = RoomParameters::measure(&joined, OctaveBands::T60)?;
+        (response, waves) = (joined, Some(found));
+        clock.lap("waves");
+    }
     warn_of_uncertain_eq(targets.eq_db(), &mut warnings);
     warn_of_misses(targets.t60_s(), &parameters.t30_s, &fit, &mut warnings);
     warn_of_fit(&fit, room, &mut warnings);
@@ -269,6 +285,7 @@ fn match_targets(
         decay,
         eq_simulated_db,
         response,
+        waves,
         eq_filter,
         matched,
         level_db,

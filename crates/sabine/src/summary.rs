@@ -1,6 +1,6 @@
 //! Every number of a match, in a form for files and other programs.
 
-use crate::{Error, RoomMatch};
+use crate::{Error, JoinedWaves, RoomMatch};
 use sabine_acoustics::{Estimate, PerBand};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -36,6 +36,8 @@ pub struct MatchSummary {
     pub level_db: f64,
     /// Sample rate of the sounds, in Hz.
     pub sample_rate_hz: u32,
+    /// What joining waves to paths found, where that was asked for.
+    pub waves: Option<JoinedWaves>,
     /// Seconds that each stage took.
     pub seconds: BTreeMap<String, f64>,
     /// What to know before trusting the result, in words.
@@ -107,6 +109,7 @@ impl MatchSummary {
             eq_filter_delay_s: matched.eq_filter.delay_s(),
             level_db: matched.level_db,
             sample_rate_hz: matched.matched.sample_rate_hz(),
+            waves: matched.waves,
             seconds: matched.seconds.iter().map(|(stage, s)| ((*stage).to_owned(), *s)).collect(),
             warnings: matched.warnings.iter().map(ToString::to_string).collect(),
         }

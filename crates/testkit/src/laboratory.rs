@@ -11,8 +11,9 @@
 //! noise adds up over a response to -63 dB of the response's energy in the octave where it is worst. Responses end
 //! when the slowest octave has fallen by 65 dB.
 //!
-//! What it does **not** do: phase at walls (nor angle, but where that is the effect), standing waves, diffraction, rooms other than boxes. The particles' first
-//! passages are blurred by the time that sound takes across a sphere of 1 m.
+//! What it does **not** do: phase at walls (nor angle, but where that is the effect), standing waves, diffraction, rooms other than boxes. The
+//! particles' first passages are blurred by the time that sound takes across a sphere of 1 m. Only where [`Hidden::RoomModes`] is at work
+//! are there standing waves, of the box alone, and then no second room is heard below their crossover.
 //!
 //! Order of events: the room, the source, the way, the microphone (noise joins here), the channel, the recorder. An effect changes the
 //! truth ([`Truth`]) or acts on samples; a new one is a variant of [`Hidden`], a file for its physics, and a line where it acts.
@@ -28,6 +29,7 @@ mod hidden;
 mod image_field;
 mod local_reaction;
 mod missing_surfaces;
+mod modal_field;
 mod noise;
 mod panel;
 mod patch;
@@ -162,6 +164,7 @@ impl Laboratory {
             effect.apply(&mut truth)?;
         }
         truth.keep_inside();
+        modal_field::check(&truth)?;
         truth.duration_s = (random_room::fallen_s(&truth)? + random_room::MARGIN_S)
             .max(truth.duration_s)
             .max(coupled_tail::tails_end_s(effects));
@@ -208,7 +211,7 @@ impl Laboratory {
         let decay = BoxDecay::new(truth, &medium, truth.duration_s + 0.2);
         let scattered: Vec<_> =
             (0..truth.sources.len()).map(|s| ScatteredField::new(truth, &medium, s)).collect();
-        let render = |index: usize| {
+        let render = |index: usize| -> Result<(Vec<f64>, BandEnergies), Error> {
             let pair = (index / truth.receivers_m.len(), index % truth.receivers_m.len());
             let mut columns = Columns {
                 samples: vec![vec![0.0; samples]; self.bands.len()],
@@ -221,11 +224,12 @@ impl Laboratory {
             }
             coupled_tail::add_tails(truth, &medium, pair, &mut columns);
             let energies = BandEnergies::of(&columns.samples, rate_hz);
-            let joined = steep_bands::join_steeply(self.bands, columns.samples, self.config.sample_rate_hz);
-            (joined, energies)
+            let rate = self.config.sample_rate_hz;
+            let joined = steep_bands::join_steeply(self.bands, columns.samples, rate);
+            Ok((modal_field::join(truth, &medium, self.bands, index, rate, joined)?, energies))
         };
-        let (mut responses, energies): (Vec<Vec<f64>>, Vec<BandEnergies>) =
-            (0..truth.responses()).into_par_iter().map(render).unzip();
+        let rendered: Result<Vec<_>, Error> = (0..truth.responses()).into_par_iter().map(render).collect();
+        let (mut responses, energies): (Vec<Vec<f64>>, Vec<BandEnergies>) = rendered?.into_iter().unzip();
         distortion::add_harmonics(truth, rate_hz, &mut responses);
         let noise = Noise::new(truth, &energies, samples);
         responses.par_iter_mut().enumerate().for_each(|(index, samples)| {

@@ -11,6 +11,7 @@ mod nonlinear_distortion;
 mod open_patch;
 mod position_error;
 mod room_dimensions;
+mod room_modes;
 mod sampling_clock;
 mod scattering;
 mod sound_speed;
@@ -31,6 +32,7 @@ pub use nonlinear_distortion::NonlinearDistortion;
 pub use open_patch::OpenPatch;
 pub use position_error::PositionError;
 pub use room_dimensions::RoomDimensions;
+pub use room_modes::RoomModes;
 pub use sampling_clock::SamplingClock;
 pub use scattering::Scattering;
 pub use sound_speed::SoundSpeed;
@@ -64,6 +66,7 @@ pub fn catalogue() -> Vec<Box<dyn Effect>> {
         Box::new(AngleDependentAbsorption),
         Box::new(NonlinearDistortion),
         Box::new(EdgeDiffraction),
+        Box::new(RoomModes),
     ]
 }
 

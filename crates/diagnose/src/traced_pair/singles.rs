@@ -48,6 +48,7 @@ impl TracedPair {
                 ln_energy: chosen.iter().map(|&i| f64::from(energies[i]).max(1e-30).ln()).collect(),
                 own_share: 1.0,
                 leaks: Vec::new(),
+                waves: Vec::new(),
                 groups: (0..=chosen.len()).collect(),
                 group_energy: chosen.iter().map(|&i| f64::from(energies[i]).max(1e-30)).collect(),
                 group_hits: chosen

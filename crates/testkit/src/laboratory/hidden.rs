@@ -143,6 +143,11 @@ pub enum Hidden {
         /// How long before the emission the recordings begin, in seconds, 0 to 5.
         lead_in_s: f64,
     },
+    /// Standing waves: below a frequency the response is the sum of the box's modes.
+    RoomModes {
+        /// Middle of the crossover to the images in Hz, 0 (none) to 1000.
+        below_hz: f64,
+    },
     /// Outside the catalogue: the gain swells and sinks while each response is recorded, as depth sin(2 pi t / period + phase).
     GainDrift {
         /// Greatest deviation in dB.
@@ -220,7 +225,7 @@ pub struct Gap {
 
 impl Hidden {
     /// Identifiers of the catalogue's effects.
-    pub const CATALOGUE: [&'static str; 18] = [
+    pub const CATALOGUE: [&'static str; 19] = [
         "transducer_response",
         "air_absorption",
         "source_directivity",
@@ -239,6 +244,7 @@ impl Hidden {
         "open_patch",
         "nonlinear_distortion",
         "angle_dependent_absorption",
+        "room_modes",
     ];
     /// Names of the effects that no catalogue holds.
     pub const OUTSIDE: [&'static str; 3] = ["gain_drift", "dropouts", "foreign_chirp"];
@@ -270,6 +276,7 @@ impl Hidden {
             Self::OpenPatch { .. } => "open_patch",
             Self::NonlinearDistortion { .. } => "nonlinear_distortion",
             Self::AngleDependentAbsorption { .. } => "angle_dependent_absorption",
+            Self::RoomModes { .. } => "room_modes",
             Self::GainDrift { .. } => "gain_drift",
             Self::Dropouts { .. } => "dropouts",
             Self::ForeignChirp { .. } => "foreign_chirp",
@@ -329,6 +336,7 @@ impl Hidden {
             | Self::ExtraReflector { .. }
             | Self::OpenPatch { .. }
             | Self::AngleDependentAbsorption { .. }
+            | Self::RoomModes { .. }
             | Self::GainDrift { .. }
             | Self::Dropouts { .. }
             | Self::ForeignChirp { .. } => {}

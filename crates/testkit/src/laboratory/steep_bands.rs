@@ -81,13 +81,24 @@ impl Gains {
         let from = if lowest { 0 } else { (lower / half / self.bin_hz) as usize };
         let to = if highest { self.bins } else { self.bins.min((upper * half / self.bin_hz) as usize + 2) };
         for i in from..to {
-            let frequency_hz = i as f64 * self.bin_hz;
-            let rise = if lowest || frequency_hz > lower * half { 1.0 } else { step(frequency_hz, lower) };
-            let fall =
-                if highest || frequency_hz < upper / half { 1.0 } else { 1.0 - step(frequency_hz, upper) };
-            visit(i, rise * fall);
+            visit(i, share(self.bands, band, i as f64 * self.bin_hz));
         }
     }
+}
+
+/// Gain of a band at a frequency.
+fn share(bands: OctaveBands, band: usize, frequency_hz: f64) -> f64 {
+    let half = (0.5 * CROSSOVER_OCTAVES).exp2();
+    let (lower, upper) = bands.edges_hz(band);
+    let (lowest, highest) = (band == 0, band + 1 == bands.len());
+    let rise = if lowest || frequency_hz > lower * half { 1.0 } else { step(frequency_hz, lower) };
+    let fall = if highest || frequency_hz < upper / half { 1.0 } else { 1.0 - step(frequency_hz, upper) };
+    rise * fall
+}
+
+/// The amplitude that [`join_steeply`] gives to a frequency, from one for each octave.
+pub(crate) fn amplitude_at(bands: OctaveBands, amplitudes: &[f64], frequency_hz: f64) -> f64 {
+    amplitudes.iter().enumerate().map(|(band, a)| a * share(bands, band, frequency_hz)).sum()
 }
 
 /// From 0 below a crossover to 1 above it.

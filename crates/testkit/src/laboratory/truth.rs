@@ -256,6 +256,9 @@ impl Truth {
                 }
                 check_range("lead-in (s)", *lead_in_s, 0.0, 5.0, "between 0 and 5 s")
             }
+            Hidden::RoomModes { below_hz } => {
+                check_range("crossover of the modes (Hz)", *below_hz, 0.0, 1000.0, "between 0 and 1000 Hz")
+            }
             Hidden::GainDrift { depth_db, period_s, phase_rad } => {
                 check_range("depth (dB)", *depth_db, -40.0, 40.0, "between -40 and 40 dB")?;
                 check_range("period (s)", *period_s, 1e-3, 100.0, "between 0.001 and 100 s")?;

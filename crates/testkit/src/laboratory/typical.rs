@@ -3,6 +3,7 @@
 use super::box_decay::BoxDecay;
 use super::hidden::{End, Fault, Gap, Hidden};
 use super::missing_surfaces;
+use super::modal_field;
 use super::random_room::face_areas_m2;
 use super::stream::{Purpose, stream};
 use super::truth::Truth;
@@ -77,6 +78,9 @@ impl Hidden {
             "open_patch" => missing_surfaces::open_patch(r, truth, strength),
             "angle_dependent_absorption" => Self::AngleDependentAbsorption { share: strength.min(1.0) },
             "nonlinear_distortion" => nonlinear_distortion(r, strength),
+            "room_modes" => {
+                Self::RoomModes { below_hz: strength * modal_field::typical_below_hz(truth, decay_s) }
+            }
             "gain_drift" => Self::GainDrift {
                 depth_db: 4.0 * strength,
                 period_s: 0.15 + 0.15 * unit(r),

@@ -1,0 +1,71 @@
+//! `room_modes`: standing waves in the lowest octaves.
+
+use crate::{BandView, Case, Effect, Parameter, Survey};
+
+/// The frequencies of modes are known to this share: so far off is the solver (0.2 % in the middle of an octave), and so is a room
+/// that is measured to a centimetre. The beats of two modes are lost after as many periods.
+const DETUNED: f64 = 0.002;
+/// Most of a bin's energy that may be left to chance where waves predict it, and least.
+const LEFT_TO_CHANCE: (f64, f64) = (0.03, 1.0);
+
+/// Below the Schroeder frequency energies follow the solution of the wave equation in the mesh
+/// ([`WaveSolver`](sabine_propagate::wave::WaveSolver)), no longer the sum of the paths' energies: for a path, whether it adds to
+/// another or takes from it is chance; for a wave it is not.
+///
+/// Two parameters: the share of the waves, 0 for paths alone and 1 for waves alone (the exponent of the ratio of the two
+/// energies in each bin); and how much of the spread that chance would give is left: places, walls and the mesh are known so well
+/// and no better. It grows as 1 - exp(-(2 pi f t 0.2 %)^2), for the frequencies of modes are known to 0.2 %. Octaves below 2000 sqrt(T / V) count, and the lowest if it reaches below; in a room without any there is no case.
+/// The solution is made once at the materials of the baseline, and anew when a cause has been named. [`DiagnoseConfig::wave_solutions`](crate::DiagnoseConfig::wave_solutions)
+/// turns it off.
+///
+/// Mark: narrow peaks at the same frequencies everywhere, loud here and weak there; energies of the lowest octaves that differ from
+/// place to place as the waves do, and beat. Mimicked by: `transducer_response` and absorption (where the lowest octaves are louder or
+/// decay otherwise on the average), `position_error` (one place that is louder), and by nothing that is the same at all places.
+///
+/// Source: Schroeder and Kuttruff, JASA 34 (1962) 76; Kuttruff, Room Acoustics, 6th ed., 3.2 to 3.5; Bilbao, Hamilton, Botts and
+/// Savioja, IEEE/ACM TASLP 24(1) (2016).
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RoomModes;
+
+impl Effect for RoomModes {
+    fn id(&self) -> &'static str {
+        "room_modes"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "In the lowest octaves the room is one of standing waves: where paths leave it to chance, the wave equation says how loud it is."
+    }
+
+    fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {
+        if survey.octaves_of_modes == 0 { Vec::new() } else { vec![Box::new(*self)] }
+    }
+}
+
+impl Case for RoomModes {
+    fn parameters(&self, _: &Survey) -> Vec<Parameter> {
+        vec![
+            Parameter::new("share_of_waves", "", 0.0, 0.7, (0.0, 1.2)).typically(1.0),
+            Parameter::new("left_to_chance", "", 1.0, 0.7, LEFT_TO_CHANCE).typically(0.5),
+        ]
+    }
+
+    fn starts(&self, _: &Survey) -> Vec<Vec<f64>> {
+        vec![vec![0.9, 0.3], vec![0.4, 0.8]]
+    }
+
+    fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+        for (bin, l) in ln_energy.iter_mut().enumerate() {
+            *l += values[0] * view.wave_change(bin);
+        }
+    }
+
+    fn variance(&self, values: &[f64], view: &BandView<'_>, variance: &mut [f64]) {
+        if view.has_waves() {
+            let predicted = values[0].clamp(0.0, 1.0) * (1.0 - values[1]);
+            let turn_per_s = std::f64::consts::TAU * view.survey().bands().exact_hz(view.band()) * DETUNED;
+            for (bin, v) in variance.iter_mut().enumerate() {
+                *v *= 1.0 - predicted * (-(turn_per_s * view.time_s(bin)).powi(2)).exp();
+            }
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! Standing waves hidden in the responses of laboratory rooms must be found, and none where there is none.
+//!
+//! The laboratory sums the modes of its box in closed form; the diagnosis solves the wave equation on voxels.
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
+use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, Verdict};
+use sabine_testkit::{Hidden, LabConfig, Laboratory};
+
+fn diagnose(lab: &Laboratory, hidden: &[Hidden]) -> Diagnosis {
+    let folder = tempfile::tempdir().unwrap();
+    let room = lab.write(hidden, &folder.path().join("room"), None).unwrap();
+    let config = DiagnoseConfig { rays: 2000, ..DiagnoseConfig::default() };
+    let found = Diagnoser::new(config).unwrap().diagnose(&room, &[], &()).unwrap();
+    println!("{:?}, {:?}", found.verdict, found.lack_of_fit);
+    for cause in &found.causes {
+        println!("{} {:.1} nats {:?} {:?}", cause.effect, cause.nats, cause.held_out_gain, cause.parameters);
+    }
+    println!("{:?}", found.candidates.iter().map(|c| (&c.effect, c.nats, c.d_prime)).collect::<Vec<_>>());
+    println!("{:?}", found.seconds);
+    found
+}
+
+fn room(seed: u64) -> Laboratory {
+    Laboratory::new(LabConfig { seed, ..LabConfig::default() }).unwrap()
+}
+
+fn are_found(seed: u64) {
+    let lab = room(seed);
+    let hidden = Hidden::random("room_modes", 1.0, &lab, seed).unwrap();
+    let found = diagnose(&lab, &[hidden]);
+    let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
+    assert_eq!(named, ["room_modes"], "{:?}", found.lack_of_fit);
+    assert_eq!(found.verdict, Verdict::Explained);
+    let cause = &found.causes[0];
+    let gain = cause.held_out_gain.as_ref().unwrap();
+    assert!(gain.low > 0.0 && gain.db_rmse_after < gain.db_rmse_before, "{gain:?}");
+    let share = cause.parameters.iter().find(|p| p.name == "share_of_waves").unwrap();
+    assert!((share.value - 1.0).abs() < 0.1, "{share:?}");
+    let left = cause.parameters.iter().find(|p| p.name == "left_to_chance").unwrap();
+    assert!(left.value < 0.2, "{left:?}");
+}
+
+#[test]
+fn standing_waves_are_found() {
+    are_found(810);
+}
+
+#[test]
+fn a_room_of_rays_has_no_standing_waves() {
+    let found = diagnose(&room(810), &[]);
+    assert_eq!(found.verdict, Verdict::Adequate, "{:?} {:?}", found.causes, found.lack_of_fit);
+    // They were looked for.
+    let score = found.candidates.iter().find(|c| c.effect == "room_modes").unwrap();
+    assert!(score.nats < 0.0, "{score:?}");
+}
+
+/// Two more rooms, for a quiet machine: `cargo test -p sabine-diagnose --test hidden_waves -- --ignored`.
+#[test]
+#[ignore = "minutes"]
+fn standing_waves_are_found_in_other_rooms() {
+    are_found(811);
+    are_found(812);
+}
