@@ -150,7 +150,8 @@ fn run(arguments: &Arguments) -> Result<(), Anything> {
         arguments.wave_below.map(|hz| WaveRoomBelow::new(hz, arguments.rate, &room, source)).transpose()?;
     let bar = Bar::new();
     let start = Instant::now();
-    let (paths, parameters) = trace(arguments, &room, source, receiver, &conditions, &bar)?;
+    let bends = arguments.diffraction || extended.as_ref().is_some_and(|model| model.diffraction);
+    let (paths, parameters) = trace(arguments, bends, &room, source, receiver, &conditions, &bar)?;
     let trace_s = start.elapsed().as_secs_f64();
     bar.finish();
     let start = Instant::now();
@@ -230,6 +231,7 @@ fn pattern(pattern: Pattern) -> Result<Option<Directivity>, sabine::acoustics::E
 /// Traces for as long as asked, or until T30 can be read in every octave.
 fn trace(
     arguments: &Arguments,
+    diffraction: bool,
     room: &MeasuredRoom,
     source: &Source,
     receiver: &Receiver,
@@ -246,7 +248,7 @@ fn trace(
             image_order: arguments.order,
             duration_s,
             seed: arguments.seed,
-            diffraction: arguments.diffraction,
+            diffraction,
             allow_leaks: arguments.allow_leaks,
             ..TracerConfig::default()
         };
