@@ -54,10 +54,15 @@ fn a_room_of_rays_has_no_standing_waves() {
     assert!(score.nats < 0.0, "{score:?}");
 }
 
-/// Two more rooms, for a quiet machine: `cargo test -p sabine-diagnose --test hidden_waves -- --ignored`.
 #[test]
 #[ignore = "minutes"]
-fn standing_waves_are_found_in_other_rooms() {
+fn standing_waves_are_found_in_another_room() {
     are_found(811);
+}
+
+/// Not met: `source_directivity` (6.9 nats) is named beside them.
+#[test]
+#[ignore = "minutes; a second cause is named"]
+fn standing_waves_are_all_that_is_found_in_a_third_room() {
     are_found(812);
 }
