@@ -97,7 +97,9 @@ impl Diagnoser {
         if !room.responses().is_empty() && room.responses().iter().all(|r| held.contains(&r.receiver)) {
             return Err(Error::AllHeldOut);
         }
-        let mut bench = Workbench::new(room, &held, &self.config, observer)?;
+        let wave_solutions = self.config.wave_solutions && self.effects.iter().any(|e| e.needs_waves());
+        let config = DiagnoseConfig { wave_solutions, ..self.config.clone() };
+        let mut bench = Workbench::new(room, &held, &config, observer)?;
         let used = bench.fitted.clone();
         let cases = search::cases(&self.effects, &bench.survey);
 

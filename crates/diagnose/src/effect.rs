@@ -132,6 +132,11 @@ pub trait Effect: Send + Sync {
     /// The cases in which it may come: one for each receiver, material, response ..., or a single one. None if it cannot be at
     /// work here.
     fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>>;
+
+    /// Whether its cases look at [`BandView::wave_change`]: waves are not solved if no effect does.
+    fn needs_waves(&self) -> bool {
+        false
+    }
 }
 
 /// An effect with its subject: "this receiver stands elsewhere". Its parameters are fitted with everything else left open.

@@ -35,6 +35,8 @@ const OCTAVE_SD_DB: f64 = 1.5;
 /// Spread of the logarithm of a noise floor about what a quiet quarter of its bins has.
 const FLOOR_SD: f64 = 3.0;
 const LN_PER_DB: f64 = std::f64::consts::LN_10 / 10.0;
+/// The time from a copy to the direct sound is known no better than this, whatever the bins say: both are as wide as a loudspeaker's pulse.
+const LEAD_SD_S: f64 = 2e-4;
 /// Step of differences over time, in seconds.
 const STEP_S: f64 = 5e-4;
 const HALF_90: f64 = 1.645;
@@ -203,7 +205,8 @@ impl LeadIns {
         }
         let Some(best) = best else { return Ok(None) };
         let found = parameters.iter().enumerate().map(|(i, p)| {
-            let (value, sd) = (best.values[cells.len() + i], best.sd(cells.len() + i));
+            let (value, fitted_sd) = (best.values[cells.len() + i], best.sd(cells.len() + i));
+            let sd = if i == 0 { fitted_sd.hypot(LEAD_SD_S) } else { fitted_sd };
             FoundParameter {
                 name: p.name.clone(),
                 value,

@@ -36,6 +36,10 @@ impl Effect for RoomModes {
         "In the lowest octaves the room is one of standing waves: where paths leave it to chance, the wave equation says how loud it is."
     }
 
+    fn needs_waves(&self) -> bool {
+        true
+    }
+
     fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {
         if survey.octaves_of_modes == 0 { Vec::new() } else { vec![Box::new(*self)] }
     }
