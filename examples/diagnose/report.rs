@@ -111,18 +111,19 @@ fn parameters(page: &mut Page, findings: &Findings) -> Result<()> {
 }
 
 fn gain_sentence(cause: &Cause) -> String {
-    cause.held_out_gain.as_ref().map_or(String::new(), |gain| {
-        format!(
-            " At positions that the fit had not seen, decay curves {}: {:.2} dB off before, {:.2} dB after.",
-            if gain.db_rmse_after < gain.db_rmse_before {
-                "come closer"
-            } else {
-                "do not come closer, which speaks against it"
-            },
-            gain.db_rmse_before,
-            gain.db_rmse_after
-        )
-    })
+    let Some(gain) = &cause.held_out_gain else { return String::new() };
+    let (before, after) = (gain.db_rmse_before, gain.db_rmse_after);
+    // What bears on times alone leaves decays as they are.
+    let verdict = if (after - before).abs() < 0.005 {
+        "are the same with and without it, which says nothing about it"
+    } else if after < before {
+        "come closer"
+    } else {
+        "do not come closer, which speaks against it"
+    };
+    format!(
+        " At positions that the fit had not seen, decay curves {verdict}: {before:.2} dB off before, {after:.2} dB after."
+    )
 }
 
 /// Parameters that are one for each octave, as a curve.
