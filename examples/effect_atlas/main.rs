@@ -28,8 +28,8 @@ struct Arguments {
     /// Rooms for each effect and strength; 0 prints the tables of the record alone
     #[arg(long, default_value_t = 3)]
     rooms: u64,
-    /// Seed of the first room; nothing was tuned on seeds from 5000 on
-    #[arg(long, default_value_t = 5000)]
+    /// Seed of the first room; nothing was tuned on seeds from 6000 on
+    #[arg(long, default_value_t = 6000)]
     seed: u64,
     /// Receivers in each room
     #[arg(long, default_value_t = 12)]
