@@ -202,8 +202,8 @@ fn nonlinear_distortion(r: &mut Pcg64Mcg, strength: f64) -> Hidden {
         to_hz,
         quadratic: sign(r) * 2.0 * factor(-32.0 + 8.0 * (unit(r) - 0.5)),
         cubic: -4.0 * factor(-38.0 + 8.0 * (unit(r) - 0.5)),
-        // Both harmonics are within the recording.
-        lead_in_s: growth_s * 3f64.ln() + 0.1,
+        // Both harmonics are within the recording, if there are any.
+        lead_in_s: if strength > 0.0 { growth_s * 3f64.ln() + 0.1 } else { 0.0 },
     }
 }
 
