@@ -30,6 +30,8 @@ const HEIGHT_SD_DB: f64 = 2.5;
 const MISREAD_SHARE: f64 = 0.02;
 /// Times at which the fit starts to look for partners of a peak, and how it narrows.
 const WIDTHS_S: [f64; 3] = [4e-4, 1.2e-4, 0.0];
+/// Standard deviations from which a normal density counts as nothing: 5e-32 of its top.
+const FAR_SD: f64 = 12.0;
 /// Of the starts that an effect offers, those that are followed.
 const MOST_STARTS: usize = 3;
 /// Latency of a recording whose time zero means nothing.
@@ -59,7 +61,9 @@ pub(crate) struct ArrivalModel<'a> {
 }
 
 fn normal(residual: f64, sd: f64) -> f64 {
-    (-0.5 * (residual / sd).powi(2)).exp() / (sd * std::f64::consts::TAU.sqrt())
+    let z = residual / sd;
+    // Most peaks are far from most reflections; beside the even background their density is less than the last bit.
+    if z.abs() > FAR_SD { 0.0 } else { (-0.5 * z * z).exp() / (sd * std::f64::consts::TAU.sqrt()) }
 }
 
 impl<'a> ArrivalModel<'a> {
@@ -153,15 +157,17 @@ impl<'a> ArrivalModel<'a> {
         if slopes {
             found.push((latency, 1.0));
             for placed in &self.effects {
-                for i in 0..placed.parameters.len() {
-                    let index = placed.first + i;
+                let mut own = values[placed.first..placed.first + placed.parameters.len()].to_vec();
+                for i in 0..own.len() {
+                    let (index, value) = (placed.first + i, own[i]);
                     let step = 1e-4 * self.priors[index].sd;
-                    let at = |offset: f64| {
-                        let mut moved = values.to_vec();
-                        moved[index] += offset;
-                        self.effect_delay_s(&moved, &view)
+                    let mut at = |moved: f64| {
+                        own[i] = moved;
+                        placed.case.delay_s(&own, &view)
                     };
-                    found.push((index, (at(step) - at(-step)) / (2.0 * step)));
+                    let (later, earlier) = (at(value + step), at(value - step));
+                    own[i] = value;
+                    found.push((index, (later - earlier) / (2.0 * step)));
                 }
             }
         }
@@ -172,6 +178,7 @@ impl<'a> ArrivalModel<'a> {
         let Some((direct, later)) = self.data.arrivals[pair].split_first() else { return 0.0 };
         let measured = &self.data.measured[self.assignment[pair]];
         let direct_sd_s = DIRECT_SD_S * measured.slowness();
+        let sloping = slopes.is_some();
         let mut push = |found: &[(usize, f64)], residual: f64, sd: f64, share: f64| {
             let Some(slopes) = slopes.as_deref_mut() else { return };
             let weight = share / (sd * sd);
@@ -182,7 +189,7 @@ impl<'a> ArrivalModel<'a> {
                 }
             }
         };
-        let (time_s, found) = self.time(values, pair, direct, true);
+        let (time_s, found) = self.time(values, pair, direct, sloping);
         let residual = measured.direct_s - time_s;
         let Some(width_s) = self.width_s else {
             push(&found, residual, direct_sd_s, 1.0);
@@ -199,7 +206,7 @@ impl<'a> ArrivalModel<'a> {
             return value;
         }
         let times: Vec<(f64, Vec<(usize, f64)>)> =
-            later.iter().map(|a| self.time(values, pair, a, true)).collect();
+            later.iter().map(|a| self.time(values, pair, a, sloping)).collect();
         let more = self.more(values, pair);
         let each = SEEN_SHARE / measured.peaks_s.len().max(1) as f64;
         let rest = 1.0 - each * more.len() as f64;

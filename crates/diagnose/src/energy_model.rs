@@ -220,34 +220,44 @@ impl<'a> EnergyModel<'a> {
         values[self.first_gain + self.assignment[pair]] + self.common_gain.map_or(0.0, |index| values[index])
     }
 
-    /// Energy of the paths in one band at these materials and gains, before any effect, and the change of its logarithm with
-    /// the absorption of each material.
-    fn paths(&self, values: &[f64], pair: usize, band: usize, count: usize) -> (Vec<f64>, Vec<f64>) {
+    /// Logarithm of the energy of the paths in one band at these materials and gains, before any effect, and, where wanted, its change
+    /// with the absorption of each material, `[bin * materials + material]`.
+    fn paths(
+        &self,
+        values: &[f64],
+        (pair, band): (usize, usize),
+        count: usize,
+        sloping: bool,
+    ) -> (Vec<f64>, Vec<f64>) {
         let bands = self.data.survey.bands.len();
         let m = self.data.absorption.len();
         let state = &self.data.states[pair][band];
         let shift: Vec<f64> = (0..m)
             .map(|k| ((1.0 - values[k * bands + band]) / (1.0 - self.data.absorption[k][band])).ln())
             .collect();
-        let gain_db = self.gain_db(values, pair);
+        let moved = shift.iter().any(|s| *s != 0.0);
+        let gain = self.gain_db(values, pair) * LN_PER_DB;
         let mut ln_energy = Vec::with_capacity(count);
-        let mut slopes = Vec::with_capacity(count * m);
-        let mut moved = vec![0.0; m];
+        let mut slopes = Vec::with_capacity(if sloping { count * m } else { 0 });
+        let mut mean_hits = vec![0.0; m];
         for bin in 0..count {
-            let groups = state.groups[bin]..state.groups[bin + 1];
             let mut energy = 0.0;
-            moved.fill(0.0);
-            for group in groups {
+            mean_hits.fill(0.0);
+            for group in state.groups[bin]..state.groups[bin + 1] {
                 let hits = &state.group_hits[group * m..(group + 1) * m];
-                let exponent: f64 = hits.iter().zip(&shift).map(|(n, s)| n * s).sum();
-                let e = state.group_energy[group] * exponent.exp();
+                let mut e = state.group_energy[group];
+                if moved {
+                    e *= hits.iter().zip(&shift).map(|(n, s)| n * s).sum::<f64>().exp();
+                }
                 energy += e;
-                moved.iter_mut().zip(hits).for_each(|(sum, n)| *sum += e * n);
+                if sloping {
+                    mean_hits.iter_mut().zip(hits).for_each(|(sum, n)| *sum += e * n);
+                }
             }
-            let sum = energy.ln();
-            moved.iter_mut().for_each(|n| *n /= energy);
-            ln_energy.push(sum + gain_db * LN_PER_DB);
-            slopes.extend((0..m).map(|k| -moved[k] / (1.0 - values[k * bands + band])));
+            ln_energy.push(energy.ln() + gain);
+            if sloping {
+                slopes.extend((0..m).map(|k| -mean_hits[k] / (energy * (1.0 - values[k * bands + band]))));
+            }
         }
         (ln_energy, slopes)
     }
@@ -274,7 +284,7 @@ impl<'a> EnergyModel<'a> {
 
     /// Logarithm of the predicted energy in the bins of a pair and band, as many as are compared.
     pub fn predicted(&self, values: &[f64], pair: usize, band: usize, count: usize) -> Vec<f64> {
-        let (mut ln_energy, _) = self.paths(values, pair, band, count);
+        let (mut ln_energy, _) = self.paths(values, (pair, band), count, false);
         let gain_db = self.gain_db(values, pair);
         self.apply(values, &self.view(pair, band, gain_db), gain_db, &mut ln_energy);
         ln_energy
@@ -312,7 +322,7 @@ impl<'a> EnergyModel<'a> {
         let m = self.data.absorption.len();
         let gain_db = self.gain_db(values, pair);
         let view = self.view(pair, band, gain_db);
-        let (paths, path_slopes) = self.paths(values, pair, band, count);
+        let (paths, path_slopes) = self.paths(values, (pair, band), count, slopes.is_some());
         let mut predicted = paths.clone();
         self.apply(values, &view, gain_db, &mut predicted);
         let silence = SILENCE * self.data.reference[band];

@@ -32,6 +32,8 @@ const COHERENT_SD: f64 = 0.35;
 const TIME_SD_S: f64 = 4e-5;
 /// Exact paths keep their very time for so long after the direct sound, in seconds; later ones are gathered in cells.
 const ALONE_S: f64 = 0.04;
+/// Cell of paths that are in none.
+const ALONE: u16 = u16::MAX;
 /// A neighbour from which a filter takes less than this share is left out.
 const LEAST_LEAK: f64 = 1e-7;
 /// Energy of a bin without paths, as a share of the strongest: it counts as nothing.
@@ -61,6 +63,10 @@ pub(crate) struct TracedPair {
     departures: Vec<[f32; 3]>,
     /// Time after the direct sound.
     times_s: Vec<f32>,
+    /// Cell of time that each path falls into; [`ALONE`] for early exact ones.
+    cells: Vec<u16>,
+    /// Those: they keep their very times.
+    alone: Vec<u32>,
     /// Group of like hits that each path belongs to, within its slice of time.
     groups: Vec<u8>,
 }
@@ -140,7 +146,8 @@ impl TracedPair {
         let energies = paths.energies(stated, &air)?;
         let weights: Vec<f32> = (0..paths.len()).map(|i| energies.iter().map(|e| e[i]).sum()).collect();
         let groups = hit_groups::group(&times_s, &weights, &hits, materials);
-        Ok(Self { paths, bent, air, speed_m_s, direct_s, hits, departures, times_s, groups })
+        let (cells, alone) = in_cells(&paths, &times_s);
+        Ok(Self { paths, bent, air, speed_m_s, direct_s, hits, departures, times_s, cells, alone, groups })
     }
 
     /// The same paths in other air.
@@ -150,6 +157,7 @@ impl TracedPair {
         self.speed_m_s = air.speed_of_sound_m_s();
         self.direct_s *= slower;
         self.times_s.iter_mut().for_each(|t| *t *= slower as f32);
+        (self.cells, self.alone) = in_cells(&self.paths, &self.times_s);
     }
 
     /// The exact paths, the shortest first.
@@ -253,13 +261,14 @@ impl TracedPair {
         let cells = (duration_s / CELL_S).ceil() as usize + 1;
         let mut cell = vec![0.0f64; cells];
         let mut sums = vec![0.0; count];
-        for (i, &e) in energies.iter().enumerate() {
-            let (time_s, e) = (f64::from(self.times_s[i]), f64::from(e));
-            if time_s < ALONE_S && self.paths.is_exact(i) {
-                Self::shares(time_s, bins, kernel, count, |bin, share| sums[bin] += share * e);
-            } else if let Some(c) = cell.get_mut((time_s.max(0.0) / CELL_S) as usize) {
-                *c += e;
+        for (&c, &e) in self.cells.iter().zip(energies) {
+            if let Some(c) = cell.get_mut(usize::from(c)) {
+                *c += f64::from(e);
             }
+        }
+        for &i in &self.alone {
+            let (time_s, e) = (f64::from(self.times_s[i as usize]), f64::from(energies[i as usize]));
+            Self::shares(time_s, bins, kernel, count, |bin, share| sums[bin] += share * e);
         }
         for (c, e) in cell.into_iter().enumerate().filter(|(_, e)| *e > 0.0) {
             let time_s = (c as f64 + 0.5) * CELL_S;
@@ -417,6 +426,24 @@ impl TracedPair {
         }
         state
     }
+}
+
+/// Cell of each path, and the paths that are in none.
+fn in_cells(paths: &PathSet, times_s: &[f32]) -> (Vec<u16>, Vec<u32>) {
+    let mut alone = Vec::new();
+    let cells = times_s
+        .iter()
+        .enumerate()
+        .map(|(i, &t)| {
+            let time_s = f64::from(t);
+            if time_s < ALONE_S && paths.is_exact(i) {
+                alone.push(i as u32);
+                return ALONE;
+            }
+            ((time_s.max(0.0) / CELL_S) as usize).min(usize::from(ALONE) - 1) as u16
+        })
+        .collect();
+    (cells, alone)
 }
 
 /// Variance of the energy of single pulses of random sign: four times the sum over pairs of w_i w_j r_ij^2.

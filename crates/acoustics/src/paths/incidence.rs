@@ -51,19 +51,19 @@ impl PathSet {
         self.axes = axes;
     }
 
-    /// A sum over the reflections of each contribution whose angle is known: `step(material, cosine)`, the cosine being that of the angle
-    /// to the surface's normal. `step` is asked for 252 cosines of each material, not for each reflection.
-    pub fn sums_by_angle(&self, step: impl Fn(usize, f64) -> f64) -> Vec<f32> {
+    /// Sums over the reflections of each contribution whose angle is known, `N` at a time (octaves, say): `step(material, cosine)`, the
+    /// cosine being that of the angle to the surface's normal. `step` is asked for 252 cosines of each material, not for each reflection.
+    pub fn sums_by_angle<const N: usize>(&self, step: impl Fn(usize, f64) -> [f64; N]) -> Vec<[f32; N]> {
         let steps = usize::from(STEPS);
         let cosine = |code: usize| (code as f64 + 0.5) / f64::from(STEPS);
-        let table: Vec<f32> = (0..self.materials)
+        let table: Vec<[f32; N]> = (0..self.materials)
             .flat_map(|material| (0..steps).map(move |code| (material, cosine(code))))
-            .map(|(material, cosine)| step(material, cosine) as f32)
+            .map(|(material, cosine)| step(material, cosine).map(|x| x as f32))
             .collect();
         // Hits on each material along each axis: few sets have any.
         let wide =
             if self.incidences.iter().any(|&i| i >= STEPS && i != UNKNOWN) { 3 * self.materials } else { 0 };
-        let mut sums = vec![0.0f32; self.parents.len()];
+        let mut sums = vec![[0.0f32; N]; self.parents.len()];
         let mut along = vec![0u16; self.parents.len() * wide];
         for chain in 1..self.parents.len() {
             let parent = self.parents[chain] as usize;
@@ -72,36 +72,39 @@ impl PathSet {
             let material = usize::from(self.events[chain] >> 1);
             match self.incidences[chain] {
                 UNKNOWN => {}
-                code if code < STEPS => sums[chain] += table[material * steps + usize::from(code)],
+                code if code < STEPS => {
+                    add(&mut sums[chain], 1.0, &table[material * steps + usize::from(code)])
+                }
                 axis => along[chain * wide + 3 * material + usize::from(axis - STEPS)] += 1,
             }
         }
         (0..self.len())
             .map(|i| {
                 let chains = [self.chains[i] as usize, self.tails[i] as usize];
-                let known: f32 = chains.iter().map(|&c| sums[c]).sum();
+                let mut sum = sums[chains[0]];
+                add(&mut sum, 1.0, &sums[chains[1]]);
                 if wide == 0 || chains == [0, 0] {
-                    return known;
+                    return sum;
                 }
                 let departure = self.departure(i);
                 let codes = self.axes.map(|axis| {
                     let cosine: f64 = (0..3).map(|k| axis[k] * departure[k]).sum();
                     usize::from(code(Incidence::Cosine(cosine.abs())))
                 });
-                let mirrored: f32 = (0..wide)
-                    .map(|place| {
-                        let hits: u16 = chains.iter().map(|&c| along[c * wide + place]).sum();
-                        if hits == 0 {
-                            0.0
-                        } else {
-                            f32::from(hits) * table[place / 3 * steps + codes[place % 3]]
-                        }
-                    })
-                    .sum();
-                known + mirrored
+                for place in 0..wide {
+                    let hits: u16 = chains.iter().map(|&c| along[c * wide + place]).sum();
+                    if hits > 0 {
+                        add(&mut sum, f32::from(hits), &table[place / 3 * steps + codes[place % 3]]);
+                    }
+                }
+                sum
             })
             .collect()
     }
+}
+
+fn add<const N: usize>(sum: &mut [f32; N], times: f32, more: &[f32; N]) {
+    sum.iter_mut().zip(more).for_each(|(s, m)| *s += times * m);
 }
 
 #[cfg(test)]
@@ -132,14 +135,17 @@ mod tests {
         push(twice, PathSet::DIRECT, [0.8, 0.0, -0.6]);
         push(unknown, PathSet::DIRECT, [1.0, 0.0, 0.0]);
         push(PathSet::DIRECT, PathSet::DIRECT, [1.0, 0.0, 0.0]);
-        let found = paths.sums_by_angle(|material, cosine| (material + 1) as f64 * cosine);
-        for (found, expected) in found.iter().zip([0.25 + 2.0 * 0.75, 3.0 * 0.6, 0.0, 0.0]) {
+        let found = paths.sums_by_angle(|material, cosine| [(material + 1) as f64 * cosine, 1.0]);
+        for ([found, hits], (expected, known)) in
+            found.iter().zip([(0.25 + 2.0 * 0.75, 2.0), (3.0 * 0.6, 2.0), (0.0, 0.0), (0.0, 0.0)])
+        {
             assert!((f64::from(*found) - expected).abs() < 0.01, "{found} {expected}");
+            assert_eq!(*hits, known);
         }
         // What is copied keeps its angles.
         let mut more = PathSet::new(2, 100.0);
         more.reflect(PathSet::DIRECT, 0, Reflection::Specular);
         more.append(&paths);
-        assert_eq!(more.sums_by_angle(|m, c| (m + 1) as f64 * c), found);
+        assert_eq!(more.sums_by_angle(|m, c| [(m + 1) as f64 * c, 1.0]), found);
     }
 }

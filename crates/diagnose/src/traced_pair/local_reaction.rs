@@ -5,8 +5,12 @@ use crate::kernel::BandKernel;
 use sabine_acoustics::Material;
 use sabine_propagate::wave::admittance_of_absorption;
 
-/// Shares of local reaction at which energies are tabulated.
-pub(crate) const LOCAL_GRID: [f64; 5] = [-0.5, 0.0, 0.5, 1.0, 1.3];
+/// Shares of local reaction at which energies are tabulated: multiples of a half, so that one exponential serves all.
+pub(crate) const LOCAL_GRID: [f64; 5] = [-0.5, 0.0, 0.5, 1.0, 1.5];
+/// The same in halves.
+const HALVES: [i32; 5] = [-1, 0, 1, 2, 3];
+/// Octaves whose changes are summed along the paths together.
+const OCTAVES: usize = 4;
 /// Place of none in the grid.
 const NO_SHARE: usize = 1;
 /// A wall of impedance cos(theta) swallows all; nothing real does (energy).
@@ -29,34 +33,38 @@ impl TracedPair {
         kernels: &[BandKernel],
         duration_s: f64,
     ) -> Vec<Vec<Vec<f64>>> {
-        let one_band = |(band, energies): (usize, &Vec<f32>)| {
-            let walls: Vec<(f64, f64)> = materials
+        let mut found = Vec::with_capacity(energies.len());
+        for first in (0..energies.len()).step_by(OCTAVES) {
+            let walls: Vec<[(f64, f64); OCTAVES]> = materials
                 .iter()
-                .map(|m| m.absorption().values()[band].clamp(1e-4, 0.99))
-                .map(|a| (1.0 / admittance_of_absorption(a), a))
+                .map(|m| {
+                    std::array::from_fn(|i| {
+                        let band = (first + i).min(energies.len() - 1);
+                        let a = m.absorption().values()[band].clamp(1e-4, 0.99);
+                        (1.0 / admittance_of_absorption(a), a)
+                    })
+                })
                 .collect();
             let log_changes = self.paths.sums_by_angle(|material, cosine| {
-                let (impedance, absorption) = walls[material];
-                log_change(impedance, absorption, cosine)
+                walls[material].map(|(impedance, absorption)| log_change(impedance, absorption, cosine))
             });
-            let state = &states[band];
-            LOCAL_GRID
-                .iter()
-                .enumerate()
-                .map(|(place, &share)| {
+            for band in first..energies.len().min(first + OCTAVES) {
+                let halves: Vec<f32> = log_changes.iter().map(|c| (0.5 * c[band - first]).exp()).collect();
+                let state = &states[band];
+                let one = |(place, &power): (usize, &i32)| {
                     if place == NO_SHARE {
                         return vec![0.0; state.ln_energy.len()];
                     }
-                    let share = share as f32;
                     let changed: Vec<f32> =
-                        energies.iter().zip(&log_changes).map(|(e, c)| e * (share * c).exp()).collect();
+                        energies[band].iter().zip(&halves).map(|(e, half)| e * half.powi(power)).collect();
                     let sums = self.sums(&changed, state.bins, &kernels[band], duration_s);
                     let floor = NOTHING * sums.iter().copied().fold(0.0, f64::max).max(1e-30);
                     sums.iter().zip(&state.ln_energy).map(|(s, l)| s.max(floor).ln() - l).collect()
-                })
-                .collect()
-        };
-        energies.iter().enumerate().map(one_band).collect()
+                };
+                found.push(HALVES.iter().enumerate().map(one).collect());
+            }
+        }
+        found
     }
 }
 
