@@ -116,6 +116,12 @@ fn waves_take_the_low_end_and_leave_the_rest() {
     assert!(number("below_hz") == 100.0 && number("voxels") > 10_000.0 && number("seconds") > 0.0);
     assert!(number("level_difference_db").abs() < 6.0 && number("gain_db").abs() < 6.1, "{waves}");
     assert_eq!(joined.samples().len(), rays.samples().len());
+    // A diagnosis that named standing waves says so in its model.
+    let model = folder.path().join("extended_model.toml");
+    std::fs::write(&model, "centres_hz = [125.0]\ncauses = [\"room_modes\"]\nwave_below_hz = 100.0\n")
+        .unwrap();
+    let (extended, told) = heard("model", &["--model", model.to_str().unwrap()]);
+    assert_eq!((&extended["waves"]["below_hz"], told), (&waves["below_hz"], joined.clone()));
     // Above the octave about 100 Hz nothing changes.
     let off: f64 = (0..40)
         .map(|i| 200.0 + 25.0 * f64::from(i))

@@ -62,7 +62,7 @@ struct Arguments {
     #[arg(long)]
     diffraction: bool,
     /// Below this frequency impulse_response.wav is a solution of the wave equation, from an omnidirectional source. Its time
-    /// grows with the fourth power of the frequency. Parameters and ambisonics are those of the paths
+    /// grows with the fourth power of the frequency. Parameters and ambisonics are those of the paths [default: as --model says]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true, conflicts_with = "pattern")]
     wave_below: Option<f64>,
     /// Go on although more than one ray in a thousand escapes through holes of the mesh
@@ -146,8 +146,8 @@ fn run(arguments: &Arguments) -> Result<(), Anything> {
     }
     let facing = receiver.axis.map_or_else(|| Ok(Orientation::default()), Orientation::towards)?;
 
-    let below =
-        arguments.wave_below.map(|hz| WaveRoomBelow::new(hz, arguments.rate, &room, source)).transpose()?;
+    let below_hz = arguments.wave_below.or(extended.as_ref().and_then(|model| model.wave_below_hz));
+    let below = below_hz.map(|hz| WaveRoomBelow::new(hz, arguments.rate, &room, source)).transpose()?;
     let bar = Bar::new();
     let start = Instant::now();
     let bends = arguments.diffraction || extended.as_ref().is_some_and(|model| model.diffraction);

@@ -20,7 +20,7 @@ fn walls_that_react_locally_are_found() {
     assert_eq!(named, ["angle_dependent_absorption"]);
     let gain = found.causes[0].held_out_gain.clone().unwrap();
     assert!(gain.low > 0.0, "{gain:?}");
-    // The share comes out a fifth low (docs/validation/diagnose.md): few grazing paths carry late decays, and not all are traced.
+    // The share comes out a fifth low (docs/validation/diagnose.md).
     let share = &found.causes[0].parameters[0];
     assert!(share.low > 0.5 && share.high > 0.85, "{share:?}");
 }

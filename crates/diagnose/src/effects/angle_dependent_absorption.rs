@@ -10,8 +10,7 @@ use crate::{BandView, Case, Effect, Parameter, Survey};
 /// another material on one wall; scattering, which straightens decays. The extended model keeps random-incidence absorption: what was found
 /// is said, not rendered.
 ///
-/// The share comes out low, by about a fifth where all walls react locally: late decays are carried by few paths that graze, and the tracer
-/// chooses its paths by what walls absorb in the mean over all angles.
+/// The share comes out low, by about a fifth where all walls react locally (docs/validation/diagnose.md): more paths do not change that.
 ///
 /// Source: H. Kuttruff, Room Acoustics, 6th ed., 2.3 and 2.5; E. T. Paris, Phil. Mag. 5, 1928.
 #[derive(Clone, Copy, Debug, Default)]
