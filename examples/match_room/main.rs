@@ -81,9 +81,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error + Send + Sync>> {
     let mut diffraction = false;
     let mut wave_below_hz = arguments.wave_below;
     if let Some(model) = &arguments.model {
-        let model = ExtendedModel::read(model)?;
-        wave_below_hz = wave_below_hz.or(model.wave_below_hz);
-        let extended = model.room(&room)?;
+        let extended = ExtendedModel::read(model)?.room(&room)?;
+        wave_below_hz = wave_below_hz.or(extended.wave_below_hz);
         diffraction = extended.diffraction;
         room = extended.measured_room(&room)?;
     }

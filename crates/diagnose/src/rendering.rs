@@ -30,6 +30,8 @@ pub struct ExtendedRoom {
     pub receivers: Vec<Receiver>,
     /// Whether sound bends around edges: for [`TracerConfig::diffraction`](sabine_propagate::TracerConfig::diffraction).
     pub diffraction: bool,
+    /// Below this frequency in Hz responses are those of the wave equation.
+    pub wave_below_hz: Option<f64>,
     /// Pattern and axis of each source; `None` is omnidirectional.
     pub directivities: Vec<Option<(Directivity, Orientation)>>,
     chain: RecordingChain,
@@ -180,7 +182,17 @@ impl ExtendedModel {
             sources.iter().map(|source| self.pattern(source, own, bands)).collect::<Result<_, Fault>>()?;
         let chain = RecordingChain::new(self.clone(), own);
         let diffraction = self.diffraction;
-        Ok(ExtendedRoom { scene, air, attenuation, sources, receivers, diffraction, directivities, chain })
+        Ok(ExtendedRoom {
+            scene,
+            air,
+            attenuation,
+            sources,
+            receivers,
+            diffraction,
+            wave_below_hz: self.wave_below_hz,
+            directivities,
+            chain,
+        })
     }
 
     fn scene(&self, stated: &Scene, materials: Vec<Material>) -> Result<Scene, Cause> {
