@@ -46,7 +46,7 @@ mod unfolded;
 pub use config::LabConfig;
 pub use hidden::{End, Fault, Gap, Hidden};
 pub use screened_room::{ScreenedConfig, ScreenedRoom};
-pub use truth::{TrueMaterial, TrueSource, Truth};
+pub use truth::{TrueMaterial, TrueSession, TrueSource, Truth};
 
 use box_decay::BoxDecay;
 use image_field::Columns;
@@ -60,6 +60,7 @@ use sabine_acoustics::{
 use scattered_field::ScatteredField;
 use std::io;
 use std::path::Path;
+use truth::Medium;
 
 /// One random room, drawn from a seed.
 ///
@@ -204,29 +205,27 @@ impl Laboratory {
     }
 
     fn render(&self, truth: &Truth) -> Result<Vec<ImpulseResponse>, Error> {
-        let medium = truth.medium()?;
         let rate_hz = f64::from(self.config.sample_rate_hz);
         let samples = (truth.duration_s * rate_hz).ceil() as usize;
-        // A little longer, so that no image is missed at the end.
-        let decay = BoxDecay::new(truth, &medium, truth.duration_s + 0.2);
-        let scattered: Vec<_> =
-            (0..truth.sources.len()).map(|s| ScatteredField::new(truth, &medium, s)).collect();
+        let sessions: Vec<Session> =
+            (0..truth.sessions.len()).map(|i| Session::new(truth.in_session(i))).collect::<Result<_, _>>()?;
         let render = |index: usize| -> Result<(Vec<f64>, BandEnergies), Error> {
             let pair = (index / truth.receivers_m.len(), index % truth.receivers_m.len());
+            let Session { truth, medium, decay, scattered } = &sessions[truth.session(pair.1)];
             let mut columns = Columns {
                 samples: vec![vec![0.0; samples]; self.bands.len()],
                 rate_hz: rate_hz * (1.0 + 1e-6 * truth.clock_ppm),
                 start_s: -truth.latencies_s[index],
             };
-            image_field::add_images(truth, &medium, &decay, pair, &mut columns);
+            image_field::add_images(truth, medium, decay, pair, &mut columns);
             if let Some(field) = &scattered[pair.0] {
                 field.add(truth, pair, &mut columns);
             }
-            coupled_tail::add_tails(truth, &medium, pair, &mut columns);
+            coupled_tail::add_tails(truth, medium, pair, &mut columns);
             let energies = BandEnergies::of(&columns.samples, rate_hz);
             let rate = self.config.sample_rate_hz;
             let joined = steep_bands::join_steeply(self.bands, columns.samples, rate);
-            Ok((modal_field::join(truth, &medium, self.bands, index, rate, joined)?, energies))
+            Ok((modal_field::join(truth, medium, self.bands, index, rate, joined)?, energies))
         };
         let rendered: Result<Vec<_>, Error> = (0..truth.responses()).into_par_iter().map(render).collect();
         let (mut responses, energies): (Vec<Vec<f64>>, Vec<BandEnergies>) = rendered?.into_iter().unzip();
@@ -266,7 +265,7 @@ impl Laboratory {
                 io::Error::new(io::ErrorKind::InvalidInput, "the truth must not lie within the room");
             return Err(Error::Io { path: path.to_owned(), source });
         }
-        let room = self.new_room(self.render(&truth)?);
+        let room = self.new_room(self.render(&truth)?)?;
         if let Some(path) = truth_file {
             truth.write(path)?;
         }
@@ -278,33 +277,53 @@ impl Laboratory {
         })
     }
 
-    fn new_room(&self, responses: Vec<ImpulseResponse>) -> NewRoom {
+    fn new_room(&self, responses: Vec<ImpulseResponse>) -> Result<NewRoom, Error> {
         let receivers = self.receivers.len();
-        let entry = |(index, samples): (usize, ImpulseResponse)| {
+        let several = self.config.sessions > 1;
+        let entry = |(index, samples): (usize, ImpulseResponse)| -> Result<NewResponse, Error> {
             let (source, receiver) =
                 (&self.sources[index / receivers].id, &self.receivers[index % receivers].id);
-            NewResponse {
+            let session = self.truth.session(index % receivers);
+            Ok(NewResponse {
                 source: source.clone(),
                 receiver: receiver.clone(),
                 name: format!("{source}_{receiver}"),
-                air: None,
-                session: None,
+                air: several.then(|| self.truth.in_session(session).air()).transpose()?,
+                session: several.then(|| format!("session {}", session + 1)),
                 samples,
-            }
+            })
         };
-        NewRoom {
+        Ok(NewRoom {
             scene: self.scene.clone(),
             priors: self.priors.clone(),
             air: Some(self.air),
             measurement: Measurement { time_zero: self.config.time_zero, levels: self.config.levels },
             sources: self.sources.clone(),
             receivers: self.receivers.clone(),
-            responses: responses.into_iter().enumerate().map(entry).collect(),
-        }
+            responses: responses.into_iter().enumerate().map(entry).collect::<Result<_, _>>()?,
+        })
     }
 
     pub(crate) fn null(&self) -> &Truth {
         &self.truth
+    }
+}
+
+/// What a session's responses have in common.
+struct Session {
+    truth: Truth,
+    medium: Medium,
+    decay: BoxDecay,
+    scattered: Vec<Option<ScatteredField>>,
+}
+
+impl Session {
+    fn new(truth: Truth) -> Result<Self, Error> {
+        let medium = truth.medium()?;
+        // A little longer, so that no image is missed at the end.
+        let decay = BoxDecay::new(&truth, &medium, truth.duration_s + 0.2);
+        let scattered = (0..truth.sources.len()).map(|s| ScatteredField::new(&truth, &medium, s)).collect();
+        Ok(Self { truth, medium, decay, scattered })
     }
 }
 

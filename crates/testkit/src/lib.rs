@@ -48,8 +48,8 @@ mod wave_grid;
 pub use box_modes::BoxModes;
 pub use brute_force::BruteForceRays;
 pub use laboratory::{
-    End, Fault, Gap, Hidden, LabConfig, Laboratory, ScreenedConfig, ScreenedRoom, TrueMaterial, TrueSource,
-    Truth,
+    End, Fault, Gap, Hidden, LabConfig, Laboratory, ScreenedConfig, ScreenedRoom, TrueMaterial, TrueSession,
+    TrueSource, Truth,
 };
 pub use phonons::{PhononConfig, PhononEnergy, Phonons};
 pub use shoebox::{Image, ShoeboxImages};

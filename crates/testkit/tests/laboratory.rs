@@ -5,7 +5,7 @@ mod rooms;
 mod spectrum;
 
 use rooms::{db, energy, one_octave, quick_room, samples, seven_octaves, true_places};
-use sabine_acoustics::{Error, Levels, MeasuredRoom, TimeZero};
+use sabine_acoustics::{Air, Error, Levels, MeasuredRoom, TimeZero};
 use sabine_testkit::{
     Fault, Hidden, LabConfig, Laboratory, ShoeboxImages, Truth, assert_all_close, assert_close,
 };
@@ -181,6 +181,37 @@ fn a_room_is_written_and_read_back_and_the_truth_lies_elsewhere() {
 }
 
 #[test]
+fn sessions_have_air_of_their_own_and_turned_sources_keep_their_places() {
+    let place = tempfile::tempdir().unwrap();
+    let config = LabConfig { seed: 19, receivers: 4, sessions: 2, turned: true, ..LabConfig::default() };
+    let lab = Laboratory::new(config).unwrap();
+    let room = lab.write(&[], &place.path().join("room"), None).unwrap();
+    let [first, again] = room.sources() else { panic!("{:?}", room.sources()) };
+    assert_eq!(first.position_m, again.position_m);
+    let (a, b) = (first.axis.unwrap(), again.axis.unwrap());
+    assert!((a[0] * b[0] + a[1] * b[1]).abs() < 1e-9 && a[2] == b[2]);
+    let truth = lab.truth(&[]).unwrap();
+    for (i, response) in room.responses().iter().enumerate() {
+        let session = i % 2;
+        assert_eq!(response.session.as_deref(), Some(["session 1", "session 2"][session]));
+        let warmer_k = response.air.temperature_c() - lab.air().temperature_c();
+        assert!((warmer_k - 6.0 * session as f64).abs() < 1e-9, "{warmer_k} K");
+        let percent = |air: &Air| air.relative_humidity_percent();
+        let off_percent = (percent(&response.air) - percent(&lab.air())).abs();
+        assert!((off_percent - 30.0 * session as f64).abs() < 1e-9, "{off_percent} %");
+        // The direct sound comes with the speed of sound of its session, 331.3 m/s and 0.606 m/s more for each degree.
+        let (from, to) = (truth.sources[i / 4].position_m, truth.receivers_m[i % 4]);
+        let length_m = (0..3).map(|k| (from[k] - to[k]).powi(2)).sum::<f64>().sqrt();
+        let expected_s = length_m / (331.3 + 0.606 * response.air.temperature_c());
+        let samples = room.load_response(i).unwrap();
+        let most = samples.samples().iter().fold(0f32, |m, s| m.max(s.abs()));
+        let onset = samples.samples().iter().position(|s| s.abs() > 0.3 * most).unwrap();
+        let onset_s = onset as f64 / 48e3;
+        assert!((onset_s - expected_s).abs() < 1e-4, "{i}: {onset_s} {expected_s}");
+    }
+}
+
+#[test]
 fn at_strength_0_nothing_is_hidden() {
     let lab = quick_room(3);
     let plain = lab.responses(&[]).unwrap();
@@ -237,7 +268,8 @@ fn what_does_not_fit_is_refused() {
     assert!(matches!(Hidden::random("scattering", -1.0, &lab, 1), Err(Error::OutOfRange { .. })));
     for wrong in [
         LabConfig { sources: 0, ..LabConfig::default() },
-        LabConfig { receivers: 33, ..LabConfig::default() },
+        LabConfig { receivers: 41, ..LabConfig::default() },
+        LabConfig { sessions: 5, ..LabConfig::default() },
         LabConfig { sample_rate_hz: 16_000, ..LabConfig::default() },
     ] {
         assert!(matches!(Laboratory::new(wrong), Err(Error::OutOfRange { .. })));

@@ -9,8 +9,12 @@ pub struct LabConfig {
     pub seed: u64,
     /// Number of sources, 1 to 8.
     pub sources: usize,
-    /// Number of receivers, 1 to 32.
+    /// Number of receivers, 1 to 40.
     pub receivers: usize,
+    /// Number of sessions, 1 to 4, each in air of its own, which is declared; receivers belong to them in turn.
+    pub sessions: usize,
+    /// Whether every source is measured again from the same place, turned to its left by a right angle: twice as many sources.
+    pub turned: bool,
     /// Sample rate of the responses in Hz; the highest octave must lie below half of it.
     pub sample_rate_hz: u32,
     /// Octaves of the material tables and of the responses.
@@ -29,6 +33,8 @@ impl Default for LabConfig {
             seed: 1,
             sources: 1,
             receivers: 12,
+            sessions: 1,
+            turned: false,
             sample_rate_hz: 48_000,
             bands: OctaveBands::T60,
             time_zero: TimeZero::Emission,
@@ -45,7 +51,8 @@ impl LabConfig {
         let checks = [
             ("seed", self.seed as f64, 0.0, i64::MAX as f64, "below 2^63"),
             ("sources", self.sources as f64, 1.0, 8.0, "between 1 and 8"),
-            ("receivers", self.receivers as f64, 1.0, 32.0, "between 1 and 32"),
+            ("receivers", self.receivers as f64, 1.0, 40.0, "between 1 and 40"),
+            ("sessions", self.sessions as f64, 1.0, 4.0, "between 1 and 4"),
             (
                 "sample rate (Hz)",
                 rate,

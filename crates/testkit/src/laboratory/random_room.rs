@@ -3,7 +3,7 @@
 use super::box_decay::BoxDecay;
 use super::config::LabConfig;
 use super::stream::{Purpose, stream};
-use super::truth::{TrueMaterial, TrueSource, Truth};
+use super::truth::{TrueMaterial, TrueSession, TrueSource, Truth};
 use rand::Rng;
 use rand::seq::SliceRandom;
 use rand_distr::StandardNormal;
@@ -31,6 +31,9 @@ pub(crate) const MARGIN_S: f64 = 0.06;
 /// Standard deviation of a microphone's gain in dB, and of a receiver's place along each axis in metres.
 pub(crate) const GAIN_SD_DB: f64 = 0.3;
 pub(crate) const PLACE_SD_M: f64 = 0.005;
+
+/// By how much each session is warmer than the first, in K, and damper or drier, in percent of relative humidity.
+const SESSIONS: [[f64; 2]; 4] = [[0.0, 0.0], [6.0, 30.0], [-4.0, 15.0], [3.0, -20.0]];
 
 /// What is said about the room.
 pub(crate) struct Declared {
@@ -92,6 +95,7 @@ pub(crate) fn draw(config: &LabConfig) -> Result<(Declared, Truth), Error> {
             inverted: Vec::new(),
             materials: materials(&declared),
             sources: Vec::new(),
+            sessions: Vec::new(),
             effects: Vec::new(),
         };
         let fits = |truth: &Truth| -> Result<bool, Error> {
@@ -110,6 +114,9 @@ pub(crate) fn draw(config: &LabConfig) -> Result<(Declared, Truth), Error> {
         }
         let Some(mut places) = draw_places(config, place_seed, size_m) else { continue };
         let receivers_m = places.split_off(config.sources);
+        if config.turned {
+            places.extend_from_within(..);
+        }
         truth.duration_s = fallen_s + MARGIN_S;
         measure(config, &mut truth, &places, &receivers_m);
         return Ok((
@@ -148,6 +155,13 @@ fn measure(config: &LabConfig, truth: &mut Truth, sources_m: &[[f64; 3]], receiv
             TrueSource { position_m, axis: towards.map(|c| c / length), omni_share }
         })
         .collect();
+    if config.turned {
+        let (first, again) = truth.sources.split_at_mut(config.sources);
+        for (turned, source) in again.iter_mut().zip(first) {
+            turned.axis = [-source.axis[1], source.axis[0], source.axis[2]];
+        }
+    }
+    truth.sessions = SESSIONS[..config.sessions].iter().map(|&s| session(truth, s)).collect();
     let responses = sources_m.len() * receivers_m.len();
     truth.inverted = vec![false; responses];
     let mut random = stream(config.seed, Purpose::Gain, 0);
@@ -171,6 +185,12 @@ fn measure(config: &LabConfig, truth: &mut Truth, sources_m: &[[f64; 3]], receiv
             _ => 0.0,
         })
         .collect();
+}
+
+/// The air of a session, on whichever side of the first one's humidity there is room.
+fn session(truth: &Truth, [warmer_k, damper_percent]: [f64; 2]) -> TrueSession {
+    let up = truth.relative_humidity_percent < 50.0;
+    TrueSession { warmer_k, damper_percent: if up { damper_percent } else { -damper_percent } }
 }
 
 /// Three to five materials over six faces, numbered as they first appear.

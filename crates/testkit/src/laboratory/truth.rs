@@ -46,8 +46,20 @@ pub struct Truth {
     pub materials: Vec<TrueMaterial>,
     /// Sources.
     pub sources: Vec<TrueSource>,
+    /// Sessions, the first being that of the stated air.
+    pub sessions: Vec<TrueSession>,
     /// The hidden effects, in the order in which they were asked for.
     pub effects: Vec<Hidden>,
+}
+
+/// The air of a session, as it differs from that of the first.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrueSession {
+    /// Kelvin.
+    pub warmer_k: f64,
+    /// Percent of relative humidity.
+    pub damper_percent: f64,
 }
 
 /// A surface as it really is.
@@ -114,6 +126,18 @@ impl Truth {
     /// As [`Air::new`].
     pub fn air(&self) -> Result<Air, Error> {
         Air::new(self.temperature_c, self.relative_humidity_percent, self.pressure_kpa)
+    }
+
+    /// Session of a receiver.
+    pub fn session(&self, receiver: usize) -> usize {
+        receiver % self.sessions.len()
+    }
+
+    /// The same room in the air of a session.
+    pub(crate) fn in_session(&self, session: usize) -> Self {
+        let TrueSession { warmer_k, damper_percent } = self.sessions[session];
+        let damp = (self.relative_humidity_percent + damper_percent).clamp(2.0, 98.0);
+        Self { temperature_c: self.temperature_c + warmer_k, relative_humidity_percent: damp, ..self.clone() }
     }
 
     /// Number of responses.
