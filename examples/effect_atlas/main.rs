@@ -3,6 +3,7 @@
 //! Prints answers by effect and strength, detection by d', false alarms, coverage and controls with 95 % intervals. With `--record`
 //! every room is written to a CSV file as soon as it is done, and rooms that the file holds are not done again.
 
+mod decide;
 mod sham;
 mod tables;
 mod trial;
@@ -34,6 +35,18 @@ struct Arguments {
     /// Receivers in each room
     #[arg(long, default_value_t = 12)]
     receivers: usize,
+    /// Sources in each room
+    #[arg(long, default_value_t = 1)]
+    sources: usize,
+    /// Sample rate; octaves that it does not hold are left out
+    #[arg(long, value_name = "HZ", default_value_t = 48_000)]
+    rate: u32,
+    /// Sessions, each in air of its own, which is stated
+    #[arg(long, default_value_t = 1)]
+    sessions: usize,
+    /// Follow every set of causes up by the measurement that it asks for, and by another
+    #[arg(long)]
+    decide: bool,
     /// Rays for each pair
     #[arg(long, default_value_t = DiagnoseConfig::default().rays)]
     rays: usize,
@@ -107,6 +120,10 @@ fn tasks(arguments: &Arguments) -> Vec<Task> {
                     strength,
                     seed: arguments.seed + room,
                     receivers: arguments.receivers,
+                    sources: arguments.sources,
+                    sample_rate_hz: arguments.rate,
+                    sessions: arguments.sessions,
+                    decide: arguments.decide,
                     rays: arguments.rays,
                     range_db: arguments.range_db,
                     shams: arguments.shams as usize,

@@ -40,7 +40,50 @@ pub fn print(trials: &[Trial]) {
     for t in trials.iter().filter(|t| t.outcome != Outcome::Right) {
         println!("| {} | {:.2} | {} | {} |", t.hidden, t.strength, t.seed, t.answer);
     }
+    conditions(trials);
     figures(trials);
+}
+
+/// How the answers depend on how the room was measured, if that differs.
+fn conditions(trials: &[Trial]) {
+    let mut groups: BTreeMap<(usize, usize, u32, usize), Vec<&Trial>> = BTreeMap::new();
+    for t in trials.iter().filter(|t| t.shams == 0) {
+        groups.entry((t.receivers, t.sources, t.sample_rate_hz, t.sessions)).or_default().push(t);
+    }
+    if groups.len() < 2 {
+        return;
+    }
+    println!("\n## By conditions\n");
+    println!(
+        "| receivers | sources | sample rate, kHz | sessions | null rooms: false alarms | detected | right single name | wrong or a name too many | root mean square d' | seconds (median) |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|");
+    for ((receivers, sources, rate, sessions), own) in &groups {
+        let (nulls, hidden): (Vec<&Trial>, Vec<&Trial>) = own.iter().partition(|t| t.hidden == "none");
+        let of = |among: &[&Trial], hit: &dyn Fn(&Trial) -> bool| {
+            format!("{} of {}", among.iter().filter(|t| hit(t)).count(), among.len())
+        };
+        println!(
+            "| {receivers} | {sources} | {} | {sessions} | {} | {} | {} | {} | {} | {:.0} |",
+            f64::from(*rate) / 1000.0,
+            of(&nulls, &|t| t.outcome != Outcome::Right),
+            of(&hidden, &|t| t.outcome != Outcome::Missed),
+            of(&hidden, &|t| t.outcome == Outcome::Right),
+            of(&hidden, &|t| matches!(t.outcome, Outcome::Wrong | Outcome::Extra)),
+            mean_d_prime(&hidden).map_or("-".into(), |d| format!("{d:.1}")),
+            median(own.iter().map(|t| t.seconds).collect())
+        );
+    }
+}
+
+/// Share of rooms named rightly if the truth of each were that of another, in the mean over all ways to turn the list.
+fn by_permuted_names(trials: &[&Trial]) -> f64 {
+    let n = trials.len();
+    let hits = (1..n)
+        .flat_map(|turn| (0..n).map(move |i| (i, (i + turn) % n)))
+        .filter(|&(i, other)| trials[i].answer == trials[other].hidden)
+        .count();
+    hits as f64 / (n * n.saturating_sub(1)).max(1) as f64
 }
 
 fn figures(trials: &[Trial]) {
@@ -83,6 +126,7 @@ fn figures(trials: &[Trial]) {
         .filter(|t| t.outcome != Outcome::Missed)
         .collect();
     share("right single name, detected, mean d' from 7 on", due.iter().map(|t| t.outcome == Outcome::Right));
+    println!("| the same with names permuted among the rooms | {:.0} % | |", 100.0 * by_permuted_names(&due));
     let right_or_set = |t: &&Trial| matches!(t.outcome, Outcome::Right | Outcome::Set);
     share("right name or a set that holds it, likewise", due.iter().map(right_or_set));
     let wrong = |t: &&Trial| t.outcome == Outcome::Wrong;
@@ -102,6 +146,8 @@ fn figures(trials: &[Trial]) {
         "gain at positions not seen above zero, rightly named",
         named.iter().map(|t| t.gain_low > Some(0.0)),
     );
+    share("a set: the measurement asked for decides", plain.iter().filter_map(|t| t.asked_decides));
+    share("a set: another measurement decides", plain.iter().filter_map(|t| t.other_decides));
     let ratios = named.iter().map(|t| t.absorption_after / t.absorption_before.max(1e-9)).collect();
     println!(
         "| error of fitted absorption, after / before, rightly named (median) | {:.2} | |",

@@ -1,8 +1,9 @@
 //! One laboratory room, diagnosed blind, and its truth beside what was found.
 
 use crate::AnyError;
+use crate::decide;
 use crate::sham::{IDS, Sham};
-use sabine::acoustics::TimeZero;
+use sabine::acoustics::{OctaveBands, TimeZero};
 use sabine::diagnose::{Cause, DiagnoseConfig, Diagnoser, Diagnosis, Verdict, catalogue};
 use sabine_testkit::{Fault, Hidden, LabConfig, Laboratory};
 use serde::{Deserialize, Serialize};
@@ -16,10 +17,16 @@ pub struct Task {
     pub strength: f64,
     pub seed: u64,
     pub receivers: usize,
+    pub sources: usize,
+    pub sample_rate_hz: u32,
+    /// Sessions in air of their own.
+    pub sessions: usize,
     pub rays: usize,
     pub range_db: f64,
     /// Effects without meaning that stand beside the catalogue.
     pub shams: usize,
+    /// Whether a set is followed up by the measurement that it asks for, and by another.
+    pub decide: bool,
 }
 
 /// How the answer stands to the truth.
@@ -49,6 +56,12 @@ pub struct Trial {
     pub strength: f64,
     pub seed: u64,
     pub receivers: usize,
+    #[serde(default = "one")]
+    pub sources: usize,
+    #[serde(default = "usual_rate")]
+    pub sample_rate_hz: u32,
+    #[serde(default = "one")]
+    pub sessions: usize,
     pub shams: usize,
     pub verdict: String,
     pub answer: String,
@@ -67,6 +80,23 @@ pub struct Trial {
     pub absorption_before: f64,
     pub absorption_after: f64,
     pub seconds: f64,
+    /// The measurement that would decide, and whether it does; the same of one drawn from the others.
+    #[serde(default)]
+    pub asked: Option<String>,
+    #[serde(default)]
+    pub asked_decides: Option<bool>,
+    #[serde(default)]
+    pub other: Option<String>,
+    #[serde(default)]
+    pub other_decides: Option<bool>,
+}
+
+fn one() -> usize {
+    1
+}
+
+fn usual_rate() -> u32 {
+    LabConfig::default().sample_rate_hz
 }
 
 impl Task {
@@ -81,25 +111,38 @@ impl Task {
             t.hidden == self.name()
                 && t.strength == self.strength
                 && (t.seed, t.receivers, t.shams) == (self.seed, self.receivers, self.shams)
+                && (t.sources, t.sample_rate_hz, t.sessions)
+                    == (self.sources, self.sample_rate_hz, self.sessions)
         })
     }
 
-    /// Hides, diagnoses and compares. The folder is used for the room and cleared afterwards.
-    pub fn run(&self, folder: &Path) -> Result<Trial, AnyError> {
+    fn lab(&self) -> Result<LabConfig, AnyError> {
         // A recording that begins before the emission must say so.
         let early = self.hidden.iter().any(|id| id == "nonlinear_distortion");
         let time_zero = if early { TimeZero::Common } else { TimeZero::Emission };
-        let config =
-            LabConfig { seed: self.seed, receivers: self.receivers, time_zero, ..LabConfig::default() };
-        let lab = Laboratory::new(config)?;
-        let hidden: Vec<Hidden> = self
-            .hidden
-            .iter()
-            .zip(0..)
-            .map(|(id, k)| Hidden::random(id, self.strength, &lab, self.seed + 7919 * k))
-            .collect::<Result<_, _>>()?;
-        let room = lab.write(&hidden, folder, None)?;
-        let started = std::time::Instant::now();
+        let all = OctaveBands::T60;
+        let highest = (0..all.len()).rfind(|&b| 2.0 * all.edges_hz(b).1 <= f64::from(self.sample_rate_hz));
+        let highest = highest.ok_or("the sample rate leaves no octave")?;
+        Ok(LabConfig {
+            seed: self.seed,
+            sources: self.sources,
+            receivers: self.receivers,
+            sessions: self.sessions,
+            sample_rate_hz: self.sample_rate_hz,
+            bands: OctaveBands::new(all.nominal_hz(0), all.nominal_hz(highest))?,
+            time_zero,
+            ..LabConfig::default()
+        })
+    }
+
+    /// Hides the effects in a room and diagnoses it. The folder is used for the room and cleared afterwards.
+    pub fn diagnose(
+        &self,
+        lab: &Laboratory,
+        hidden: &[Hidden],
+        folder: &Path,
+    ) -> Result<Diagnosis, AnyError> {
+        let room = lab.write(hidden, folder, None)?;
         let config = DiagnoseConfig {
             rays: self.rays,
             range_db: self.range_db,
@@ -109,8 +152,23 @@ impl Task {
         let mut effects = catalogue();
         effects.extend((0..self.shams.min(IDS.len())).map(|n| Box::new(Sham::new(n)) as _));
         let found = Diagnoser::new(config)?.with_effects(effects).diagnose(&room, &[], &())?;
-        let seconds = started.elapsed().as_secs_f64();
         std::fs::remove_dir_all(folder)?;
+        Ok(found)
+    }
+
+    /// Hides, diagnoses and compares.
+    pub fn run(&self, folder: &Path) -> Result<Trial, AnyError> {
+        let config = self.lab()?;
+        let lab = Laboratory::new(config.clone())?;
+        let hidden: Vec<Hidden> = self
+            .hidden
+            .iter()
+            .zip(0..)
+            .map(|(id, k)| Hidden::random(id, self.strength, &lab, self.seed + 7919 * k))
+            .collect::<Result<_, _>>()?;
+        let started = std::time::Instant::now();
+        let found = self.diagnose(&lab, &hidden, folder)?;
+        let seconds = started.elapsed().as_secs_f64();
         let outcome = outcome(&found, &hidden);
         if outcome != Outcome::Right {
             found.notes.iter().for_each(|note| eprintln!("  {note}"));
@@ -125,11 +183,24 @@ impl Task {
         };
         let held = cause.map(|c| within(c, &truths)).unwrap_or_default();
         let [before, after] = absorption_errors(&found, &lab, &hidden)?;
+        let follow_up = match &hidden[..] {
+            [one]
+                if self.decide
+                    && outcome == Outcome::Set
+                    && found.alternatives.iter().any(|a| a == one.id()) =>
+            {
+                Some(decide::follow_up(self, &config, one, &found.alternatives, folder)?)
+            }
+            _ => None,
+        };
         Ok(Trial {
             hidden: self.name(),
             strength: self.strength,
             seed: self.seed,
             receivers: self.receivers,
+            sources: self.sources,
+            sample_rate_hz: self.sample_rate_hz,
+            sessions: self.sessions,
             shams: self.shams,
             verdict: found.verdict.to_string(),
             answer: answer(&found),
@@ -143,11 +214,15 @@ impl Task {
             absorption_before: before,
             absorption_after: after,
             seconds,
+            asked: follow_up.as_ref().map(|f| format!("{:?}", f.asked.0)),
+            asked_decides: follow_up.as_ref().map(|f| f.asked.1),
+            other: follow_up.as_ref().map(|f| format!("{:?}", f.other.0)),
+            other_decides: follow_up.as_ref().map(|f| f.other.1),
         })
     }
 }
 
-fn named(found: &Diagnosis) -> Vec<&str> {
+pub fn named(found: &Diagnosis) -> Vec<&str> {
     let mut named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
     named.sort_unstable();
     named.dedup();

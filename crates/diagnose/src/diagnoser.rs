@@ -4,8 +4,9 @@ use crate::diagnosis::{CandidateScore, Cause, Diagnosis, FittedMaterial, HeldOut
 use crate::effect::{Effect, Evidence, Nuisance};
 use crate::found_parameters::parameters;
 use crate::held_out::{Folds, decay_curves, predict};
-use crate::isolability::{isolability, would_decide};
+use crate::isolability::isolability;
 use crate::lack_of_fit;
+use crate::measurement::would_decide;
 use crate::naming::Named;
 use crate::notes::{Circumstances, notes};
 use crate::prediction::compare;
@@ -318,7 +319,7 @@ fn words_that_decide(alternatives: &[String]) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     for (i, a) in alternatives.iter().enumerate() {
         for b in &alternatives[i + 1..] {
-            let word = would_decide(a, b).to_owned();
+            let word = would_decide(a, b).to_string();
             if !words.contains(&word) {
                 words.push(word);
             }

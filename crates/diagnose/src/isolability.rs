@@ -4,6 +4,7 @@ use crate::diagnosis::Isolability;
 use crate::effect::{Case, Evidence, Nuisance};
 use crate::energy_model::EnergyModel;
 use crate::gauss_newton::{Model, Slopes};
+use crate::measurement::would_decide;
 use crate::search::Candidate;
 use crate::workbench::Workbench;
 use crate::{Error, arrival_model};
@@ -33,7 +34,7 @@ pub(crate) fn isolability(
                     effects: [a.id.to_owned(), b.id.to_owned()],
                     cosine,
                     separable: cosine < TWINS,
-                    would_decide: would_decide(a.id, b.id).to_owned(),
+                    would_decide: would_decide(a.id, b.id).to_string(),
                 });
             }
         }
@@ -149,43 +150,4 @@ fn expected(model: &dyn Model, values: &[f64]) -> Slopes {
     let mut slopes = Slopes { gradient: DVector::zeros(n), information: DMatrix::zeros(n, n) };
     model.log_likelihood(values, Some(&mut slopes));
     slopes
-}
-
-/// The measurement that tells two effects apart, in plain words.
-pub(crate) fn would_decide(a: &str, b: &str) -> &'static str {
-    let is = |x: &str, y: &str| (a == x && b == y) || (a == y && b == x);
-    let has = |x: &str| a == x || b == x;
-    if is("sound_speed", "sampling_clock") {
-        "Record a loopback click at the beginning and end of the sweep, or read a thermometer in the room."
-    } else if is("air_absorption", "surface_absorption") || is("air_absorption", "scattering") {
-        "Measure again at another humidity (a morning and an evening), or read a hygrometer in the room."
-    } else if is("coupled_volume", "background_noise") {
-        "Measure again 10 dB louder and with a longer sweep: noise stays where it is, a coupled volume rises with the source."
-    } else if has("coupled_volume") {
-        "Measure again with the doors and openings of the room closed."
-    } else if has("background_noise") || has("truncation") {
-        "Record a longer response, and some seconds of silence before it."
-    } else if has("source_directivity") {
-        "Turn the loudspeaker by 90 degrees and measure again."
-    } else if has("time_zero") {
-        "Record a loopback of the excitation beside the microphones: it shows the latency."
-    } else if has("position_error") || has("room_dimensions") || has("sound_speed") {
-        "Measure two distances with a laser: between the far walls, and from the loudspeaker to a microphone."
-    } else if has("channel_fault") {
-        "Exchange the microphone's cable and channel with a neighbour's and measure again."
-    } else if has("nonlinear_distortion") {
-        "Turn the loudspeaker down by 10 dB and measure again: distortion falls faster than the sound."
-    } else if has("angle_dependent_absorption") {
-        "Measure close to the walls and along them, where sound grazes, with the source in another place."
-    } else if has("open_patch") {
-        "Close what may be open and measure again, or measure where other first reflections meet that wall."
-    } else if has("extra_reflector") {
-        "Take out (or cover) what stands in the room and measure again."
-    } else if has("room_modes") {
-        "Measure with the source in another place: standing waves change with it, loudspeakers and walls do not."
-    } else if has("scattering") {
-        "Measure at more positions, some of them close to the walls."
-    } else {
-        "Measure at more positions, with the source in another place."
-    }
 }

@@ -1,0 +1,125 @@
+//! Whether the measurement that a set of causes asks for does decide between them.
+
+use crate::AnyError;
+use crate::trial::{Task, named};
+use rand::seq::IndexedRandom;
+use rand::{SeedableRng, rngs::SmallRng};
+use sabine::diagnose::{Diagnosis, Measurement, Verdict, would_decide};
+use sabine_testkit::{Hidden, LabConfig, Laboratory};
+use std::path::Path;
+
+/// All that can be done in the laboratory.
+const ALL: [Measurement; 16] = [
+    Measurement::ClockOrThermometer,
+    Measurement::OtherHumidity,
+    Measurement::LouderAndLonger,
+    Measurement::DoorsClosed,
+    Measurement::LongerWithSilence,
+    Measurement::TurnedSource,
+    Measurement::Loopback,
+    Measurement::Distances,
+    Measurement::ExchangedChannel,
+    Measurement::Quieter,
+    Measurement::AlongWalls,
+    Measurement::PatchClosed,
+    Measurement::ObjectsRemoved,
+    Measurement::OtherSourcePlace,
+    Measurement::MorePositions,
+    Measurement::MorePositionsAndSource,
+];
+
+/// Two measurements, and whether the right name comes out alone after each.
+pub struct FollowUp {
+    pub asked: (Measurement, bool),
+    pub other: (Measurement, bool),
+}
+
+/// What a measurement is in the laboratory.
+enum Extra {
+    /// The room measured again and more, all of it diagnosed together.
+    More(LabConfig),
+    /// The room measured once more without what these effects stand for: if nothing is wrong any more, it was that one.
+    Without(Vec<&'static str>),
+}
+
+fn extra(measurement: Measurement, lab: &LabConfig, set: &[String]) -> Extra {
+    // Twice as many positions, and another source, as far as the laboratory goes.
+    let receivers = (2 * lab.receivers).min(40);
+    let (more, sources) = (LabConfig { receivers, ..lab.clone() }, (2 * lab.sources).min(8));
+    let is_among = |id: &str| set.iter().any(|s| s == id);
+    match measurement {
+        Measurement::ClockOrThermometer => Extra::Without(vec!["sampling_clock"]),
+        Measurement::OtherHumidity => Extra::More(LabConfig { sessions: 2, ..more }),
+        Measurement::LouderAndLonger => Extra::Without(vec!["background_noise"]),
+        Measurement::DoorsClosed => Extra::Without(vec!["coupled_volume"]),
+        Measurement::LongerWithSilence if is_among("truncation") => Extra::Without(vec!["truncation"]),
+        Measurement::LongerWithSilence => Extra::Without(vec!["background_noise"]),
+        Measurement::TurnedSource => Extra::More(LabConfig { turned: true, ..lab.clone() }),
+        Measurement::Loopback => Extra::Without(vec!["time_zero"]),
+        Measurement::Distances => Extra::Without(vec!["position_error", "room_dimensions"]),
+        Measurement::ExchangedChannel => Extra::Without(vec!["channel_fault"]),
+        Measurement::Quieter => Extra::Without(vec!["nonlinear_distortion"]),
+        Measurement::PatchClosed => Extra::Without(vec!["open_patch"]),
+        Measurement::ObjectsRemoved => Extra::Without(vec!["extra_reflector"]),
+        Measurement::OtherSourcePlace => Extra::More(LabConfig { sources, ..lab.clone() }),
+        Measurement::MorePositions => Extra::More(more),
+        _ => Extra::More(LabConfig { sources, ..more }),
+    }
+}
+
+/// Follows a set of causes up by what would decide between the hidden one and the first of the others, and by a measurement drawn from
+/// the rest.
+pub fn follow_up(
+    task: &Task,
+    lab: &LabConfig,
+    hidden: &Hidden,
+    set: &[String],
+    folder: &Path,
+) -> Result<FollowUp, AnyError> {
+    let rival = set.iter().find(|s| *s != hidden.id()).ok_or("a set of one")?;
+    let asked = would_decide(hidden.id(), rival);
+    let rest: Vec<Measurement> = ALL.into_iter().filter(|m| *m != asked).collect();
+    let mut random = SmallRng::seed_from_u64(task.seed);
+    let other = *rest.choose(&mut random).ok_or("no other measurement")?;
+    let decides = |measurement| -> Result<(Measurement, bool), AnyError> {
+        let name = concluded(task, extra(measurement, lab, set), lab, hidden, set, folder)?;
+        Ok((measurement, name.as_deref() == Some(hidden.id())))
+    };
+    Ok(FollowUp { asked: decides(asked)?, other: decides(other)? })
+}
+
+/// The one name that comes out.
+fn concluded(
+    task: &Task,
+    extra: Extra,
+    lab: &LabConfig,
+    hidden: &Hidden,
+    set: &[String],
+    folder: &Path,
+) -> Result<Option<String>, AnyError> {
+    let one = |found: &Diagnosis| match (&found.verdict, &named(found)[..]) {
+        (Verdict::Explained, [name]) => Some((*name).to_owned()),
+        _ => None,
+    };
+    match extra {
+        Extra::More(config) => {
+            let lab = Laboratory::new(config)?;
+            Ok(one(&task.diagnose(&lab, std::slice::from_ref(hidden), folder)?))
+        }
+        Extra::Without(effects) => {
+            let left: Vec<Hidden> =
+                [hidden].into_iter().filter(|h| !effects.contains(&h.id())).cloned().collect();
+            let found = task.diagnose(&Laboratory::new(lab.clone())?, &left, folder)?;
+            let mut gone = set.iter().filter(|s| effects.contains(&s.as_str()));
+            match (found.verdict, gone.next(), gone.next()) {
+                (Verdict::Adequate, Some(name), None) => Ok(Some(name.clone())),
+                // What has not gone cannot be it.
+                (Verdict::Ambiguous, ..) => {
+                    let mut rest = found.alternatives.iter().filter(|a| !effects.contains(&a.as_str()));
+                    Ok(rest.next().filter(|_| rest.next().is_none()).cloned())
+                }
+                _ => Ok(one(&found)),
+            }
+        }
+    }
+}
