@@ -13,8 +13,10 @@ misuka (PolyForm Noncommercial) compiles through LLVM and needs a newer one than
 A program that is not installed leaves a gap. PROFILE=debug takes a development build of Sabine instead, and says so.
 """
 
+import concurrent.futures
 import importlib.metadata
 import json
+import multiprocessing
 import os
 import platform
 import subprocess
@@ -256,11 +258,19 @@ WORKERS = {f.__name__: f for f in (log_mel_librosa, log_mel_numpy, fir_firwin2, 
                                    box_pyroomacoustics, box_misuka, box_acoustic_spaces)}
 
 
+# A process counts what the one that starts it holds as its own: programs are started by one that is forked before anything is loaded.
+LAUNCHER = concurrent.futures.ProcessPoolExecutor(1, multiprocessing.get_context("fork"))
+
+
 def spent(command):
+    return LAUNCHER.submit(launched, list(map(str, command))).result()
+
+
+def launched(command):
     """Output of a process, its processor time in seconds and largest resident set in MiB, its children's included."""
     with tempfile.TemporaryFile("w+") as errors:
         try:
-            process = subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, stderr=errors, text=True)
+            process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True)
         except FileNotFoundError:
             print(f"{command[0]} is missing: build first, see the top of this file", file=sys.stderr)
             return None
@@ -458,6 +468,7 @@ def version(package):
 
 
 def main():
+    LAUNCHER.submit(os.getpid).result()
     revision = subprocess.run(["git", "-C", ROOT, "rev-parse", "--short", "HEAD"], capture_output=True, text=True).stdout.strip()
     print(f"Sabine {revision}; {', '.join(map(version, PACKAGES))}; Python {platform.python_version()}.")
     print(f"{os.cpu_count()} processors, load {os.getloadavg()[0]:.1f} at the start, Sabine from {TARGET.name}.")
