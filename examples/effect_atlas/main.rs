@@ -53,6 +53,9 @@ struct Arguments {
     /// Decay that is compared, in dB
     #[arg(long, default_value_t = DiagnoseConfig::default().range_db)]
     range_db: f64,
+    /// How well places are said to be known, in metres along each axis; they are off by 5 mm
+    #[arg(long, value_name = "M", default_value_t = DiagnoseConfig::default().position_sd_m)]
+    position_sd: f64,
     /// Effects without meaning beside the catalogue, 0 to 14: a control
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=14))]
     shams: u64,
@@ -126,6 +129,7 @@ fn tasks(arguments: &Arguments) -> Vec<Task> {
                     decide: arguments.decide,
                     rays: arguments.rays,
                     range_db: arguments.range_db,
+                    position_sd_m: arguments.position_sd,
                     shams: arguments.shams as usize,
                 });
             }

@@ -23,6 +23,7 @@ pub struct Task {
     pub sessions: usize,
     pub rays: usize,
     pub range_db: f64,
+    pub position_sd_m: f64,
     /// Effects without meaning that stand beside the catalogue.
     pub shams: usize,
     /// Whether a set is followed up by the measurement that it asks for, and by another.
@@ -146,6 +147,7 @@ impl Task {
         let config = DiagnoseConfig {
             rays: self.rays,
             range_db: self.range_db,
+            position_sd_m: self.position_sd_m,
             seed: self.seed,
             ..DiagnoseConfig::default()
         };

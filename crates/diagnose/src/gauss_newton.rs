@@ -64,7 +64,8 @@ pub(crate) fn maximise(model: &dyn Model, start: &[f64], what: &'static str) -> 
     let penalty =
         |x: &[f64]| -> f64 { x.iter().zip(priors).map(|(x, p)| -0.5 * ((x - p.mean) / p.sd).powi(2)).sum() };
     let mut x: Vec<f64> = start.iter().zip(priors).map(|(x, p)| x.clamp(p.low, p.high)).collect();
-    let mut slopes = Slopes { gradient: DVector::zeros(n), information: DMatrix::zeros(n, n) };
+    let [mut slopes, mut tried_slopes] =
+        [(); 2].map(|()| Slopes { gradient: DVector::zeros(n), information: DMatrix::zeros(n, n) });
     let mut damping = 1e-3;
     let mut settled = false;
     let mut likelihood = fill(model, &x, &mut slopes);
@@ -94,11 +95,12 @@ pub(crate) fn maximise(model: &dyn Model, start: &[f64], what: &'static str) -> 
             let step = h.cholesky().ok_or(Error::Singular { what })?.solve(&g);
             let tried: Vec<f64> =
                 (0..n).map(|i| (x[i] + step[i]).clamp(priors[i].low, priors[i].high)).collect();
-            let found = model.log_likelihood(&tried, None);
+            // Most steps are taken: their slopes are wanted next.
+            let found = fill(model, &tried, &mut tried_slopes);
             let gain = found + penalty(&tried) - value;
             let length = (0..n).map(|i| ((tried[i] - x[i]) / priors[i].sd).abs()).fold(0.0, f64::max);
             if gain.is_finite() && gain >= -1e-9 {
-                accepted = Some((tried, length, gain));
+                accepted = Some((tried, found, length, gain));
                 damping = (damping * 0.2).max(1e-9);
                 break;
             }
@@ -107,13 +109,13 @@ pub(crate) fn maximise(model: &dyn Model, start: &[f64], what: &'static str) -> 
             }
             damping = damping.max(1e-4) * 10.0;
         }
-        let Some((next, length, gain)) = accepted else {
+        let Some((next, found, length, gain)) = accepted else {
             // No step gains anything: this is the top as far as numbers can tell.
             settled = true;
             break;
         };
-        x = next;
-        likelihood = fill(model, &x, &mut slopes);
+        (x, likelihood) = (next, found);
+        std::mem::swap(&mut slopes, &mut tried_slopes);
         if length < SETTLED && gain < GAIN_NATS {
             settled = true;
             break;
