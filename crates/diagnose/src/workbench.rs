@@ -1,13 +1,13 @@
 //! Everything that a diagnosis compares, and fits of any set of causes to it.
 
+mod changes;
 mod waves;
 
 use crate::arrival_model::{self, ArrivalData};
 use crate::discrepancy::FreeDiscrepancy;
 use crate::edges::Edges;
-use crate::effect::{Case, Nuisance};
+use crate::effect::Case;
 use crate::energy_model::{self, ABSORPTION, Before, BinResidual, EnergyData, EnergyModel};
-use crate::extended_model::Dimensions;
 use crate::gauss_newton::{Maximum, Prior};
 use crate::kernel::BandKernel;
 use crate::measured::{Measured, PEAKS_S};
@@ -17,7 +17,7 @@ use crate::traced_room::{prepare, trace, traced_s};
 use crate::{DiagnoseConfig, Error, LeadIns};
 use rayon::prelude::*;
 use sabine_acoustics::{
-    Air, ImpulseResponse, Material, MaterialPrior, MeasuredRoom, Observer, PerBand, Receiver, Scene, Source,
+    ImpulseResponse, Material, MaterialPrior, MeasuredRoom, Observer, PerBand, Receiver, Scene, Source,
     TimeZero, report,
 };
 use sabine_propagate::{PathTracer, PreparedScene};
@@ -366,79 +366,6 @@ impl Workbench {
         let used = vec![true; self.pairs.len()];
         let data = self.energy_data();
         EnergyModel::new(&data, cases, &used).residuals(values, pairs.iter().copied())
-    }
-
-    /// Traces the pairs of a source or receiver anew from where it was found to stand: levels of early reflections change with it.
-    /// Arrival times stay relative to the stated place.
-    pub fn move_place(&mut self, place: Nuisance, offset_m: [f64; 3]) -> Result<(), Error> {
-        let moved = |position: [f64; 3]| std::array::from_fn(|k| position[k] + offset_m[k]);
-        match place {
-            Nuisance::SourcePosition(i) => {
-                self.sources[i].position_m = moved(self.survey.sources[i].position_m)
-            }
-            Nuisance::ReceiverPosition(i) => {
-                self.receivers[i].position_m = moved(self.survey.receivers[i].position_m);
-            }
-            Nuisance::Absorption(_) | Nuisance::ResponseGain(_) => return Ok(()),
-        }
-        self.retrace(place)?;
-        self.expand(true)
-    }
-
-    /// Takes all paths at another temperature. Arrival times stay relative to the stated one.
-    pub fn warm(&mut self, kelvin: f64) -> Result<(), Error> {
-        self.warmer_k = kelvin;
-        for pair in 0..self.pairs.len() {
-            self.set_air(pair)?;
-        }
-        self.expand(true)
-    }
-
-    /// Traces everything anew in a room of another size. Arrival times stay relative to the stated one.
-    pub fn resize(&mut self, dimensions: &Dimensions) -> Result<(), Error> {
-        let resized = dimensions.applied(&self.scene)?;
-        self.prepared = self.tracer.prepare(&resized)?;
-        self.edges = Edges::find(&resized)?;
-        self.resized = Some(resized);
-        for source in 0..self.sources.len() {
-            self.retrace(Nuisance::SourcePosition(source))?;
-        }
-        self.expand(true)
-    }
-
-    /// Traces the pairs of a place anew, as far as it lies in the room: the stated place is as good as one that is none.
-    fn retrace(&mut self, place: Nuisance) -> Result<(), Error> {
-        for pair in 0..self.survey.responses.len() {
-            let response = &self.survey.responses[pair];
-            let concerned = place == Nuisance::SourcePosition(response.source)
-                || place == Nuisance::ReceiverPosition(response.receiver);
-            if !concerned {
-                continue;
-            }
-            let ends = (&self.sources[response.source], &self.receivers[response.receiver]);
-            if let Ok(paths) = self.tracer.trace_prepared(&self.prepared, ends.0, ends.1, &response.air, &())
-            {
-                let places_m = [ends.0.position_m, ends.1.position_m];
-                let bent = Edges::paths(self.edges.as_ref(), places_m, paths.max_length_m());
-                self.pairs[pair] = TracedPair::new(paths, bent, response.air, &self.materials)?;
-                self.direct_s[pair] = self.pairs[pair].direct_s;
-                self.set_air(pair)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// The air of a pair, as it was found.
-    fn set_air(&mut self, pair: usize) -> Result<(), Error> {
-        if self.warmer_k == 0.0 {
-            return Ok(());
-        }
-        let stated = self.survey.responses[pair].air;
-        let temperature_c = (stated.temperature_c() + self.warmer_k).clamp(-40.0, 60.0);
-        let air = Air::new(temperature_c, stated.relative_humidity_percent(), stated.pressure_kpa())?;
-        self.pairs[pair].set_air(air);
-        self.direct_s[pair] = self.pairs[pair].direct_s;
-        Ok(())
     }
 
     /// Sets the dispersion of each band to what the bins still scatter once anything smooth has been taken out.
