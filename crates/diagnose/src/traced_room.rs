@@ -5,8 +5,10 @@ use crate::measured::Measured;
 use crate::survey::Survey;
 use crate::traced_pair::{TracedPair, scattering_more};
 use crate::{DiagnoseConfig, Error};
+use rayon::prelude::*;
 use sabine_acoustics::{Material, MeasuredRoom, Observer, PerBand, Scene, report};
 use sabine_propagate::{PathTracer, PreparedScene};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Extra scattering of the bands of the traced scene, in turn: its paths then serve any scattering.
 const TRACED_SCATTERING: [f64; 4] = [0.0, 0.12, 0.4, 0.85];
@@ -78,14 +80,17 @@ pub(crate) fn trace(
     (tracer, prepared, edges): (&PathTracer, &PreparedScene, Option<&Edges>),
     observer: &dyn Observer,
 ) -> Result<Vec<TracedPair>, Error> {
-    let mut found: Vec<TracedPair> = Vec::new();
-    for (i, response) in survey.responses.iter().enumerate() {
-        report(observer, "tracing", i as u64, survey.responses.len() as u64)?;
-        let (source, receiver) = (&room.sources()[response.source], &room.receivers()[response.receiver]);
-        let paths = tracer.trace_prepared(prepared, source, receiver, &response.air, &())?;
-        let places_m = [source.position_m, receiver.position_m];
-        let bent = Edges::paths(edges, places_m, paths.max_length_m());
-        found.push(TracedPair::new(paths, bent, response.air, materials)?);
-    }
-    Ok(found)
+    let (done, total) = (AtomicU64::new(0), survey.responses.len() as u64);
+    survey
+        .responses
+        .par_iter()
+        .map(|response| {
+            report(observer, "tracing", done.fetch_add(1, Ordering::Relaxed), total)?;
+            let (source, receiver) = (&room.sources()[response.source], &room.receivers()[response.receiver]);
+            let paths = tracer.trace_prepared(prepared, source, receiver, &response.air, &())?;
+            let places_m = [source.position_m, receiver.position_m];
+            let bent = Edges::paths(edges, places_m, paths.max_length_m());
+            Ok(TracedPair::new(paths, bent, response.air, materials)?)
+        })
+        .collect()
 }
