@@ -103,7 +103,11 @@ fn concluded(
     };
     match extra {
         Extra::More(config) => {
-            let lab = Laboratory::new(config)?;
+            let (stated, lab) = (Laboratory::new(lab.clone())?, Laboratory::new(config)?);
+            if stated.scene() != lab.scene() {
+                // More places do not fit into this room, and the laboratory has drawn another.
+                return Ok(None);
+            }
             Ok(one(&task.diagnose(&lab, std::slice::from_ref(hidden), folder)?))
         }
         Extra::Without(effects) => {
