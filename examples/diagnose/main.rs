@@ -31,7 +31,7 @@ struct Arguments {
     /// Causes to try, by their names in the catalogue [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     effects: Vec<String>,
-    /// Rays for each source-receiver pair [default: 3000]
+    /// Rays for each source-receiver pair [default: 10000]
     #[arg(long)]
     rays: Option<usize>,
     /// Seed of rays and simulated measurements

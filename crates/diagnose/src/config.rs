@@ -38,7 +38,7 @@ pub struct DiagnoseConfig {
 impl Default for DiagnoseConfig {
     fn default() -> Self {
         Self {
-            rays: 3000,
+            rays: 10_000,
             seed: 0,
             image_order: 3,
             range_db: 35.0,

@@ -235,7 +235,7 @@ pub struct Diagnosis {
     pub notes: Vec<String>,
     /// The model with the named causes at work.
     pub model: ExtendedModel,
-    /// Seconds spent, by stage.
+    /// Seconds spent, by stage; `waves` are part of other stages.
     pub seconds: Vec<(String, f64)>,
 }
 

@@ -92,10 +92,14 @@ pub(crate) struct BandState {
     pub departure_products: Vec<[f64; 6]>,
     /// Expected variance of a measured bin about the prediction, as a share of its energy squared.
     pub variance: Vec<f64>,
+    /// The tracer's own part of it.
+    monte_carlo: Vec<f64>,
     /// What bends around edges.
     pub bent: BentEnergy,
     /// Logarithm of the change of energy, `[grid][bin]`; empty until tabulated.
     scattering: Vec<Vec<f64>>,
+    /// By how much the tracer's own relative variance is more there: what scatters is found by chance.
+    scattering_variance: Vec<Vec<f64>>,
     /// The same for walls that react locally by a share.
     local_reaction: Vec<Vec<f64>>,
     /// Logarithm of a wave solution's energy over that of the paths, both as the filter passes them; empty where there is none.
@@ -105,6 +109,10 @@ pub(crate) struct BandState {
 impl BandState {
     pub fn scattering_change(&self, bin: usize, extra: f64) -> f64 {
         between(&SCATTERING_GRID, &self.scattering, bin, extra)
+    }
+
+    pub fn scattering_variance(&self, bin: usize, extra: f64) -> f64 {
+        between(&SCATTERING_GRID, &self.scattering_variance, bin, extra)
     }
 
     pub fn local_reaction_change(&self, bin: usize, share: f64) -> f64 {
@@ -207,34 +215,69 @@ impl TracedPair {
         let bent = self.bent_energies(materials, kernels, duration_s)?;
         states.iter_mut().zip(bent).for_each(|(state, bent)| state.bent = bent);
         if scattering {
-            let mut table: Vec<Vec<Vec<f64>>> = vec![Vec::new(); bands.len()];
-            for (place, &extra) in SCATTERING_GRID.iter().enumerate() {
-                let changed: Vec<Material> =
-                    materials.iter().map(|m| scattering_more(m, extra)).collect::<Result<_, _>>()?;
-                let energies = if place == NO_EXTRA {
-                    None
-                } else {
-                    Some(self.paths.energies_under(&Conditions::new(&changed, &self.air))?)
-                };
-                for (band, table) in table.iter_mut().enumerate() {
-                    let state = &states[band];
-                    table.push(match &energies {
-                        None => vec![0.0; state.ln_energy.len()],
-                        Some(e) => {
-                            let sums = self.sums(&e[band], state.bins, &kernels[band], duration_s);
-                            let floor = NOTHING * sums.iter().copied().fold(0.0, f64::max);
-                            sums.iter().zip(&state.ln_energy).map(|(s, l)| s.max(floor).ln() - l).collect()
-                        }
-                    });
-                }
-            }
-            for (state, table) in states.iter_mut().zip(table) {
-                state.scattering = table;
-            }
+            self.tabulate_scattering(materials, kernels, duration_s, &mut states)?;
             let local = self.local_reaction(materials, &energies, &states, kernels, duration_s);
             states.iter_mut().zip(local).for_each(|(state, local)| state.local_reaction = local);
         }
         Ok(states)
+    }
+
+    /// Energies and the tracer's own variance at other scattering.
+    fn tabulate_scattering(
+        &self,
+        materials: &[Material],
+        kernels: &[BandKernel],
+        duration_s: f64,
+        states: &mut [BandState],
+    ) -> Result<(), Error> {
+        for (place, &extra) in SCATTERING_GRID.iter().enumerate() {
+            if place == NO_EXTRA {
+                for state in states.iter_mut() {
+                    state.scattering.push(vec![0.0; state.ln_energy.len()]);
+                    state.scattering_variance.push(vec![0.0; state.ln_energy.len()]);
+                }
+                continue;
+            }
+            let changed: Vec<Material> =
+                materials.iter().map(|m| scattering_more(m, extra)).collect::<Result<_, _>>()?;
+            let energies = self.paths.energies_under(&Conditions::new(&changed, &self.air))?;
+            for ((state, kernel), energies) in states.iter_mut().zip(kernels).zip(&energies) {
+                let sums = self.sums(energies, state.bins, kernel, duration_s);
+                let chance = self.monte_carlo(energies, state.bins, kernel, duration_s);
+                let floor = NOTHING * sums.iter().copied().fold(0.0, f64::max).max(1e-30);
+                let bins = || sums.iter().map(|s| s.max(floor)).zip(&state.ln_energy);
+                let change: Vec<f64> = bins().map(|(e, l)| e.ln() - l).collect();
+                let more =
+                    |((e, _), (chance, own)): ((f64, _), (&f64, &f64))| (chance / (e * e) - own).max(0.0);
+                let variance = bins().zip(chance.iter().zip(&state.monte_carlo)).map(more).collect();
+                state.scattering.push(change);
+                state.scattering_variance.push(variance);
+            }
+        }
+        Ok(())
+    }
+
+    /// Variance of the energy of each bin by chance, from the scatter between batches of rays.
+    fn monte_carlo(&self, energies: &[f32], bins: Bins, kernel: &BandKernel, duration_s: f64) -> Vec<f64> {
+        let count = bins.count(duration_s);
+        let cells = (duration_s / CELL_S).ceil() as usize + 1;
+        let batches = usize::from(PathSet::BATCHES);
+        let mut by_batch = vec![0.0f32; cells * batches];
+        for (i, (&cell, &e)) in self.cells.iter().zip(energies).enumerate() {
+            if let Some(batch) = self.paths.batch(i).filter(|_| usize::from(cell) < cells) {
+                by_batch[usize::from(cell) * batches + usize::from(batch)] += e;
+            }
+        }
+        let mut sums = vec![0.0f64; count * batches];
+        for (cell, parts) in by_batch.chunks(batches).enumerate().filter(|(_, p)| p.iter().any(|e| *e > 0.0))
+        {
+            let time_s = (cell as f64 + 0.5) * CELL_S;
+            Self::shares(time_s, bins, kernel, count, |bin, share| {
+                let target = &mut sums[bin * batches..(bin + 1) * batches];
+                target.iter_mut().zip(parts).for_each(|(s, r)| *s += share * f64::from(*r));
+            });
+        }
+        sums.chunks(batches).map(variance_of_sum).collect()
     }
 
     /// The bins that a path's energy falls into, with its share of each.
@@ -390,8 +433,10 @@ impl TracedPair {
             departure: Vec::with_capacity(count),
             departure_products: Vec::with_capacity(count),
             variance: Vec::with_capacity(count),
+            monte_carlo: Vec::with_capacity(count),
             bent: BentEnergy::default(),
             scattering: Vec::new(),
+            scattering_variance: Vec::new(),
             local_reaction: Vec::new(),
             waves: Vec::new(),
         };
@@ -415,9 +460,8 @@ impl TracedPair {
                 + among_singles(&singles[bin], kernel)
                 + strayed[bin];
             let parts = &batch_sums[bin * batches..(bin + 1) * batches];
-            let mean = parts.iter().sum::<f64>() / batches as f64;
-            let scatter: f64 = parts.iter().map(|p| (p - mean).powi(2)).sum();
-            let monte_carlo = scatter * batches as f64 / (batches as f64 - 1.0);
+            let monte_carlo = variance_of_sum(parts);
+            state.monte_carlo.push(monte_carlo / (e * e));
             let coherent = bins.centre_s(bin) < COHERENT_BANDWIDTH_TIMES / kernel.bandwidth_hz;
             let model_sd = if coherent { COHERENT_SD } else { MODEL_SD };
             let variance = (interference.max(0.0) + monte_carlo) / (e * e) + model_sd * model_sd;
@@ -426,6 +470,13 @@ impl TracedPair {
         }
         state
     }
+}
+
+/// Variance of the sum of independent batches, from their scatter.
+fn variance_of_sum(batches: &[f64]) -> f64 {
+    let count = batches.len() as f64;
+    let mean = batches.iter().sum::<f64>() / count;
+    batches.iter().map(|b| (b - mean).powi(2)).sum::<f64>() * count / (count - 1.0)
 }
 
 /// Cell of each path, and the paths that are in none.

@@ -102,6 +102,12 @@ impl BandView<'_> {
         self.state.scattering_change(bin, extra)
     }
 
+    /// By how much the tracer's own variance of a bin, as a share of its energy squared, is more if the surfaces scattered by `extra` more: what
+    /// scatters is found by chance.
+    pub fn scattering_variance(&self, bin: usize, extra: f64) -> f64 {
+        self.state.scattering_variance(bin, extra)
+    }
+
     /// Natural logarithm of a bin's energy in the solution of the wave equation over that of the paths, both behind the octave's
     /// filter; 0 where there is no solution.
     pub fn wave_change(&self, bin: usize) -> f64 {

@@ -41,10 +41,22 @@ impl Case for Scattering {
     }
 
     fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
-        let extra = values[0] + values[1] * view.survey().octaves_from_1khz(view.band());
-        let extra = if view.survey().declared_scattering > 0.01 { extra } else { extra.max(0.0) };
+        let extra = extra(values, view);
         for (bin, l) in ln_energy.iter_mut().enumerate() {
             *l += view.scattering_change(bin, extra);
         }
     }
+
+    fn variance(&self, values: &[f64], view: &BandView<'_>, variance: &mut [f64]) {
+        let extra = extra(values, view);
+        for (bin, v) in variance.iter_mut().enumerate() {
+            *v += view.scattering_variance(bin, extra);
+        }
+    }
+}
+
+/// Extra share in the octave of a view.
+fn extra(values: &[f64], view: &BandView<'_>) -> f64 {
+    let extra = values[0] + values[1] * view.survey().octaves_from_1khz(view.band());
+    if view.survey().declared_scattering > 0.01 { extra } else { extra.max(0.0) }
 }

@@ -65,6 +65,8 @@ impl TracedPair {
                     })
                     .collect(),
                 variance: vec![0.0; singles.len()],
+                monte_carlo: Vec::new(),
+                scattering_variance: Vec::new(),
                 bent: BentEnergy::default(),
                 // A share more of each reflection is scattered, and lost to the mirror; what was scattered never comes back as one.
                 local_reaction: Vec::new(),
