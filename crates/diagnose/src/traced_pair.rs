@@ -2,17 +2,19 @@
 
 mod bent;
 mod local_reaction;
+mod scattering;
 mod singles;
 
 pub(crate) use bent::BentEnergy;
 use local_reaction::LOCAL_GRID;
+pub(crate) use scattering::scattering_more;
 pub(crate) use singles::Single;
 
 use crate::bins::Bins;
 use crate::hit_groups;
 use crate::kernel::BandKernel;
 use rayon::prelude::*;
-use sabine_acoustics::{Air, Conditions, Error, Material, OctaveBands, PathSet, PerBand};
+use sabine_acoustics::{Air, Conditions, Error, Material, PathSet};
 use std::collections::BTreeMap;
 
 /// Width of the cells in which sampled paths are gathered, in seconds.
@@ -222,64 +224,6 @@ impl TracedPair {
         Ok(states)
     }
 
-    /// Energies and the tracer's own variance at other scattering.
-    fn tabulate_scattering(
-        &self,
-        materials: &[Material],
-        kernels: &[BandKernel],
-        duration_s: f64,
-        states: &mut [BandState],
-    ) -> Result<(), Error> {
-        for (place, &extra) in SCATTERING_GRID.iter().enumerate() {
-            if place == NO_EXTRA {
-                for state in states.iter_mut() {
-                    state.scattering.push(vec![0.0; state.ln_energy.len()]);
-                    state.scattering_variance.push(vec![0.0; state.ln_energy.len()]);
-                }
-                continue;
-            }
-            let changed: Vec<Material> =
-                materials.iter().map(|m| scattering_more(m, extra)).collect::<Result<_, _>>()?;
-            let energies = self.paths.energies_under(&Conditions::new(&changed, &self.air))?;
-            for ((state, kernel), energies) in states.iter_mut().zip(kernels).zip(&energies) {
-                let sums = self.sums(energies, state.bins, kernel, duration_s);
-                let chance = self.monte_carlo(energies, state.bins, kernel, duration_s);
-                let floor = NOTHING * sums.iter().copied().fold(0.0, f64::max).max(1e-30);
-                let bins = || sums.iter().map(|s| s.max(floor)).zip(&state.ln_energy);
-                let change: Vec<f64> = bins().map(|(e, l)| e.ln() - l).collect();
-                let more =
-                    |((e, _), (chance, own)): ((f64, _), (&f64, &f64))| (chance / (e * e) - own).max(0.0);
-                let variance = bins().zip(chance.iter().zip(&state.monte_carlo)).map(more).collect();
-                state.scattering.push(change);
-                state.scattering_variance.push(variance);
-            }
-        }
-        Ok(())
-    }
-
-    /// Variance of the energy of each bin by chance, from the scatter between batches of rays.
-    fn monte_carlo(&self, energies: &[f32], bins: Bins, kernel: &BandKernel, duration_s: f64) -> Vec<f64> {
-        let count = bins.count(duration_s);
-        let cells = (duration_s / CELL_S).ceil() as usize + 1;
-        let batches = usize::from(PathSet::BATCHES);
-        let mut by_batch = vec![0.0f32; cells * batches];
-        for (i, (&cell, &e)) in self.cells.iter().zip(energies).enumerate() {
-            if let Some(batch) = self.paths.batch(i).filter(|_| usize::from(cell) < cells) {
-                by_batch[usize::from(cell) * batches + usize::from(batch)] += e;
-            }
-        }
-        let mut sums = vec![0.0f64; count * batches];
-        for (cell, parts) in by_batch.chunks(batches).enumerate().filter(|(_, p)| p.iter().any(|e| *e > 0.0))
-        {
-            let time_s = (cell as f64 + 0.5) * CELL_S;
-            Self::shares(time_s, bins, kernel, count, |bin, share| {
-                let target = &mut sums[bin * batches..(bin + 1) * batches];
-                target.iter_mut().zip(parts).for_each(|(s, r)| *s += share * f64::from(*r));
-            });
-        }
-        sums.chunks(batches).map(variance_of_sum).collect()
-    }
-
     /// The bins that a path's energy falls into, with its share of each.
     fn shares(time_s: f64, bins: Bins, kernel: &BandKernel, count: usize, mut give: impl FnMut(usize, f64)) {
         let reach = kernel.reach_s().min(2.0 * bins.width_s);
@@ -334,10 +278,8 @@ impl TracedPair {
         let width = 1 + m;
         let count = bins.count(duration_s);
         let cells = (duration_s / CELL_S).ceil() as usize + 1;
-        let batches = usize::from(PathSet::BATCHES);
         let mut gathered = vec![0.0f64; cells * COLUMNS];
         let mut grouped = vec![0.0f64; cells * hit_groups::MOST * width];
-        let mut by_batch = vec![0.0f32; cells * batches];
         let mut sums = vec![0.0f64; count * COLUMNS];
         // Groups of each bin, by slice of time and number.
         let mut rows: Vec<BTreeMap<(usize, u8), Vec<f64>>> = vec![BTreeMap::new(); count];
@@ -383,15 +325,12 @@ impl TracedPair {
             all_cells[cell] += e;
             if exact {
                 exact_cells[cell] += e * e;
-            } else if let Some(batch) = self.paths.batch(i) {
-                by_batch[cell * batches + usize::from(batch)] += e as f32;
             }
             add(&mut gathered[cell * COLUMNS..(cell + 1) * COLUMNS], &row, 1.0);
             let own = &mut grouped[(cell * hit_groups::MOST + usize::from(group)) * width..][..width];
             own[0] += e;
             own[1..].iter_mut().zip(hits).for_each(|(a, n)| *a += e * f64::from(*n));
         }
-        let mut batch_sums = vec![0.0f64; count * batches];
         // Energy of each cell in each bin, for the spread.
         let mut weighted: Vec<Vec<(usize, f64)>> = vec![Vec::new(); count];
         for cell in 0..cells {
@@ -408,9 +347,6 @@ impl TracedPair {
                 }
                 let own = &gathered[cell * COLUMNS..(cell + 1) * COLUMNS];
                 add(&mut sums[bin * COLUMNS..(bin + 1) * COLUMNS], own, share);
-                let parts = &by_batch[cell * batches..(cell + 1) * batches];
-                let target = &mut batch_sums[bin * batches..(bin + 1) * batches];
-                target.iter_mut().zip(parts).for_each(|(s, r)| *s += share * f64::from(*r));
                 for group in 0..hit_groups::MOST {
                     let own = &grouped[(cell * hit_groups::MOST + group) * width..][..width];
                     if own[0] > 0.0 {
@@ -420,6 +356,7 @@ impl TracedPair {
                 }
             });
         }
+        let chance = self.monte_carlo(energies, bins, kernel, duration_s);
         let floor = NOTHING * (0..count).map(|k| sums[k * COLUMNS]).fold(0.0, f64::max).max(1e-30);
         let mut state = BandState {
             bins,
@@ -459,8 +396,7 @@ impl TracedPair {
             let interference = interference(&weighted[bin], kernel) - 2.0 * kernel.likeness[0] * squares[bin]
                 + among_singles(&singles[bin], kernel)
                 + strayed[bin];
-            let parts = &batch_sums[bin * batches..(bin + 1) * batches];
-            let monte_carlo = variance_of_sum(parts);
+            let monte_carlo = chance[bin];
             state.monte_carlo.push(monte_carlo / (e * e));
             let coherent = bins.centre_s(bin) < COHERENT_BANDWIDTH_TIMES / kernel.bandwidth_hz;
             let model_sd = if coherent { COHERENT_SD } else { MODEL_SD };
@@ -470,13 +406,6 @@ impl TracedPair {
         }
         state
     }
-}
-
-/// Variance of the sum of independent batches, from their scatter.
-fn variance_of_sum(batches: &[f64]) -> f64 {
-    let count = batches.len() as f64;
-    let mean = batches.iter().sum::<f64>() / count;
-    batches.iter().map(|b| (b - mean).powi(2)).sum::<f64>() * count / (count - 1.0)
 }
 
 /// Cell of each path, and the paths that are in none.
@@ -526,14 +455,4 @@ fn interference(cells: &[(usize, f64)], kernel: &BandKernel) -> f64 {
         }
     }
     2.0 * sum
-}
-
-/// A material that scatters more (of what it reflects specularly) or less (of what it scatters).
-pub(crate) fn scattering_more(material: &Material, extra: f64) -> Result<Material, Error> {
-    let bands: OctaveBands = material.bands();
-    let changed = PerBand::from_fn(bands, |b| {
-        let s = material.scattering().values()[b];
-        (if extra >= 0.0 { s + (1.0 - s) * extra } else { s * (1.0 + extra) }).clamp(0.0, 1.0)
-    });
-    Material::new(material.absorption().clone(), changed)
 }
