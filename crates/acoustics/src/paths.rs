@@ -360,6 +360,7 @@ impl PathSet {
     ///
     /// # Panics
     /// If there is no such contribution.
+    #[inline]
     pub fn is_exact(&self, contribution: usize) -> bool {
         self.batches[contribution] == EXACT
     }
@@ -368,6 +369,7 @@ impl PathSet {
     ///
     /// # Panics
     /// If there is no such contribution.
+    #[inline]
     pub fn batch(&self, contribution: usize) -> Option<u8> {
         Some(self.batches[contribution]).filter(|&b| b != EXACT)
     }

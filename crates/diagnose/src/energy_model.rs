@@ -11,9 +11,11 @@ pub(crate) use fit::{Before, fit};
 use crate::Survey;
 use crate::effect::{Case, Nuisance, Parameter, Stage};
 use crate::gauss_newton::{Model, Prior, Slopes};
+use crate::hit_changes::HitChanges;
 use crate::measured::Measured;
 use crate::traced_pair::BandState;
 use crate::views::BandView;
+use rayon::prelude::*;
 use sabine_acoustics::Levels;
 
 /// Logarithm of energy in one decibel.
@@ -29,6 +31,8 @@ const EARLY_BINS: usize = 8;
 /// Logarithm of measured over predicted energy from which a bin's surprise grows in proportion, no longer exponentially: what no model
 /// expects, as noise 30 dB above a decay, must not drown the rest, and a search would not find its way out.
 const SURPRISE: f64 = 2.5;
+/// Pairs whose likelihood one thread sums.
+const PAIRS_AT_ONCE: usize = 3;
 /// Bounds of absorption.
 pub(crate) const ABSORPTION: (f64, f64) = (0.002, 0.98);
 
@@ -261,7 +265,12 @@ impl<'a> EnergyModel<'a> {
         (ln_energy, slopes)
     }
 
-    fn view(&self, pair: usize, band: usize, gain_db: f64) -> BandView<'_> {
+    fn view<'v>(
+        &'v self,
+        (pair, band): (usize, usize),
+        gain_db: f64,
+        hit_changes: &'v HitChanges,
+    ) -> BandView<'v> {
         BandView {
             survey: self.data.survey,
             pair,
@@ -271,6 +280,7 @@ impl<'a> EnergyModel<'a> {
             direct_s: self.data.direct_s[pair],
             reference: self.data.reference[band],
             gain: (gain_db * LN_PER_DB).exp(),
+            hit_changes,
         }
     }
 
@@ -285,7 +295,8 @@ impl<'a> EnergyModel<'a> {
     pub fn predicted(&self, values: &[f64], pair: usize, band: usize, count: usize) -> Vec<f64> {
         let (mut ln_energy, _) = self.paths(values, (pair, band), count, false);
         let gain_db = self.gain_db(values, pair);
-        self.apply(values, &self.view(pair, band, gain_db), gain_db, &mut ln_energy);
+        let changes = HitChanges::default();
+        self.apply(values, &self.view((pair, band), gain_db, &changes), gain_db, &mut ln_energy);
         ln_energy
     }
 
@@ -320,7 +331,8 @@ impl<'a> EnergyModel<'a> {
         let bands = self.data.survey.bands.len();
         let m = self.data.absorption.len();
         let gain_db = self.gain_db(values, pair);
-        let view = self.view(pair, band, gain_db);
+        let changes = HitChanges::default();
+        let view = self.view((pair, band), gain_db, &changes);
         let (paths, path_slopes) = self.paths(values, (pair, band), count, slopes.is_some());
         let mut predicted = paths.clone();
         self.apply(values, &view, gain_db, &mut predicted);
@@ -432,13 +444,25 @@ impl Model for EnergyModel<'_> {
         &self.priors
     }
 
-    fn log_likelihood(&self, values: &[f64], mut slopes: Option<&mut Slopes>) -> f64 {
-        let mut sum = 0.0;
-        for pair in (0..self.assignment.len()).filter(|&p| self.used[p]) {
-            for band in 0..self.data.survey.bands.len() {
-                sum += self.band_likelihood(values, pair, band, slopes.as_deref_mut());
-            }
+    fn log_likelihood(&self, values: &[f64], slopes: Option<&mut Slopes>) -> f64 {
+        let pairs: Vec<usize> = (0..self.assignment.len()).filter(|&p| self.used[p]).collect();
+        let bands = 0..self.data.survey.bands.len();
+        let (sloping, n) = (slopes.is_some(), self.priors.len());
+        // Parts of a fixed size, added up in order: the sum is the same on any number of threads.
+        let parts: Vec<(f64, Option<Slopes>)> = pairs
+            .par_chunks(PAIRS_AT_ONCE)
+            .map(|pairs| {
+                let mut own = sloping.then(|| Slopes::zero(n));
+                let mut sum = 0.0;
+                for (&pair, band) in pairs.iter().flat_map(|p| bands.clone().map(move |b| (p, b))) {
+                    sum += self.band_likelihood(values, pair, band, own.as_mut());
+                }
+                (sum, own)
+            })
+            .collect();
+        if let Some(slopes) = slopes {
+            parts.iter().flat_map(|p| &p.1).for_each(|own| slopes.add(own));
         }
-        sum
+        parts.iter().map(|p| p.0).sum()
     }
 }

@@ -4,6 +4,7 @@
 //! of pulses with random signs, as for the time bins. Both are relative to the direct sound, gated in the same way.
 
 use crate::effect::{Case, Stage};
+use crate::hit_changes::HitChanges;
 use crate::kernel::BandKernel;
 use crate::traced_pair::{BandState, Single};
 use crate::views::BandView;
@@ -130,6 +131,7 @@ pub(crate) fn gates(
                     return Vec::new();
                 }
                 let state = &states[band];
+                let hit_changes = HitChanges::default();
                 let view = BandView {
                     survey,
                     pair,
@@ -139,6 +141,7 @@ pub(crate) fn gates(
                     direct_s: bench.direct_s[pair],
                     reference: bench.reference[band],
                     gain: 1.0,
+                    hit_changes: &hit_changes,
                 };
                 let mut ln = fitted(state, bench, absorption, band);
                 for (case, own) in cases.iter().zip(values).filter(|(c, _)| c.stage() == Stage::Room) {

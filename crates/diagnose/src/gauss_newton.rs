@@ -24,6 +24,18 @@ pub(crate) struct Slopes {
     pub information: DMatrix<f64>,
 }
 
+impl Slopes {
+    /// Of `n` parameters, none so far.
+    pub fn zero(n: usize) -> Self {
+        Self { gradient: DVector::zeros(n), information: DMatrix::zeros(n, n) }
+    }
+
+    pub fn add(&mut self, other: &Self) {
+        self.gradient += &other.gradient;
+        self.information += &other.information;
+    }
+}
+
 /// A log-likelihood of parameters with priors.
 pub(crate) trait Model {
     fn priors(&self) -> &[Prior];
@@ -64,8 +76,7 @@ pub(crate) fn maximise(model: &dyn Model, start: &[f64], what: &'static str) -> 
     let penalty =
         |x: &[f64]| -> f64 { x.iter().zip(priors).map(|(x, p)| -0.5 * ((x - p.mean) / p.sd).powi(2)).sum() };
     let mut x: Vec<f64> = start.iter().zip(priors).map(|(x, p)| x.clamp(p.low, p.high)).collect();
-    let [mut slopes, mut tried_slopes] =
-        [(); 2].map(|()| Slopes { gradient: DVector::zeros(n), information: DMatrix::zeros(n, n) });
+    let [mut slopes, mut tried_slopes] = [(); 2].map(|()| Slopes::zero(n));
     let mut damping = 1e-3;
     let mut settled = false;
     let mut likelihood = fill(model, &x, &mut slopes);
@@ -164,7 +175,7 @@ mod tests {
 
         fn log_likelihood(&self, x: &[f64], slopes: Option<&mut Slopes>) -> f64 {
             let mut value = 0.0;
-            let mut own = Slopes { gradient: DVector::zeros(2), information: DMatrix::zeros(2, 2) };
+            let mut own = Slopes::zero(2);
             for (t, y) in &self.data {
                 let row = DVector::from_vec(vec![1.0, *t]);
                 let residual = (y - x[0] - x[1] * t) / self.sd;

@@ -147,7 +147,7 @@ fn directions(
 
 fn expected(model: &dyn Model, values: &[f64]) -> Slopes {
     let n = model.priors().len();
-    let mut slopes = Slopes { gradient: DVector::zeros(n), information: DMatrix::zeros(n, n) };
+    let mut slopes = Slopes::zero(n);
     model.log_likelihood(values, Some(&mut slopes));
     slopes
 }

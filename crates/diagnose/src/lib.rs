@@ -77,6 +77,7 @@ mod found_parameters;
 mod gates;
 mod gauss_newton;
 mod held_out;
+mod hit_changes;
 mod hit_groups;
 mod isolability;
 mod kernel;

@@ -93,21 +93,3 @@ pub(crate) fn merged(fitted: Vec<FoundParameter>, own: &[FoundParameter]) -> Vec
     all.extend(more);
     all
 }
-
-/// Logarithm of the change of a bin's energy if each meeting with a material left so much less (logarithm).
-pub(crate) fn change_by_hits(
-    state: &crate::traced_pair::BandState,
-    materials: usize,
-    bin: usize,
-    material: usize,
-    ln_kept: f64,
-) -> f64 {
-    let groups = state.groups[bin]..state.groups[bin + 1];
-    let (mut before, mut after) = (0.0, 0.0);
-    for group in groups {
-        let energy = state.group_energy[group];
-        before += energy;
-        after += energy * (state.group_hits[group * materials + material] * ln_kept).exp();
-    }
-    if before > 0.0 { (after / before).ln() } else { 0.0 }
-}

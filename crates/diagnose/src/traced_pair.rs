@@ -356,7 +356,7 @@ impl TracedPair {
                 }
             });
         }
-        let chance = self.monte_carlo(energies, bins, kernel, duration_s);
+        let (_, chance) = self.sums_and_chance(energies, bins, kernel, duration_s);
         let floor = NOTHING * (0..count).map(|k| sums[k * COLUMNS]).fold(0.0, f64::max).max(1e-30);
         let mut state = BandState {
             bins,

@@ -1,5 +1,6 @@
 //! What an effect is shown of a prediction.
 
+use crate::hit_changes::HitChanges;
 use crate::traced_pair::BandState;
 use crate::{Survey, SurveyedResponse};
 
@@ -15,6 +16,7 @@ pub struct BandView<'a> {
     pub(crate) reference: f64,
     /// Factor of the gains on all energy of the room.
     pub(crate) gain: f64,
+    pub(crate) hit_changes: &'a HitChanges,
 }
 
 impl BandView<'_> {
@@ -87,7 +89,7 @@ impl BandView<'_> {
     /// Natural logarithm of the change of a bin's energy if each meeting with a material left less, by this logarithm of the share.
     pub fn change_by_hits(&self, bin: usize, material: usize, ln_kept: f64) -> f64 {
         let materials = self.survey.materials.len();
-        crate::own_evidence::change_by_hits(self.state, materials, bin, material, ln_kept)
+        self.hit_changes.of(self.state, materials, bin, material, ln_kept)
     }
 
     /// Natural logarithm of the change of a bin's energy if the walls reacted locally by a share (-0.5 to 1.3; 1 is all of it): each

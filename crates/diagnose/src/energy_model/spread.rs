@@ -3,6 +3,7 @@
 use super::{EnergyModel, STEP, log_density};
 use crate::gates::ln_gamma;
 use crate::gauss_newton::Slopes;
+use crate::hit_changes::HitChanges;
 
 /// Step of differences in the logarithm of a shape.
 const SHAPE_STEP: f64 = 1e-3;
@@ -28,7 +29,8 @@ impl EnergyModel<'_> {
     /// Expected relative variances of the bins of a pair and band, dispersion left out.
     pub(super) fn variances(&self, values: &[f64], pair: usize, band: usize, count: usize) -> Vec<f64> {
         let mut variances = self.data.states[pair][band].variance[..count].to_vec();
-        let view = self.view(pair, band, self.gain_db(values, pair));
+        let changes = HitChanges::default();
+        let view = self.view((pair, band), self.gain_db(values, pair), &changes);
         for placed in &self.effects {
             let own = &values[placed.first..placed.first + placed.parameters.len()];
             placed.case.variance(own, &view, &mut variances);

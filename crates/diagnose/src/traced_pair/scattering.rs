@@ -26,8 +26,7 @@ impl TracedPair {
                 materials.iter().map(|m| scattering_more(m, extra)).collect::<Result<_, _>>()?;
             let energies = self.paths.energies_under(&Conditions::new(&changed, &self.air))?;
             for ((state, kernel), energies) in states.iter_mut().zip(kernels).zip(&energies) {
-                let sums = self.sums(energies, state.bins, kernel, duration_s);
-                let chance = self.monte_carlo(energies, state.bins, kernel, duration_s);
+                let (sums, chance) = self.sums_and_chance(energies, state.bins, kernel, duration_s);
                 let floor = NOTHING * sums.iter().copied().fold(0.0, f64::max).max(1e-30);
                 let bins = || sums.iter().map(|s| s.max(floor)).zip(&state.ln_energy);
                 let change: Vec<f64> = bins().map(|(e, l)| e.ln() - l).collect();
@@ -41,33 +40,49 @@ impl TracedPair {
         Ok(())
     }
 
-    /// Variance of the energy of each bin by chance, from the scatter between batches of rays.
-    pub(super) fn monte_carlo(
+    /// Energy of each bin, and its variance by chance, from the scatter between batches of rays.
+    pub(super) fn sums_and_chance(
         &self,
         energies: &[f32],
         bins: Bins,
         kernel: &BandKernel,
         duration_s: f64,
-    ) -> Vec<f64> {
+    ) -> (Vec<f64>, Vec<f64>) {
         let count = bins.count(duration_s);
         let cells = (duration_s / CELL_S).ceil() as usize + 1;
         let batches = usize::from(PathSet::BATCHES);
+        let mut exact = vec![0.0f64; cells];
         let mut by_batch = vec![0.0f32; cells * batches];
         for (i, (&cell, &e)) in self.cells.iter().zip(energies).enumerate() {
-            if let Some(batch) = self.paths.batch(i).filter(|_| usize::from(cell) < cells) {
-                by_batch[usize::from(cell) * batches + usize::from(batch)] += e;
+            let cell = usize::from(cell);
+            if cell >= cells {
+                continue;
+            }
+            match self.paths.batch(i) {
+                Some(batch) => by_batch[cell * batches + usize::from(batch)] += e,
+                None => exact[cell] += f64::from(e),
             }
         }
-        let mut sums = vec![0.0f64; count * batches];
-        for (cell, parts) in by_batch.chunks(batches).enumerate().filter(|(_, p)| p.iter().any(|e| *e > 0.0))
-        {
-            let time_s = (cell as f64 + 0.5) * CELL_S;
-            Self::shares(time_s, bins, kernel, count, |bin, share| {
-                let target = &mut sums[bin * batches..(bin + 1) * batches];
-                target.iter_mut().zip(parts).for_each(|(s, r)| *s += share * f64::from(*r));
-            });
+        let mut sums = vec![0.0f64; count];
+        for &i in &self.alone {
+            let (time_s, e) = (f64::from(self.times_s[i as usize]), f64::from(energies[i as usize]));
+            Self::shares(time_s, bins, kernel, count, |bin, share| sums[bin] += share * e);
         }
-        sums.chunks(batches).map(variance_of_sum).collect()
+        let mut sampled = vec![0.0f64; count * batches];
+        for (cell, parts) in by_batch.chunks(batches).enumerate() {
+            let time_s = (cell as f64 + 0.5) * CELL_S;
+            let own = exact[cell];
+            if own > 0.0 || parts.iter().any(|e| *e > 0.0) {
+                Self::shares(time_s, bins, kernel, count, |bin, share| {
+                    sums[bin] += share * own;
+                    let target = &mut sampled[bin * batches..(bin + 1) * batches];
+                    target.iter_mut().zip(parts).for_each(|(s, r)| *s += share * f64::from(*r));
+                });
+            }
+        }
+        let chance = sampled.chunks(batches).map(variance_of_sum).collect();
+        sums.iter_mut().zip(sampled.chunks(batches)).for_each(|(s, parts)| *s += parts.iter().sum::<f64>());
+        (sums, chance)
     }
 }
 
