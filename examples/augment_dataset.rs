@@ -3,7 +3,7 @@
 use clap::Parser;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 use sabine::acoustics::{
-    Air, DiffuseRoom, Material, Observer, OctaveBands, PathSet, Propagator, Receiver, Scene, Source,
+    Air, Bands, DiffuseRoom, Material, Observer, PathSet, Propagator, Receiver, Scene, Source,
 };
 use sabine::augment::{
     Built, DatasetBuilder, DatasetConfig, DatasetSources, Error, Manifest, NoiseCorpus, Partition,
@@ -197,7 +197,7 @@ impl Propagator for RoomTracer {
         air: &Air,
         observer: &dyn Observer,
     ) -> Result<PathSet, sabine::acoustics::Error> {
-        let rooms = DiffuseRoom::of_scene(scene, air, OctaveBands::SIMULATION)?;
+        let rooms = DiffuseRoom::of_scene(scene, air, Bands::SIMULATION)?;
         let longest_s = rooms.values().iter().map(DiffuseRoom::eyring_t60_s).fold(0.0, f64::max);
         let duration_s = (TIMES_EYRING * longest_s).clamp(DURATION_S.0, DURATION_S.1);
         PathTracer::new(TracerConfig { duration_s, ..self.config.clone() })?

@@ -7,7 +7,7 @@
 //! Writes `fir.wav` (32-bit float taps, mono) and `fir.svg` (gains wanted and realised), both or neither.
 
 use clap::Parser;
-use sabine::acoustics::{OctaveBands, PerBand, SampleFormat, Signal, encode_wav};
+use sabine::acoustics::{Bands, PerBand, SampleFormat, Signal, encode_wav};
 use sabine::eqfilter::{AboveBand, EqFilter, EqFilterConfig};
 use sabine_examples::{Chart, Look, OutputFolder, Scale, Series};
 use std::error::Error;
@@ -89,14 +89,14 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error + Send + Sync>> {
 /// The gains with their bands.
 fn gains(arguments: &Arguments) -> Result<PerBand<f64>, Box<dyn Error + Send + Sync>> {
     let (first_hz, count) = (arguments.first_band, arguments.gains_db.len());
-    let to_top = OctaveBands::new(first_hz, 16_000.0).map_err(|e| format!("--first-band: {e}"))?;
+    let to_top = Bands::octaves(first_hz, 16_000.0).map_err(|e| format!("--first-band: {e}"))?;
     if count > to_top.len() {
         return Err(format!(
             "--gains-db: {count} gains from {first_hz} Hz on reach beyond the 16 kHz octave"
         )
         .into());
     }
-    let bands = OctaveBands::new(first_hz, to_top.nominal_hz(count - 1))?;
+    let bands = Bands::octaves(first_hz, to_top.nominal_hz(count - 1))?;
     Ok(PerBand::new(bands, arguments.gains_db.clone())?)
 }
 

@@ -2,7 +2,7 @@
 
 use clap::Parser;
 use sabine::acoustics::{
-    BandParameters, Channel, DecayFit, FilterBank, ImpulseResponse, NoReading, OctaveBands, PerBand, Reading,
+    BandParameters, Bands, Channel, DecayFit, FilterBank, ImpulseResponse, NoReading, PerBand, Reading,
     RoomParameters, equalisation, read_audio, write_atomically,
 };
 use sabine_examples::{Chart, Look, OutputFolder, Scale, Series, chart_sheet};
@@ -53,7 +53,7 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Anything> {
-    let bands = OctaveBands::new(arguments.from, arguments.to)?;
+    let bands = Bands::octaves(arguments.from, arguments.to)?;
     let channel = arguments.channel.map_or(Channel::Mono, Channel::Index);
     let (mut results, mut plots) = (Vec::new(), Vec::new());
     for path in &arguments.files {

@@ -5,7 +5,7 @@
 
 use clap::Parser;
 use sabine::acoustics::{
-    Material, MeasuredRoom, OctaveBands, PerBand, Propagator, Reading, SampleFormat, Signal, encode_wav,
+    Bands, Material, MeasuredRoom, PerBand, Propagator, Reading, SampleFormat, Signal, encode_wav,
     library_material, material_library,
 };
 use sabine::optimize::{PredictedChange, RoomPrediction};
@@ -18,7 +18,7 @@ use std::process::ExitCode;
 type AnyError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Octaves of the prediction: 125 Hz to 8 kHz.
-const OCTAVES: OctaveBands = OctaveBands::T60;
+const OCTAVES: Bands = Bands::T60;
 
 /// Replace a material of a room and predict what changes.
 #[derive(Parser)]

@@ -4,7 +4,7 @@
 
 use clap::Parser;
 use sabine::acoustics::{
-    Conditions, Estimate, Material, MeasuredRoom, OctaveBands, PathParameters, PathSet, PerBand, Propagator,
+    Bands, Conditions, Estimate, Material, MeasuredRoom, PathParameters, PathSet, PerBand, Propagator,
     Reading, Scene, library_material,
 };
 use sabine::optimize::{AbsorptionPrior, FitConfig, MaterialFitter};
@@ -214,7 +214,7 @@ fn mean<'r>(readings: impl Iterator<Item = &'r Reading>) -> Option<f64> {
 }
 
 /// Mean of the third octaves of an octave; D50 as a share.
-fn octave(measured: &[[f64; 5]], column: usize, bands: OctaveBands, band: usize) -> Option<f64> {
+fn octave(measured: &[[f64; 5]], column: usize, bands: Bands, band: usize) -> Option<f64> {
     let (low, high) = bands.edges_hz(band);
     let inside = measured.iter().filter(|row| row[0] > low && row[0] < high).map(|row| row[column]);
     let values: Vec<f64> = inside.filter(|v| v.is_finite()).collect();

@@ -2,8 +2,8 @@
 
 use clap::{Parser, ValueEnum};
 use sabine::acoustics::{
-    Air, Channel, Conditions, Material, MeasuredRoom, NamedMaterial, OctaveBands, Orientation, PerBand,
-    Receiver, SampleFormat, Scene, Source, Triangle, read_audio, resample, write_wav_channels,
+    Air, Bands, Channel, Conditions, Material, MeasuredRoom, NamedMaterial, Orientation, PerBand, Receiver,
+    SampleFormat, Scene, Source, Triangle, read_audio, resample, write_wav_channels,
 };
 use sabine::eqfilter::{PartitionedConfig, PartitionedConvolver, ResponsePreparer};
 use sabine::propagate::{
@@ -343,7 +343,7 @@ fn furnished(folder: &Path) -> Result<Setting, Anything> {
 
 /// A hard room of 6 x 5 x 3 m and a soft one of 5 x 4 x 3 m, joined by a doorway 1 m wide and 2.1 m high.
 fn two_rooms() -> Result<Setting, Anything> {
-    let bands = OctaveBands::SIMULATION;
+    let bands = Bands::SIMULATION;
     let named = |name: &str, absorption: [f64; 8], scattering: f64| -> Result<NamedMaterial, Anything> {
         let absorption = PerBand::new(bands, absorption.to_vec())?;
         let material = Material::new(absorption, PerBand::uniform(bands, scattering))?;

@@ -38,12 +38,15 @@ struct Arguments {
     /// Sources in each room
     #[arg(long, default_value_t = 1)]
     sources: usize,
-    /// Sample rate; octaves that it does not hold are left out
+    /// Sample rate; bands that it does not hold are left out
     #[arg(long, value_name = "HZ", default_value_t = 48_000)]
     rate: u32,
     /// Sessions, each in air of its own, which is stated
     #[arg(long, default_value_t = 1)]
     sessions: usize,
+    /// Third octaves in place of octaves
+    #[arg(long)]
+    third_octaves: bool,
     /// Follow every set of causes up by the measurement that it asks for, and by another
     #[arg(long)]
     decide: bool,
@@ -126,6 +129,7 @@ fn tasks(arguments: &Arguments) -> Vec<Task> {
                     sources: arguments.sources,
                     sample_rate_hz: arguments.rate,
                     sessions: arguments.sessions,
+                    bands_per_octave: if arguments.third_octaves { 3 } else { 1 },
                     decide: arguments.decide,
                     rays: arguments.rays,
                     range_db: arguments.range_db,

@@ -14,7 +14,7 @@ pub fn print(trials: &[Trial]) {
     println!(
         "| hidden | strength | receivers | shams | rooms | right | set | extra | part | wrong | missed | unnamed | d' |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     let mut groups: BTreeMap<(&str, String, usize, usize), Vec<&Trial>> = BTreeMap::new();
     for t in trials {
         groups.entry((&t.hidden, format!("{:.2}", t.strength), t.receivers, t.shams)).or_default().push(t);
@@ -46,25 +46,26 @@ pub fn print(trials: &[Trial]) {
 
 /// How the answers depend on how the room was measured, if that differs.
 fn conditions(trials: &[Trial]) {
-    let mut groups: BTreeMap<(usize, usize, u32, usize), Vec<&Trial>> = BTreeMap::new();
+    let mut groups: BTreeMap<(usize, usize, u32, usize, usize), Vec<&Trial>> = BTreeMap::new();
     for t in trials.iter().filter(|t| t.shams == 0) {
-        groups.entry((t.receivers, t.sources, t.sample_rate_hz, t.sessions)).or_default().push(t);
+        let condition = (t.receivers, t.sources, t.sample_rate_hz, t.sessions, t.bands_per_octave);
+        groups.entry(condition).or_default().push(t);
     }
     if groups.len() < 2 {
         return;
     }
     println!("\n## By conditions\n");
     println!(
-        "| receivers | sources | sample rate, kHz | sessions | null rooms: false alarms | detected | right single name | wrong or a name too many | root mean square d' | seconds (median) |"
+        "| receivers | sources | sample rate, kHz | sessions | bands in an octave | null rooms: false alarms | detected | right single name | wrong or a name too many | root mean square d' | seconds (median) |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|");
-    for ((receivers, sources, rate, sessions), own) in &groups {
+    for ((receivers, sources, rate, sessions, per_octave), own) in &groups {
         let (nulls, hidden): (Vec<&Trial>, Vec<&Trial>) = own.iter().partition(|t| t.hidden == "none");
         let of = |among: &[&Trial], hit: &dyn Fn(&Trial) -> bool| {
             format!("{} of {}", among.iter().filter(|t| hit(t)).count(), among.len())
         };
         println!(
-            "| {receivers} | {sources} | {} | {sessions} | {} | {} | {} | {} | {} | {:.0} |",
+            "| {receivers} | {sources} | {} | {sessions} | {per_octave} | {} | {} | {} | {} | {} | {:.0} |",
             f64::from(*rate) / 1000.0,
             of(&nulls, &|t| t.outcome != Outcome::Right),
             of(&hidden, &|t| t.outcome != Outcome::Missed),

@@ -3,7 +3,7 @@
 use crate::AnyError;
 use crate::decide;
 use crate::sham::{IDS, Sham};
-use sabine::acoustics::{OctaveBands, TimeZero};
+use sabine::acoustics::{Bands, TimeZero};
 use sabine::diagnose::{Cause, DiagnoseConfig, Diagnoser, Diagnosis, Verdict, catalogue};
 use sabine_testkit::{Fault, Hidden, LabConfig, Laboratory};
 use serde::{Deserialize, Serialize};
@@ -21,6 +21,8 @@ pub struct Task {
     pub sample_rate_hz: u32,
     /// Sessions in air of their own.
     pub sessions: usize,
+    /// Bands in an octave: 1 or 3.
+    pub bands_per_octave: usize,
     pub rays: usize,
     pub range_db: f64,
     pub position_sd_m: f64,
@@ -63,6 +65,8 @@ pub struct Trial {
     pub sample_rate_hz: u32,
     #[serde(default = "one")]
     pub sessions: usize,
+    #[serde(default = "one")]
+    pub bands_per_octave: usize,
     pub shams: usize,
     pub verdict: String,
     pub answer: String,
@@ -112,8 +116,8 @@ impl Task {
             t.hidden == self.name()
                 && t.strength == self.strength
                 && (t.seed, t.receivers, t.shams) == (self.seed, self.receivers, self.shams)
-                && (t.sources, t.sample_rate_hz, t.sessions)
-                    == (self.sources, self.sample_rate_hz, self.sessions)
+                && (t.sources, t.sample_rate_hz, t.sessions, t.bands_per_octave)
+                    == (self.sources, self.sample_rate_hz, self.sessions, self.bands_per_octave)
         })
     }
 
@@ -121,16 +125,17 @@ impl Task {
         // A recording that begins before the emission must say so.
         let early = self.hidden.iter().any(|id| id == "nonlinear_distortion");
         let time_zero = if early { TimeZero::Common } else { TimeZero::Emission };
-        let all = OctaveBands::T60;
+        let all =
+            if self.bands_per_octave == 1 { Bands::T60 } else { Bands::third_octaves(100.0, 10_000.0)? };
         let highest = (0..all.len()).rfind(|&b| 2.0 * all.edges_hz(b).1 <= f64::from(self.sample_rate_hz));
-        let highest = highest.ok_or("the sample rate leaves no octave")?;
+        let highest = highest.ok_or("the sample rate leaves no band")?;
         Ok(LabConfig {
             seed: self.seed,
             sources: self.sources,
             receivers: self.receivers,
             sessions: self.sessions,
             sample_rate_hz: self.sample_rate_hz,
-            bands: OctaveBands::new(all.nominal_hz(0), all.nominal_hz(highest))?,
+            bands: all.part(0..highest + 1),
             time_zero,
             ..LabConfig::default()
         })
@@ -203,6 +208,7 @@ impl Task {
             sources: self.sources,
             sample_rate_hz: self.sample_rate_hz,
             sessions: self.sessions,
+            bands_per_octave: self.bands_per_octave,
             shams: self.shams,
             verdict: found.verdict.to_string(),
             answer: answer(&found),

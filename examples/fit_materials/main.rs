@@ -6,8 +6,8 @@ mod summary;
 
 use clap::{Parser, ValueEnum};
 use sabine::acoustics::{
-    Air, Error as AcousticsError, Estimate, Material, MeasuredRoom, OctaveBands, PathSet, PerBand,
-    Propagator, Reading, Receiver, RoomParameters, SampleFormat, Scene, Signal, Source, encode_wav,
+    Air, Bands, Error as AcousticsError, Estimate, Material, MeasuredRoom, PathSet, PerBand, Propagator,
+    Reading, Receiver, RoomParameters, SampleFormat, Scene, Signal, Source, encode_wav,
 };
 use sabine::optimize::{
     AbsorptionPrior, DecayMisfit, FitConfig, MaterialFit, MaterialFitter, MeasuredDecay, MeasuredPair,
@@ -23,7 +23,7 @@ use summary::{Compared, Seconds, Summary, mean_of};
 type AnyError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Octaves of targets and materials: 125 Hz to 8 kHz.
-const OCTAVES: OctaveBands = OctaveBands::T60;
+const OCTAVES: Bands = Bands::T60;
 /// Rate of what is rendered, in Hz.
 const RATE_HZ: u32 = 48_000;
 /// Paths are looked for as long as this many times the longest reverberation time, within these limits in seconds.
@@ -174,7 +174,7 @@ impl<'a> Room<'a> {
             file.scene().materials().iter().map(|m| m.material.resampled(OCTAVES)).collect();
         let prior = |(material, prior): (&Material, &sabine::acoustics::MaterialPrior)| AbsorptionPrior {
             mean: material.absorption().clone(),
-            standard_deviation: prior.absorption_sd.resampled(OCTAVES),
+            standard_deviation: prior.absorption_sd.averaged(OCTAVES),
         };
         let priors = materials.iter().zip(file.priors()).map(prior).collect();
         let scene = file.scene().with_materials(materials.clone())?;

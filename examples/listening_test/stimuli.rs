@@ -5,7 +5,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use sabine::acoustics::{
-    BandParameters, EnergyDecayCurve, ImpulseResponse, OctaveBands, Onset, PerBand, Reading, RoomParameters,
+    BandParameters, Bands, EnergyDecayCurve, ImpulseResponse, Onset, PerBand, Reading, RoomParameters,
     Signal, resample, resample_response,
 };
 use sabine::eqfilter::{EqFilter, convolve};
@@ -105,12 +105,12 @@ impl Responses {
     /// The numbers of the responses and of the items made with them.
     pub fn summary(&self, items: &[Item]) -> Result<Summary, AnyError> {
         let read = |response: &ImpulseResponse| -> Result<Vec<Option<f64>>, AnyError> {
-            let t30_s: PerBand<Reading> = RoomParameters::measure(response, OctaveBands::T60)?.t30_s;
+            let t30_s: PerBand<Reading> = RoomParameters::measure(response, Bands::T60)?.t30_s;
             Ok(t30_s.values().iter().map(|t| t.as_ref().ok().map(|t| t.value)).collect())
         };
         let t60 = read(&self.t60)?;
         Ok(Summary {
-            bands_hz: OctaveBands::T60.iter_hz().collect(),
+            bands_hz: Bands::T60.iter_hz().collect(),
             t60_s: vec![
                 ("reference", read(&self.measured)?),
                 ("mid_anchor", read(&self.mid_anchor)?),

@@ -10,7 +10,7 @@ use clap::Parser;
 use matcher::Matcher;
 use sabine::Recording;
 use sabine::acoustics::{
-    Channel, ImpulseResponse, MeasuredRoom, OctaveBands, RoomParameters, SampleFormat, read_audio, resample,
+    Bands, Channel, ImpulseResponse, MeasuredRoom, RoomParameters, SampleFormat, read_audio, resample,
     write_wav,
 };
 use sabine::estimator::{Estimator, LiveEstimator};
@@ -103,12 +103,12 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
         arguments.block_ms
     );
     println!("{:>7}  {:50}EQ in dB at", "", "T60 in s at");
-    println!("{:>7}  {}{}", "", row(OctaveBands::T60.iter_hz(), 0), row(OctaveBands::EQ.iter_hz(), 0));
+    println!("{:>7}  {}{}", "", row(Bands::T60.iter_hz(), 0), row(Bands::EQ.iter_hz(), 0));
     let pace = if arguments.fast { Pace::Fast } else { Pace::RealTime };
     let mut session = Session::new(live, matcher, arguments.block_ms, pace)?;
     let end = session.run(speech.samples(), dry.samples())?;
 
-    let reached = RoomParameters::measure(&end.response, OctaveBands::T60)?.t30_s;
+    let reached = RoomParameters::measure(&end.response, Bands::T60)?.t30_s;
     let t60_s = end.targets.t60_s();
     println!("T60 heard    {} s", row(t60_s.values().iter().map(|t| t.value), 2));
     println!(

@@ -2,8 +2,8 @@
 
 use crate::AnyError;
 use sabine::acoustics::{
-    Air, DiffuseRoom, ImpulseResponse, Material, MeasuredRoom, OctaveBands, PathSet, PerBand, Propagator,
-    Receiver, RoomTargets, Scene, Signal, Source, equalisation,
+    Air, Bands, DiffuseRoom, ImpulseResponse, Material, MeasuredRoom, PathSet, PerBand, Propagator, Receiver,
+    RoomTargets, Scene, Signal, Source, equalisation,
 };
 use sabine::eqfilter::{AboveBand, EqDesigner, EqFilterConfig};
 use sabine::optimize::{AbsorptionPrior, FitConfig, MaterialFitter};
@@ -59,7 +59,7 @@ impl Matcher {
         seed: u64,
     ) -> Result<Self, AnyError> {
         let start = Instant::now();
-        let bands = OctaveBands::SIMULATION;
+        let bands = Bands::SIMULATION;
         let materials: Vec<Material> =
             room.scene().materials().iter().map(|named| named.material.resampled(bands)).collect();
         let priors = materials
@@ -67,7 +67,7 @@ impl Matcher {
             .zip(room.priors())
             .map(|(material, prior)| AbsorptionPrior {
                 mean: material.absorption().clone(),
-                standard_deviation: prior.absorption_sd.resampled(bands),
+                standard_deviation: prior.absorption_sd.averaged(bands),
             })
             .collect();
         let scene = room.scene().with_materials(materials.clone())?;
@@ -96,7 +96,7 @@ impl Matcher {
             tracer,
             fitter: MaterialFitter::new(FitConfig::default())?,
             renderer,
-            designer: EqDesigner::new(OctaveBands::EQ, SAMPLE_RATE_HZ, config)?,
+            designer: EqDesigner::new(Bands::EQ, SAMPLE_RATE_HZ, config)?,
             paths: (duration_s, paths),
             first,
             start_s: start.elapsed().as_secs_f64(),
@@ -133,8 +133,8 @@ impl Matcher {
         let fit =
             self.fitter.fit_t60(&[paths], &self.materials, &self.priors, &self.air, targets.t60_s(), &())?;
         let response = self.renderer.render(paths, &fit.materials, &self.air)?;
-        let simulated = equalisation(&response, OctaveBands::EQ)?;
-        let gains_db = PerBand::from_fn(OctaveBands::EQ, |band| {
+        let simulated = equalisation(&response, Bands::EQ)?;
+        let gains_db = PerBand::from_fn(Bands::EQ, |band| {
             // An octave in which the simulation cannot be read is left as it is.
             let simulated = simulated.values()[band].as_ref().ok();
             let gain = simulated.map_or(0.0, |s| targets.eq_db().values()[band].value - s.value);

@@ -9,8 +9,8 @@ mod rooms;
 use clap::Parser;
 use rooms::{Room, rooms};
 use sabine::acoustics::{
-    Air, Error as AcousticsError, Estimate, Material, MaterialPrior, OctaveBands, PathSet, PerBand,
-    Propagator, Reading, RoomParameters,
+    Air, Bands, Error as AcousticsError, Estimate, Material, MaterialPrior, PathSet, PerBand, Propagator,
+    Reading, RoomParameters,
 };
 use sabine::optimize::{
     AbsorptionPrior, FitConfig, MaterialFit, MaterialFitter, Retrace, RetraceConfig, SlopeObjective,
@@ -190,7 +190,7 @@ impl Traced<'_> {
             let config = RenderConfig { sample_rate_hz: 32_000, seed, ..RenderConfig::default() };
             let renderer = PressureRenderer::new(config).map_err(failed)?;
             let response = renderer.render(paths, materials, &self.air).map_err(failed)?;
-            Ok(RoomParameters::measure(&response, OctaveBands::T60)?.t30_s)
+            Ok(RoomParameters::measure(&response, Bands::T60)?.t30_s)
         };
         (0..self.responses).map(|i| of(self.noise_seed + i)).collect()
     }
@@ -199,7 +199,7 @@ impl Traced<'_> {
 /// Mean over responses, as ISO 3382-1 (8.1) averages positions; what cannot be read of one is not read at all.
 fn mean(readings: &[PerBand<Reading>]) -> PerBand<Reading> {
     let count = readings.len() as f64;
-    PerBand::from_fn(OctaveBands::T60, |b| {
+    PerBand::from_fn(Bands::T60, |b| {
         let values: Vec<f64> =
             readings.iter().map(|r| r.values()[b].clone().map(|t| t.value)).collect::<Result<_, _>>()?;
         let mean = values.iter().sum::<f64>() / count;
@@ -238,7 +238,7 @@ fn fit_room(
     arguments: &Arguments,
     points: &mut Vec<Point>,
 ) -> Result<Run, AnyError> {
-    let octaves = OctaveBands::T60;
+    let octaves = Bands::T60;
     let materials: Vec<Material> = room.scene.materials().iter().map(|m| m.material.clone()).collect();
     let prior = |material: &Material| {
         if arguments.tables {

@@ -1,8 +1,6 @@
 //! Five rooms of the sizes that Tang et al. 2020 fitted materials in, built from their plans.
 
-use sabine::acoustics::{
-    Error, NamedMaterial, OctaveBands, Receiver, Scene, Source, Triangle, library_material,
-};
+use sabine::acoustics::{Bands, Error, NamedMaterial, Receiver, Scene, Source, Triangle, library_material};
 
 /// A room with a source and a receiver in it.
 pub struct Room {
@@ -135,7 +133,7 @@ impl Plan {
             let known = materials.iter().position(|m| m.name == name);
             let index = known.unwrap_or(materials.len());
             if known.is_none() {
-                let material = library_material(name)?.material(OctaveBands::T60)?;
+                let material = library_material(name)?.material(Bands::T60)?;
                 materials.push(NamedMaterial { name: name.to_owned(), material });
             }
             Ok(index as u32)

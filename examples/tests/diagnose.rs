@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
-use sabine::acoustics::{Channel, FilterBank, OctaveBands, read_audio};
+use sabine::acoustics::{Bands, Channel, FilterBank, read_audio};
 use sabine::diagnose::{ExtendedModel, catalogue};
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
 use serde_json::Value;
@@ -131,7 +131,7 @@ fn two_responses_say_what_they_can() {
 /// Energy by octave of a response, in dB.
 fn levels_db(wav: &Path) -> Vec<f64> {
     let sound = read_audio(wav, Channel::Mono).unwrap();
-    let bank = FilterBank::new(OctaveBands::T60, sound.sample_rate_hz()).unwrap();
+    let bank = FilterBank::new(Bands::T60, sound.sample_rate_hz()).unwrap();
     let energy = |band: &Vec<f32>| band.iter().map(|&s| f64::from(s).powi(2)).sum::<f64>();
     bank.analyse(sound.samples()).values().iter().map(|b| 10.0 * energy(b).log10()).collect()
 }

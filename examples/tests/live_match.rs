@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
 use sabine::acoustics::{
-    Channel, ImpulseResponse, OctaveBands, RoomParameters, SampleFormat, equalisation, read_audio, write_wav,
+    Bands, Channel, ImpulseResponse, RoomParameters, SampleFormat, equalisation, read_audio, write_wav,
 };
 use sabine::estimator::Estimator;
 use serde_json::Value;
@@ -73,7 +73,7 @@ fn the_fixture_is_matched_while_it_is_heard() {
 
     // What is written sounds like what was heard and like the room as it is.
     let matched: ImpulseResponse = read_audio(&out, Channel::Mono).unwrap().into();
-    let t30_s = RoomParameters::measure(&matched, OctaveBands::T60).unwrap().t30_s;
+    let t30_s = RoomParameters::measure(&matched, Bands::T60).unwrap().t30_s;
     let truth: Value =
         serde_json::from_str(&std::fs::read_to_string(fixture("truth.json")).unwrap()).unwrap();
     let truth_s = |hz: f64| {
@@ -84,7 +84,7 @@ fn the_fixture_is_matched_while_it_is_heard() {
         let t30 = t30.as_ref().unwrap().value;
         assert!((t30 / truth_s(hz) - 1.0).abs() < 0.15, "{hz} Hz: {t30} s for {} s", truth_s(hz));
     }
-    let eq_db = equalisation(&matched, OctaveBands::EQ).unwrap();
+    let eq_db = equalisation(&matched, Bands::EQ).unwrap();
     for ((hz, eq), target) in eq_db.iter().zip(whole.eq_db().values()) {
         let eq = eq.as_ref().unwrap().value;
         assert!((eq - target.value).abs() < 1.0, "{hz} Hz: {eq} dB for {} dB", target.value);

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
-use sabine::acoustics::{Channel, ImpulseResponse, OctaveBands, RoomParameters, read_audio};
+use sabine::acoustics::{Bands, Channel, ImpulseResponse, RoomParameters, read_audio};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -58,7 +58,7 @@ fn the_response_measures_what_the_paths_say() {
     // Measured by ISO 3382 on the sound itself, by code that knows nothing of paths.
     let response =
         ImpulseResponse::from(read_audio(out.join("impulse_response.wav"), Channel::Mono).unwrap());
-    let bands = OctaveBands::new(250.0, 4000.0).unwrap();
+    let bands = Bands::octaves(250.0, 4000.0).unwrap();
     let room = RoomParameters::measure(&response, bands).unwrap();
     for (measured, expected) in room.t30_s.values().iter().zip(&t30_s[1..6]) {
         let measured = measured.as_ref().unwrap().value;

@@ -3,9 +3,7 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
-use sabine_acoustics::{
-    BandParameters, FilterBank, ImpulseResponse, OctaveBands, RoomParameters, equalisation,
-};
+use sabine_acoustics::{BandParameters, Bands, FilterBank, ImpulseResponse, RoomParameters, equalisation};
 use std::hint::black_box;
 
 /// Duration in seconds and sample rate in Hz: a response of the estimator's training, and one as it is measured.
@@ -29,20 +27,20 @@ fn measures(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("response");
     for (duration_s, rate) in SIZES {
         let response = response(duration_s, rate);
-        let bank = FilterBank::new(OctaveBands::T60, rate).expect("a sample rate in range");
+        let bank = FilterBank::new(Bands::T60, rate).expect("a sample rate in range");
         let name = format!("{duration_s} s at {rate} Hz");
         group.throughput(Throughput::Elements(response.samples().len() as u64));
         group.bench_function(BenchmarkId::new("split into 7 octaves", &name), |bencher| {
             bencher.iter(|| black_box(bank.split(black_box(response.samples()))));
         });
         group.bench_function(BenchmarkId::new("all parameters in 7 octaves", &name), |bencher| {
-            bencher.iter(|| black_box(RoomParameters::measure(black_box(&response), OctaveBands::T60)));
+            bencher.iter(|| black_box(RoomParameters::measure(black_box(&response), Bands::T60)));
         });
         group.bench_function(BenchmarkId::new("full band", &name), |bencher| {
             bencher.iter(|| black_box(BandParameters::full_band(black_box(&response))));
         });
         group.bench_function(BenchmarkId::new("equalisation in 7 octaves", &name), |bencher| {
-            bencher.iter(|| black_box(equalisation(black_box(&response), OctaveBands::EQ)));
+            bencher.iter(|| black_box(equalisation(black_box(&response), Bands::EQ)));
         });
     }
     group.finish();

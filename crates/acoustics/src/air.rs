@@ -1,7 +1,7 @@
 //! The air between the walls.
 
 use crate::error::check_range;
-use crate::{Error, OctaveBands, PerBand};
+use crate::{Bands, Error, PerBand};
 
 /// Triple-point temperature of water, K (ISO 9613-1, 6.2 and Annex B).
 const TRIPLE_POINT_K: f64 = 273.16;
@@ -95,7 +95,7 @@ impl Air {
     }
 
     /// Energy attenuation exponent m in 1/m at the exact centre of each band: energy falls as exp(-m distance).
-    pub fn energy_exponent_per_m(&self, bands: OctaveBands) -> PerBand<f64> {
+    pub fn energy_exponent_per_m(&self, bands: Bands) -> PerBand<f64> {
         PerBand::from_fn(bands, |i| {
             self.attenuation_db_per_m(bands.exact_hz(i)) * std::f64::consts::LN_10 / 10.0
         })
@@ -124,7 +124,7 @@ mod tests {
             (20.0, 20.0, [0.71, 1.39, 2.59, 6.53, 21.6, 74.7, 217.0, 435.0]),
             (10.0, 50.0, [0.48, 1.05, 1.89, 4.26, 13.3, 47.1, 157.0, 397.0]),
         ];
-        let bands = OctaveBands::new(125.0, 16000.0).unwrap();
+        let bands = Bands::octaves(125.0, 16000.0).unwrap();
         for (temperature, humidity, row) in table {
             let air = Air::new(temperature, humidity, 101.325).unwrap();
             for (i, &expected) in row.iter().enumerate() {

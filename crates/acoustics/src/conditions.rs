@@ -1,12 +1,12 @@
 //! What may change without tracing again.
 
-use crate::{Air, Directivity, Error, Material, OctaveBands, Orientation};
+use crate::{Air, Bands, Directivity, Error, Material, Orientation};
 
 /// All that paths leave open: surfaces, air, and how source and receiver are turned and what they favour.
 ///
 /// ```
-/// use sabine_acoustics::{Air, Conditions, Directivity, Material, OctaveBands, Orientation};
-/// let walls = [Material::uniform(OctaveBands::T60, 0.1, 0.2)?];
+/// use sabine_acoustics::{Air, Conditions, Directivity, Material, Bands, Orientation};
+/// let walls = [Material::uniform(Bands::T60, 0.1, 0.2)?];
 /// let (air, voice) = (Air::default(), Directivity::first_order(Directivity::SUBCARDIOID)?);
 /// let facing = Orientation::towards([0.0, 1.0, 0.0])?;
 /// let conditions = Conditions::new(&walls, &air).with_source(&voice, facing);
@@ -53,7 +53,7 @@ impl<'a> Conditions<'a> {
     }
 
     /// That directivities, if they have bands, have those of the materials.
-    pub(crate) fn check_bands(&self, bands: OctaveBands) -> Result<(), Error> {
+    pub(crate) fn check_bands(&self, bands: Bands) -> Result<(), Error> {
         for (directivity, _) in [self.source, self.receiver].into_iter().flatten() {
             if let Some(own) = directivity.bands().filter(|&own| own != bands) {
                 return Err(Error::BandMismatch { left: bands, right: own });

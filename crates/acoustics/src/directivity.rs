@@ -2,7 +2,7 @@
 
 use crate::directivity_table::{AngleTable, SphereTable, Stencil};
 use crate::error::check_range;
-use crate::{Error, OctaveBands, PerBand};
+use crate::{Bands, Error, PerBand};
 
 /// Energy gain over direction and octave, relative to the acoustic axis: the gain on the axis is 1.
 ///
@@ -22,7 +22,7 @@ use crate::{Error, OctaveBands, PerBand};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Directivity {
     /// `None`: the same in every band.
-    bands: Option<OctaveBands>,
+    bands: Option<Bands>,
     pattern: Pattern,
 }
 
@@ -111,13 +111,13 @@ impl Directivity {
     }
 
     /// The bands, or `None` if the pattern is the same in all.
-    pub fn bands(&self) -> Option<OctaveBands> {
+    pub fn bands(&self) -> Option<Bands> {
         self.bands
     }
 
     /// The same directivity on another run of bands; a band that it lacks takes the nearest one's pattern.
     #[must_use]
-    pub fn resampled(&self, bands: OctaveBands) -> Self {
+    pub fn resampled(&self, bands: Bands) -> Self {
         let Some(own) = self.bands else { return self.clone() };
         let origin = PerBand::from_fn(own, |i| i).resampled(bands);
         let from = origin.values();
@@ -193,7 +193,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn one_band<T: Clone>(value: T) -> PerBand<T> {
-        PerBand::uniform(OctaveBands::new(1000.0, 1000.0).unwrap(), value)
+        PerBand::uniform(Bands::octaves(1000.0, 1000.0).unwrap(), value)
     }
 
     fn decibels(magnitude: f64) -> f64 {
@@ -279,16 +279,13 @@ mod tests {
 
     #[test]
     fn bands_may_differ_and_be_resampled() {
-        let bands = OctaveBands::new(125.0, 500.0).unwrap();
+        let bands = Bands::octaves(125.0, 500.0).unwrap();
         let beaming = PerBand::new(bands, vec![1.0, 0.7, 0.5]).unwrap();
         let pattern = Directivity::first_order_per_band(&beaming).unwrap();
         let side = |p: &Directivity, band| p.energy_gain([0.0, 1.0, 0.0], band);
         assert_eq!((side(&pattern, 0), side(&pattern, 2)), (1.0, 0.25));
-        let wide = pattern.resampled(OctaveBands::SIMULATION);
-        assert_eq!(
-            (wide.bands(), side(&wide, 0), side(&wide, 7)),
-            (Some(OctaveBands::SIMULATION), 1.0, 0.25)
-        );
+        let wide = pattern.resampled(Bands::SIMULATION);
+        assert_eq!((wide.bands(), side(&wide, 0), side(&wide, 7)), (Some(Bands::SIMULATION), 1.0, 0.25));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Sound around an edge: first-order diffraction by a rigid wedge.
 
 use crate::error::check_range;
-use crate::{Error, OctaveBands};
+use crate::{Bands, Error};
 use std::f64::consts::{PI, TAU};
 
 /// A point in cylindrical coordinates about an edge.
@@ -175,12 +175,12 @@ impl EdgeDiffraction {
         self.gains(TAU * frequency_hz / speed_m_s, 0.0)[0]
     }
 
-    /// Mean of [`EdgeDiffraction::energy_gain`] over an octave, from eight values per octave that are computed once: a change
+    /// Mean of [`EdgeDiffraction::energy_gain`] over a band, from eight values per octave that are computed once: a change
     /// of speed or bands costs nothing. Beyond 21 Hz and 22 kHz the last value holds.
     ///
     /// # Panics
     /// If `band` is not one of `bands`.
-    pub fn octave_energy_gain(&self, bands: OctaveBands, band: usize, speed_m_s: f64) -> f64 {
+    pub fn band_energy_gain(&self, bands: Bands, band: usize, speed_m_s: f64) -> f64 {
         let (low_hz, high_hz) = bands.edges_hz(band);
         let step_hz = (high_hz - low_hz) / MEAN_OF as f64;
         let sum: f64 = (0..MEAN_OF)

@@ -1,6 +1,6 @@
 //! Energy over time: what a geometric simulation gives before it becomes pressure.
 
-use crate::{Error, NoReading, OctaveBands};
+use crate::{Bands, Error, NoReading};
 
 /// Energy per time bin and band. **Not** a pressure response: it must not be convolved with sound.
 ///
@@ -8,7 +8,7 @@ use crate::{Error, NoReading, OctaveBands};
 /// [`PathSet::energy_response`](crate::PathSet::energy_response) makes one; [`EnergyResponse::decay_curve`] reads it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EnergyResponse {
-    bands: OctaveBands,
+    bands: Bands,
     bin_s: f64,
     bins: usize,
     energy: Vec<f64>,
@@ -21,12 +21,7 @@ impl EnergyResponse {
     /// # Errors
     /// [`Error::BandCount`] if a length is not a multiple of the number of bands or the two differ,
     /// [`Error::OutOfRange`] for a bin width that is not positive.
-    pub fn new(
-        bands: OctaveBands,
-        bin_s: f64,
-        energy: Vec<f64>,
-        standard_error: Vec<f64>,
-    ) -> Result<Self, Error> {
+    pub fn new(bands: Bands, bin_s: f64, energy: Vec<f64>, standard_error: Vec<f64>) -> Result<Self, Error> {
         crate::error::check_range("bin width (s)", bin_s, 1e-6, 10.0, "between 1 us and 10 s")?;
         let bins = energy.len() / bands.len();
         if bins * bands.len() != energy.len() {
@@ -39,7 +34,7 @@ impl EnergyResponse {
     }
 
     /// The bands.
-    pub fn bands(&self) -> OctaveBands {
+    pub fn bands(&self) -> Bands {
         self.bands
     }
 

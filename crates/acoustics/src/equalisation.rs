@@ -1,7 +1,7 @@
 //! How loud a response is in each octave.
 
 use crate::band_energy::{BandEnergy, Prepared};
-use crate::{Error, Estimate, ImpulseResponse, NoReading, OctaveBands, PerBand, Reading};
+use crate::{Bands, Error, Estimate, ImpulseResponse, NoReading, PerBand, Reading};
 
 /// The octave that all levels refer to.
 const REFERENCE_HZ: f64 = 1000.0;
@@ -13,10 +13,10 @@ const REFERENCE_HZ: f64 = 1000.0;
 /// is what the noise leaves uncertain in this response; other positions in the room differ by more.
 ///
 /// ```
-/// use sabine_acoustics::{ImpulseResponse, OctaveBands, equalisation};
+/// use sabine_acoustics::{ImpulseResponse, Bands, equalisation};
 /// let mut samples = vec![0.0; 4000];
 /// (samples[100], samples[101]) = (1.0, -1.0); // a difference: |H| = 2 sin(pi f / rate), 6 dB per octave
-/// let levels = equalisation(&ImpulseResponse::new(samples, 48000)?, OctaveBands::EQ)?;
+/// let levels = equalisation(&ImpulseResponse::new(samples, 48000)?, Bands::EQ)?;
 /// let at_500_hz = levels.at_hz(500.0).unwrap().as_ref().unwrap().value;
 /// assert!((at_500_hz - -6.0).abs() < 0.1);
 /// # Ok::<(), sabine_acoustics::Error>(())
@@ -24,9 +24,9 @@ const REFERENCE_HZ: f64 = 1000.0;
 ///
 /// # Errors
 /// [`Error::UnknownBand`] never in practice: the reference octave is nominal.
-pub fn equalisation(response: &ImpulseResponse, bands: OctaveBands) -> Result<PerBand<Reading>, Error> {
+pub fn equalisation(response: &ImpulseResponse, bands: Bands) -> Result<PerBand<Reading>, Error> {
     let prepared = Prepared::new(response);
-    let reference = OctaveBands::new(REFERENCE_HZ, REFERENCE_HZ)?.edges_hz(0);
+    let reference = Bands::octaves(REFERENCE_HZ, REFERENCE_HZ)?.edges_hz(0);
     let edges: Vec<(f64, f64)> = (0..bands.len()).map(|i| bands.edges_hz(i)).collect();
     let all = edges.iter().copied().chain([reference]);
     let densities: Vec<Reading> = prepared.bands(all).into_iter().map(|band| density(&band?)).collect();
@@ -65,7 +65,7 @@ mod tests {
     fn a_flat_spectrum_is_at_0_db() {
         let mut samples = vec![0.0; 16000];
         samples[800] = 1.0;
-        let levels = equalisation(&ImpulseResponse::new(samples, 16000).unwrap(), OctaveBands::EQ).unwrap();
+        let levels = equalisation(&ImpulseResponse::new(samples, 16000).unwrap(), Bands::EQ).unwrap();
         for (hz, level) in levels.iter() {
             assert!(level.as_ref().unwrap().value.abs() < 0.02, "{hz} Hz: {level:?}");
         }
@@ -74,10 +74,10 @@ mod tests {
     #[test]
     fn silence_and_bands_above_nyquist_have_no_level() {
         let silent = ImpulseResponse::new(vec![0.0; 16000], 16000).unwrap();
-        assert!(equalisation(&silent, OctaveBands::EQ).unwrap().values().iter().all(Result::is_err));
+        assert!(equalisation(&silent, Bands::EQ).unwrap().values().iter().all(Result::is_err));
         let mut samples = vec![0.0; 8000];
         samples[800] = 1.0;
-        let levels = equalisation(&ImpulseResponse::new(samples, 8000).unwrap(), OctaveBands::EQ).unwrap();
+        let levels = equalisation(&ImpulseResponse::new(samples, 8000).unwrap(), Bands::EQ).unwrap();
         assert!(matches!(levels.at_hz(4000.0), Some(Err(NoReading::AboveNyquist { .. }))));
         assert!(levels.at_hz(2000.0).unwrap().is_ok());
     }

@@ -1,20 +1,22 @@
 //! What can go wrong with vocabulary values and measures.
 
-use crate::OctaveBands;
+use crate::Bands;
 use std::path::PathBuf;
 
 /// Errors of this crate; each names the offending field, and the file where there is one.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A centre frequency that is not a nominal octave centre.
-    #[error("{centre_hz} Hz is not a nominal octave centre (31.5, 62.5, 125, ... 16000)")]
+    /// A centre frequency that is not nominal.
+    #[error(
+        "{centre_hz} Hz is not a nominal centre of an octave (31.5, 63, 125, ... 16000) or third octave (25, 31.5, 40, ... 20000)"
+    )]
     UnknownBand {
         /// The frequency asked for, in Hz.
         centre_hz: f64,
     },
-    /// Band centres that do not rise octave by octave.
-    #[error("octave bands from {first_hz} to {last_hz} Hz are not a contiguous rising run")]
+    /// Band centres that do not rise octave by octave, or third by third.
+    #[error("bands from {first_hz} to {last_hz} Hz are not a contiguous rising run")]
     BandOrder {
         /// First centre, in Hz.
         first_hz: f64,
@@ -33,9 +35,9 @@ pub enum Error {
     #[error("cannot combine {} bands from {} Hz with {} bands from {} Hz", left.len(), left.nominal_hz(0), right.len(), right.nominal_hz(0))]
     BandMismatch {
         /// Bands of the left operand.
-        left: OctaveBands,
+        left: Bands,
         /// Bands of the right operand.
-        right: OctaveBands,
+        right: Bands,
     },
     /// A number outside its physical range, or not finite.
     #[error("{field} is {value}; it must be {range}")]

@@ -2,8 +2,7 @@
 
 use crate::error::check_range;
 use crate::spectrum::Spectrum;
-use crate::third_octaves::ThirdOctaveBands;
-use crate::{Error, OctaveBands, PerBand};
+use crate::{Bands, Error, PerBand};
 
 /// Ring-down that the padding leaves room for, in units of one over the bandwidth of the narrowest band.
 const PADDING_BANDWIDTH_TIMES: f64 = 16.0;
@@ -80,7 +79,7 @@ impl BandMask {
     }
 }
 
-/// A zero-phase bank of adjacent octave bands (IEC 61260-1 centres and edges, base ten).
+/// A zero-phase bank of adjacent octave or third-octave bands (IEC 61260-1 centres and edges, base ten).
 ///
 /// The gains g of adjacent bands are complementary in **power**, sum g^2 = 1. Two ways to use them:
 ///
@@ -93,8 +92,8 @@ impl BandMask {
 /// about one over the bandwidth; what rings out beyond the ends is cut off and does not come back at the other end.
 ///
 /// ```
-/// use sabine_acoustics::{FilterBank, OctaveBands};
-/// let bank = FilterBank::new(OctaveBands::SIMULATION, 48000)?;
+/// use sabine_acoustics::{FilterBank, Bands};
+/// let bank = FilterBank::new(Bands::SIMULATION, 48000)?;
 /// let input: Vec<f32> = (0..4800).map(|i| ((i * i) as f32 * 1e-3).sin()).collect();
 /// let bands = bank.split(&input);
 /// let worst = (0..input.len())
@@ -105,7 +104,7 @@ impl BandMask {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilterBank {
-    bands: OctaveBands,
+    bands: Bands,
     sample_rate_hz: u32,
 }
 
@@ -114,13 +113,13 @@ impl FilterBank {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a sample rate outside 1 kHz to 768 kHz.
-    pub fn new(bands: OctaveBands, sample_rate_hz: u32) -> Result<Self, Error> {
+    pub fn new(bands: Bands, sample_rate_hz: u32) -> Result<Self, Error> {
         check_sample_rate(sample_rate_hz)?;
         Ok(Self { bands, sample_rate_hz })
     }
 
     /// The bands.
-    pub fn bands(&self) -> OctaveBands {
+    pub fn bands(&self) -> Bands {
         self.bands
     }
 
@@ -170,73 +169,6 @@ impl FilterBank {
     }
 }
 
-/// The same bank in third octaves: see [`FilterBank`] for what the two ways of splitting mean.
-///
-/// ```
-/// use sabine_acoustics::{ThirdOctaveBands, ThirdOctaveFilterBank};
-/// let bands = ThirdOctaveBands::new(100.0, 5000.0)?;
-/// assert_eq!(bands.len(), 18);
-/// let bank = ThirdOctaveFilterBank::new(bands, 16000)?;
-/// let input: Vec<f32> = (0..1600).map(|i| (0.3 * i as f32).sin()).collect();
-/// let split = bank.split(&input);
-/// let sum: f32 = split.iter().map(|band| band[800]).sum();
-/// assert!((sum - input[800]).abs() < 1e-5);
-/// # Ok::<(), sabine_acoustics::Error>(())
-/// ```
-#[derive(Clone, Debug, PartialEq)]
-pub struct ThirdOctaveFilterBank {
-    bands: ThirdOctaveBands,
-    sample_rate_hz: u32,
-}
-
-impl ThirdOctaveFilterBank {
-    /// A bank for signals at a sample rate.
-    ///
-    /// # Errors
-    /// [`Error::OutOfRange`] for a sample rate outside 1 kHz to 768 kHz.
-    pub fn new(bands: ThirdOctaveBands, sample_rate_hz: u32) -> Result<Self, Error> {
-        check_sample_rate(sample_rate_hz)?;
-        Ok(Self { bands, sample_rate_hz })
-    }
-
-    /// The bands.
-    pub fn bands(&self) -> ThirdOctaveBands {
-        self.bands
-    }
-
-    /// Bands that add up to the input, lowest first.
-    pub fn split(&self, samples: &[f32]) -> Vec<Vec<f32>> {
-        let last = self.bands.len() - 1;
-        self.filter(samples, |i, mask| {
-            let mut open = *mask;
-            if i == 0 {
-                open.lower_hz = None;
-            }
-            if i == last {
-                open.upper_hz = None;
-            }
-            (open, 2)
-        })
-    }
-
-    /// Bands limited on both sides whose energies add up, lowest first.
-    pub fn analyse(&self, samples: &[f32]) -> Vec<Vec<f32>> {
-        self.filter(samples, |_, mask| (*mask, 1))
-    }
-
-    fn filter(&self, samples: &[f32], adapt: impl Fn(usize, &BandMask) -> (BandMask, i32)) -> Vec<Vec<f32>> {
-        let samples: Vec<f64> = samples.iter().copied().map(f64::from).collect();
-        let spectrum = Spectrum::new(&samples, self.sample_rate_hz, padding_s(self.bands.edges_hz(0)));
-        (0..self.bands.len())
-            .map(|i| {
-                let (mask, power) = adapt(i, &BandMask::between(self.bands.edges_hz(i)));
-                let band = spectrum.filtered(mask.support_hz(), |hz| mask.gain(hz).powi(power));
-                band.into_iter().map(|x| x as f32).collect()
-            })
-            .collect()
-    }
-}
-
 /// Silence that must follow a signal so that a band's ringing does not wrap around, in seconds.
 pub(crate) fn padding_s(narrowest_edges_hz: (f64, f64)) -> f64 {
     PADDING_BANDWIDTH_TIMES / (narrowest_edges_hz.1 - narrowest_edges_hz.0)
@@ -266,7 +198,7 @@ mod tests {
             (3.0, 60.0, f64::INFINITY),
             (4.0, 70.0, f64::INFINITY),
         ];
-        let octaves = OctaveBands::SIMULATION;
+        let octaves = Bands::SIMULATION;
         let mask = BandMask::between(octaves.edges_hz(4));
         let ratio = octaves.edges_hz(4).1 / octaves.edges_hz(4).0;
         for (power, least, greatest) in limits {
@@ -279,7 +211,7 @@ mod tests {
 
     #[test]
     fn energies_of_the_bands_add_up_between_the_outer_centres() {
-        let bands = OctaveBands::SIMULATION;
+        let bands = Bands::SIMULATION;
         for step in 0..200 {
             let hz =
                 bands.exact_hz(0) * (bands.exact_hz(7) / bands.exact_hz(0)).powf(f64::from(step) / 199.0);
@@ -293,7 +225,7 @@ mod tests {
     fn a_band_keeps_the_time_of_an_impulse() {
         let mut input = vec![0.0; 4000];
         input[1234] = 1.0;
-        let bands = FilterBank::new(OctaveBands::T60, 16000).unwrap().analyse(&input);
+        let bands = FilterBank::new(Bands::T60, 16000).unwrap().analyse(&input);
         for (hz, band) in bands.iter() {
             let peak = (0..band.len()).max_by(|&a, &b| band[a].abs().total_cmp(&band[b].abs())).unwrap();
             assert_eq!(peak, 1234, "{hz} Hz");
@@ -307,7 +239,7 @@ mod tests {
     fn ringing_does_not_come_back_at_the_other_end() {
         let mut input = vec![0.0; 16000];
         input[15999] = 1.0;
-        let bands = FilterBank::new(OctaveBands::SIMULATION, 16000).unwrap().analyse(&input);
+        let bands = FilterBank::new(Bands::SIMULATION, 16000).unwrap().analyse(&input);
         for (hz, band) in bands.iter() {
             let start = band[..4000].iter().fold(0.0_f32, |peak, x| peak.max(x.abs()));
             assert!(start < 1e-5 * band[15999].abs(), "{hz} Hz: {start}"); // -100 dB
@@ -321,14 +253,14 @@ mod tests {
             samples in proptest::collection::vec(-1.0f32..1.0, 1..3000),
             rate in prop::sample::select(vec![8000u32, 16000, 44100, 48000]),
         ) {
-            let octaves = FilterBank::new(OctaveBands::SIMULATION, rate).unwrap().split(&samples);
-            let thirds = ThirdOctaveFilterBank::new(ThirdOctaveBands::new(50.0, 5000.0).unwrap(), rate)
+            let octaves = FilterBank::new(Bands::SIMULATION, rate).unwrap().split(&samples);
+            let thirds = FilterBank::new(Bands::third_octaves(50.0, 5000.0).unwrap(), rate)
                 .unwrap()
                 .split(&samples);
             for n in 0..samples.len() {
                 let sum: f32 = octaves.values().iter().map(|band| band[n]).sum();
                 prop_assert!((sum - samples[n]).abs() < 1e-5);
-                let sum: f32 = thirds.iter().map(|band| band[n]).sum();
+                let sum: f32 = thirds.values().iter().map(|band| band[n]).sum();
                 prop_assert!((sum - samples[n]).abs() < 1e-5);
             }
         }

@@ -14,7 +14,7 @@
 //! # Example
 //! What a room of known decay measures, and how sure the answer is:
 //! ```
-//! use sabine_acoustics::{ImpulseResponse, NoReading, OctaveBands, RoomParameters};
+//! use sabine_acoustics::{ImpulseResponse, NoReading, Bands, RoomParameters};
 //!
 //! // White noise whose energy falls by 60 dB in 0.8 s, 50 dB above a floor of noise.
 //! let mut state = 1u32;
@@ -25,7 +25,7 @@
 //! let samples = (0..24000).map(|i| (-6.9078 * i as f32 / 12800.0).exp() * white() + 0.00316 * white()).collect();
 //! let response = ImpulseResponse::new(samples, 16000)?;
 //!
-//! let room = RoomParameters::measure(&response, OctaveBands::T60)?;
+//! let room = RoomParameters::measure(&response, Bands::T60)?;
 //! let t60 = room.t60_s.at_hz(2000.0).unwrap().clone()?;
 //! assert!((t60.value - 0.8).abs() < 0.04);
 //! let (low, high) = t60.interval(4.0);
@@ -37,7 +37,7 @@
 //! ```
 //!
 //! # Contents
-//! - Bands: [`OctaveBands`], [`PerBand`], [`ThirdOctaveBands`] (IEC 61260-1).
+//! - [`Bands`], octaves or third octaves, and [`PerBand`] (IEC 61260-1).
 //! - Sound: [`Signal`], [`ImpulseResponse`] (**pressure**), [`read_audio`], [`write_wav`], [`resample()`].
 //! - Measures: [`RoomParameters`], [`BandParameters`] (full band and third octaves), [`DecayFit`], [`EnergyDecayCurve`],
 //!   [`equalisation()`], [`Onset`], [`FilterBank`]. A number comes as a [`Reading`]: an [`Estimate`] with its standard error, or
@@ -123,7 +123,6 @@ mod signal;
 mod spectrum;
 mod targets;
 mod theory;
-mod third_octaves;
 mod traits;
 mod weld;
 
@@ -133,7 +132,7 @@ pub use audio::{
     AudioInfo, Channel, SampleFormat, encode_wav, encode_wav_channels, probe_wav, read_audio, write_wav,
     write_wav_channels,
 };
-pub use bands::{OctaveBands, PerBand};
+pub use bands::{Bands, PerBand};
 pub use conditions::Conditions;
 pub use decay_fit::{DecayFit, Slope};
 pub use directivity::Directivity;
@@ -142,7 +141,7 @@ pub use energy::{EnergyDecayCurve, EnergyResponse};
 pub use equalisation::equalisation;
 pub use error::Error;
 pub use estimate::{Estimate, NoReading, Reading};
-pub use filter_bank::{FilterBank, ThirdOctaveFilterBank};
+pub use filter_bank::FilterBank;
 pub use material::Material;
 pub use material_library::{LibraryMaterial, library_material, material_library};
 pub use measured_room::{
@@ -160,6 +159,5 @@ pub use scene::{NamedMaterial, Receiver, Scene, Source, Triangle};
 pub use signal::{ImpulseResponse, Signal};
 pub use targets::RoomTargets;
 pub use theory::{DiffuseRoom, schroeder_frequency_hz};
-pub use third_octaves::ThirdOctaveBands;
 pub use traits::{Augment, FeatureExtractor, Objective, Propagator, RayHit, RayScene, RoomEstimator};
 pub use weld::WeldReport;

@@ -1,12 +1,12 @@
 //! Surfaces.
 
 use crate::error::check_range;
-use crate::{Error, OctaveBands, PerBand};
+use crate::{Bands, Error, PerBand};
 
 /// How a surface treats sound energy, per octave band.
 /// ```
-/// use sabine_acoustics::{Material, OctaveBands, PerBand};
-/// let bands = OctaveBands::new(500.0, 2000.0)?;
+/// use sabine_acoustics::{Material, Bands, PerBand};
+/// let bands = Bands::octaves(500.0, 2000.0)?;
 /// let curtain = Material::new(PerBand::new(bands, vec![0.4, 0.6, 0.7])?, PerBand::uniform(bands, 0.2))?;
 /// assert_eq!(curtain.absorption().at_hz(1000.0), Some(&0.6));
 /// assert!(Material::uniform(bands, 1.2, 0.1).is_err()); // more than all energy
@@ -40,7 +40,7 @@ impl Material {
     ///
     /// # Errors
     /// As [`Material::new`].
-    pub fn uniform(bands: OctaveBands, absorption: f64, scattering: f64) -> Result<Self, Error> {
+    pub fn uniform(bands: Bands, absorption: f64, scattering: f64) -> Result<Self, Error> {
         Self::new(PerBand::uniform(bands, absorption), PerBand::uniform(bands, scattering))
     }
 
@@ -55,7 +55,7 @@ impl Material {
     }
 
     /// The bands.
-    pub fn bands(&self) -> OctaveBands {
+    pub fn bands(&self) -> Bands {
         self.absorption.bands()
     }
 
@@ -67,9 +67,9 @@ impl Material {
         Self::new(absorption, self.scattering.clone())
     }
 
-    /// The same surface on another run of bands; a band that it lacks takes the nearest one's value.
+    /// The same surface on another run of bands; a band takes the mean over those that lie in it, or else the nearest one's value.
     #[must_use]
-    pub fn resampled(&self, bands: OctaveBands) -> Self {
-        Self { absorption: self.absorption.resampled(bands), scattering: self.scattering.resampled(bands) }
+    pub fn resampled(&self, bands: Bands) -> Self {
+        Self { absorption: self.absorption.averaged(bands), scattering: self.scattering.averaged(bands) }
     }
 }

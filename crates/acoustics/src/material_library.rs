@@ -1,6 +1,6 @@
 //! Common surfaces, from the literature.
 
-use crate::{Error, Material, OctaveBands, PerBand};
+use crate::{Bands, Error, Material, PerBand};
 
 /// A surface of the library: absorption from a published table, scattering from the depth of its relief.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,8 +27,8 @@ impl LibraryMaterial {
     ///
     /// # Errors
     /// None in practice: the tables are tested to lie within 0 to 1.
-    pub fn material(&self, bands: OctaveBands) -> Result<Material, Error> {
-        let absorption = PerBand::new(OctaveBands::T60, self.absorption.to_vec())?.resampled(bands);
+    pub fn material(&self, bands: Bands) -> Result<Material, Error> {
+        let absorption = PerBand::new(Bands::T60, self.absorption.to_vec())?.resampled(bands);
         let scattering = PerBand::from_fn(bands, |i| scattering_of_depth(self.depth_m, bands.exact_hz(i)));
         Material::new(absorption, scattering)
     }
@@ -46,9 +46,9 @@ fn scattering_of_depth(depth_m: f64, frequency_hz: f64) -> f64 {
 /// All surfaces of the library.
 ///
 /// ```
-/// use sabine_acoustics::{OctaveBands, library_material, material_library};
+/// use sabine_acoustics::{Bands, library_material, material_library};
 /// assert!(material_library().len() >= 25);
-/// let carpet = library_material("carpet_thin")?.material(OctaveBands::SIMULATION)?;
+/// let carpet = library_material("carpet_thin")?.material(Bands::SIMULATION)?;
 /// // A thin carpet on concrete swallows a fifth at 1 kHz and next to nothing in the bass.
 /// assert_eq!(carpet.absorption().at_hz(1000.0), Some(&0.2));
 /// assert_eq!(carpet.absorption().at_hz(62.5), Some(&0.02));
@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn every_surface_is_a_material_under_a_name_of_its_own() {
         for (i, surface) in LIBRARY.iter().enumerate() {
-            let material = surface.material(OctaveBands::SIMULATION).expect(surface.name);
+            let material = surface.material(Bands::SIMULATION).expect(surface.name);
             assert_eq!(material.absorption().values()[1..], surface.absorption);
             assert_eq!(library_material(surface.name).unwrap(), surface);
             assert!(LIBRARY[i + 1..].iter().all(|other| other.name != surface.name));

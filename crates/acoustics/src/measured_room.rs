@@ -8,7 +8,7 @@ pub use write::{NewResponse, NewRoom};
 
 use crate::audio::{Channel, probe_wav, read_audio};
 use crate::error::check_range;
-use crate::{Air, Error, ImpulseResponse, Material, Mesh, OctaveBands, PerBand, Receiver, Scene, Source};
+use crate::{Air, Bands, Error, ImpulseResponse, Material, Mesh, PerBand, Receiver, Scene, Source};
 use file::{AirTable, MaterialTable, PlaceTable, ResponseTable, RoomFile};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashSet};
@@ -277,7 +277,7 @@ impl MeasuredRoom {
     }
 
     /// The bands of the material tables.
-    pub fn bands(&self) -> OctaveBands {
+    pub fn bands(&self) -> Bands {
         self.scene.materials()[0].material.bands()
     }
 
@@ -354,18 +354,18 @@ fn read_text(path: &Path) -> Result<String, Error> {
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
-fn bands(centres_hz: &[f64]) -> Result<OctaveBands, Error> {
+fn bands(centres_hz: &[f64]) -> Result<Bands, Error> {
     for &centre in centres_hz {
         check_range("centre (Hz)", centre, 62.0, 16_500.0, "an octave centre from 62.5 to 16000")?;
     }
-    OctaveBands::from_centres_hz(centres_hz)
+    Bands::from_centres_hz(centres_hz)
 }
 
 type ByName<T> = BTreeMap<String, T>;
 
 fn materials(
     path: &Path,
-    bands: OctaveBands,
+    bands: Bands,
     tables: &ByName<MaterialTable>,
 ) -> Result<(ByName<Material>, ByName<MaterialPrior>), Error> {
     let mut found = (BTreeMap::new(), BTreeMap::new());

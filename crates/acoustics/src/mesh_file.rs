@@ -22,14 +22,14 @@ use std::path::{Path, PathBuf};
 /// order in which the faces first use them. Textures, normals, colours, cameras, skins and animations are not looked at.
 ///
 /// ```
-/// use sabine_acoustics::{Material, Mesh, OctaveBands};
+/// use sabine_acoustics::{Material, Mesh, Bands};
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("tent.obj");
 /// std::fs::write(&path, "v 0 0 0\nv 4 0 0\nv 0 4 0\nv 0 0 4\nusemtl ground\nf 1 2 3\nusemtl cloth\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
 /// let mesh = Mesh::read(&path)?;
 /// assert_eq!(mesh.material_names(), ["ground", "cloth"]);
-/// let cloth = Material::uniform(OctaveBands::SIMULATION, 0.2, 0.3)?;
-/// let ground = Material::uniform(OctaveBands::SIMULATION, 0.1, 0.5)?;
+/// let cloth = Material::uniform(Bands::SIMULATION, 0.2, 0.3)?;
+/// let ground = Material::uniform(Bands::SIMULATION, 0.1, 0.5)?;
 /// let scene = mesh.into_scene(&[("cloth".into(), cloth), ("ground".into(), ground)].into())?;
 /// assert!((scene.volume_m3() - 32.0 / 3.0).abs() < 1e-9);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -200,7 +200,7 @@ impl MeshDraft {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::OctaveBands;
+    use crate::Bands;
 
     /// A square without name beside one of glass.
     fn squares() -> Mesh {
@@ -215,7 +215,7 @@ mod tests {
     #[test]
     fn materials_and_names_must_match() {
         let scene = |names: &[&str]| {
-            let material = Material::uniform(OctaveBands::T60, 0.1, 0.1).unwrap();
+            let material = Material::uniform(Bands::T60, 0.1, 0.1).unwrap();
             squares().into_scene(&names.iter().map(|&name| (name.to_owned(), material.clone())).collect())
         };
         let whole = scene(&["glass", "default"]).unwrap();

@@ -2,8 +2,7 @@
 
 use crate::band_energy::{BandEnergy, Prepared};
 use crate::{
-    DecayFit, EnergyDecayCurve, Error, Estimate, ImpulseResponse, NoReading, OctaveBands, Onset, PerBand,
-    Reading, ThirdOctaveBands,
+    Bands, DecayFit, EnergyDecayCurve, Error, Estimate, ImpulseResponse, NoReading, Onset, PerBand, Reading,
 };
 
 /// The noise must lie this far below the lowest level that a regression uses (ISO 3382-1, 5.3.3), in dB.
@@ -65,8 +64,8 @@ impl BandParameters {
         }
     }
 
-    /// The parameters in third-octave bands, lowest first.
-    pub fn third_octaves(response: &ImpulseResponse, bands: ThirdOctaveBands) -> Vec<Self> {
+    /// The parameters in each band, lowest first.
+    pub fn in_bands(response: &ImpulseResponse, bands: Bands) -> Vec<Self> {
         Prepared::new(response)
             .bands((0..bands.len()).map(|i| bands.edges_hz(i)))
             .into_iter()
@@ -117,7 +116,7 @@ impl BandParameters {
 /// The parameters of a response in octave bands.
 ///
 /// ```
-/// use sabine_acoustics::{ImpulseResponse, NoReading, OctaveBands, RoomParameters};
+/// use sabine_acoustics::{ImpulseResponse, NoReading, Bands, RoomParameters};
 /// // White noise under an envelope that falls by 60 dB in 0.5 s.
 /// let mut state = 7u32;
 /// let samples = (0..16000).map(|i| {
@@ -125,7 +124,7 @@ impl BandParameters {
 ///     ((state >> 8) as f32 / 8388608.0 - 1.0) * (-6.9078 * i as f32 / 8000.0).exp()
 /// });
 /// let response = ImpulseResponse::new(samples.collect(), 16000)?;
-/// let room = RoomParameters::measure(&response, OctaveBands::T60)?;
+/// let room = RoomParameters::measure(&response, Bands::T60)?;
 /// let t60 = room.t60_s.at_hz(1000.0).unwrap().as_ref().unwrap();
 /// assert!((t60.value - 0.5).abs() < 4.0 * t60.standard_error);
 /// // The 8 kHz octave reaches up to 11.2 kHz, which a sample rate of 16 kHz cannot hold.
@@ -164,7 +163,7 @@ impl RoomParameters {
     ///
     /// # Errors
     /// None at present: an [`ImpulseResponse`] is checked when it is made.
-    pub fn measure(response: &ImpulseResponse, bands: OctaveBands) -> Result<Self, Error> {
+    pub fn measure(response: &ImpulseResponse, bands: Bands) -> Result<Self, Error> {
         let prepared = Prepared::new(response);
         let read: Vec<BandParameters> = prepared
             .bands((0..bands.len()).map(|i| bands.edges_hz(i)))
@@ -191,7 +190,7 @@ impl RoomParameters {
     }
 
     /// The bands.
-    pub fn bands(&self) -> OctaveBands {
+    pub fn bands(&self) -> Bands {
         self.t60_s.bands()
     }
 }

@@ -1,8 +1,6 @@
 //! Room-acoustic parameters of traced paths, with the Monte-Carlo error that the rays leave in them.
 
-use crate::{
-    Conditions, EnergyDecayCurve, Error, Estimate, NoReading, OctaveBands, PathSet, PerBand, Reading,
-};
+use crate::{Bands, Conditions, EnergyDecayCurve, Error, Estimate, NoReading, PathSet, PerBand, Reading};
 
 /// Step of the decay curve, in seconds.
 const STEP_S: f64 = 1e-3;
@@ -71,7 +69,7 @@ impl PathParameters {
     ///         batch: Some((i % 32) as u8),
     ///     });
     /// }
-    /// let (wall, air) = ([Material::uniform(OctaveBands::new(125.0, 125.0)?, 0.1, 0.1)?], Air::default());
+    /// let (wall, air) = ([Material::uniform(Bands::octaves(125.0, 125.0)?, 0.1, 0.1)?], Air::default());
     /// let room = PathParameters::read(&paths, &Conditions::new(&wall, &air))?;
     /// let t30_s = room.t30_s.values()[0].clone()?;
     /// assert!((t30_s.value - 0.5).abs() < 1e-3 && t30_s.standard_error < 1e-3);
@@ -100,7 +98,7 @@ impl PathParameters {
         Ok(Self::of(bands, &read))
     }
 
-    fn of(bands: OctaveBands, read: &[[Reading; QUANTITIES]]) -> Self {
+    fn of(bands: Bands, read: &[[Reading; QUANTITIES]]) -> Self {
         let pick = |quantity: usize| PerBand::from_fn(bands, |band| read[band][quantity].clone());
         Self {
             edt_s: pick(0),
@@ -115,7 +113,7 @@ impl PathParameters {
     }
 
     /// The bands.
-    pub fn bands(&self) -> OctaveBands {
+    pub fn bands(&self) -> Bands {
         self.t30_s.bands()
     }
 }

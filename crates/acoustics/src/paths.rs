@@ -7,7 +7,7 @@ pub use incidence::Incidence;
 use crate::packed_direction::{pack_direction, unpack_direction};
 use crate::reweighting::{LANES, Lanes, exp, sums_along};
 use crate::{
-    Air, Conditions, Directivity, EdgeDiffraction, EnergyResponse, Error, Material, OctaveBands, Orientation,
+    Air, Bands, Conditions, Directivity, EdgeDiffraction, EnergyResponse, Error, Material, Orientation,
 };
 use rayon::prelude::*;
 
@@ -49,14 +49,14 @@ pub struct Contribution {
 /// Energies are scaled so that the direct sound at 1 m is 1.
 ///
 /// ```
-/// use sabine_acoustics::{Air, Contribution, Material, OctaveBands, PathSet, Reflection};
+/// use sabine_acoustics::{Air, Contribution, Material, Bands, PathSet, Reflection};
 /// let mut paths = PathSet::new(1, 100.0);
 /// let floor = paths.reflect(PathSet::DIRECT, 0, Reflection::Specular);
 /// let up = [0.0, 0.0, 1.0];
 /// paths.push(Contribution {
 ///     length_m: 5.0, log_weight: -2.0 * 5f64.ln(), chain: floor, tail: PathSet::DIRECT,
 ///     departure: up, arrival: up, batch: None });
-/// let hard = Material::uniform(OctaveBands::T60, 0.2, 0.0)?;
+/// let hard = Material::uniform(Bands::T60, 0.2, 0.0)?;
 /// let energy = paths.energies(&[hard], &Air::default())?;
 /// // 1/25 of the energy at 1 m, less 20 % in the floor and a little in 5 m of air.
 /// assert!((energy[0][0] / (0.8 / 25.0) - 1.0).abs() < 1e-3);
@@ -152,7 +152,7 @@ impl PathSet {
     }
 
     /// Adds a path that bends around an edge: its energy in each band is that of the contribution times
-    /// [`EdgeDiffraction::octave_energy_gain`]. The contribution is exact, without reflections, as long as the way around the
+    /// [`EdgeDiffraction::band_energy_gain`]. The contribution is exact, without reflections, as long as the way around the
     /// edge, and of the weight of an undisturbed path of that length. Directions are as in [`Contribution`].
     pub fn push_diffracted(&mut self, departure: [f64; 3], arrival: [f64; 3], diffraction: EdgeDiffraction) {
         let length_m = diffraction.length_m();
@@ -479,10 +479,10 @@ impl PathSet {
         Ok(energies)
     }
 
-    fn weigh_diffractions(&self, energies: &mut [Vec<f32>], bands: OctaveBands, speed_m_s: f64) {
+    fn weigh_diffractions(&self, energies: &mut [Vec<f32>], bands: Bands, speed_m_s: f64) {
         for (contribution, diffraction) in &self.diffractions {
             for (band, column) in energies.iter_mut().enumerate() {
-                column[*contribution] *= diffraction.octave_energy_gain(bands, band, speed_m_s) as f32;
+                column[*contribution] *= diffraction.band_energy_gain(bands, band, speed_m_s) as f32;
             }
         }
     }
@@ -542,7 +542,7 @@ impl PathSet {
         EnergyResponse::new(bands, bin_s, energy, standard_error)
     }
 
-    fn check_materials(&self, materials: &[Material]) -> Result<OctaveBands, Error> {
+    fn check_materials(&self, materials: &[Material]) -> Result<Bands, Error> {
         if materials.len() != self.materials || materials.is_empty() {
             return Err(Error::MaterialCount { expected: self.materials, found: materials.len() });
         }
@@ -603,7 +603,7 @@ mod tests {
         let a = paths.reflect(PathSet::DIRECT, 0, Reflection::Specular);
         let ab = paths.reflect(a, 1, Reflection::Scattered);
         paths.push(path(10.0, 0.0, ab, Some(0)));
-        let bands = OctaveBands::new(1000.0, 1000.0).unwrap();
+        let bands = Bands::octaves(1000.0, 1000.0).unwrap();
         let materials =
             [Material::uniform(bands, 0.5, 0.2).unwrap(), Material::uniform(bands, 0.1, 0.3).unwrap()];
         let air = Air::default();
@@ -618,7 +618,7 @@ mod tests {
     fn attenuation_may_come_from_another_air() {
         let mut paths = PathSet::new(1, 100.0);
         paths.push(path(50.0, 0.0, PathSet::DIRECT, None));
-        let bands = OctaveBands::new(8000.0, 8000.0).unwrap();
+        let bands = Bands::octaves(8000.0, 8000.0).unwrap();
         let wall = [Material::uniform(bands, 0.1, 0.1).unwrap()];
         let (air, dry) = (Air::default(), Air::new(20.0, 10.0, 101.325).unwrap());
         let found = paths.energies_under(&Conditions::new(&wall, &air).with_attenuation(&dry)).unwrap()[0][0];
@@ -634,7 +634,7 @@ mod tests {
         let back = right.reflect(PathSet::DIRECT, 1, Reflection::Scattered);
         right.push(Contribution { tail: back, ..path(3.0, 0.0, out, None) });
         left.append(&right);
-        let bands = OctaveBands::new(1000.0, 1000.0).unwrap();
+        let bands = Bands::octaves(1000.0, 1000.0).unwrap();
         let materials =
             [Material::uniform(bands, 0.5, 0.2).unwrap(), Material::uniform(bands, 0.1, 0.3).unwrap()];
         let air = Air::default();
@@ -650,7 +650,7 @@ mod tests {
         let hit = paths.reflect(PathSet::DIRECT, 0, Reflection::Specular);
         paths.push(path(1.0, 0.0, PathSet::DIRECT, None));
         paths.push(path(2.0, 0.0, hit, None));
-        let black = Material::uniform(OctaveBands::T60, 1.0, 0.0).unwrap();
+        let black = Material::uniform(Bands::T60, 1.0, 0.0).unwrap();
         let energy = paths.energies(&[black], &Air::default()).unwrap();
         assert!(energy[0][0] > 0.9 && energy[0][1] == 0.0);
     }
@@ -694,7 +694,7 @@ mod tests {
         for batch in 0..PathSet::BATCHES {
             paths.push(path(1.0, f64::from(batch % 2) * 2f64.ln(), PathSet::DIRECT, Some(batch)));
         }
-        let bands = OctaveBands::new(125.0, 125.0).unwrap();
+        let bands = Bands::octaves(125.0, 125.0).unwrap();
         let m = Material::uniform(bands, 0.0, 0.0).unwrap();
         let response = paths.energy_response(&[m], &Air::default(), 0.01).unwrap();
         // 16 batches of 1 and 16 of 2: mean 1.5, sample variance 8/31, sum of 32 independent parts.
@@ -705,7 +705,7 @@ mod tests {
     #[test]
     fn the_wrong_number_of_materials_is_refused() {
         let paths = PathSet::new(2, 10.0);
-        let m = Material::uniform(OctaveBands::T60, 0.1, 0.1).unwrap();
+        let m = Material::uniform(Bands::T60, 0.1, 0.1).unwrap();
         assert!(matches!(
             paths.energies(&[m], &Air::default()),
             Err(Error::MaterialCount { expected: 2, found: 1 })

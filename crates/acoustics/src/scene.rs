@@ -26,8 +26,8 @@ pub struct NamedMaterial {
 /// Indices are checked, coordinates are finite and all materials share their bands. Whether the mesh is closed is for the
 /// tracer to say.
 /// ```
-/// use sabine_acoustics::{Material, OctaveBands, Scene};
-/// let wall = Material::uniform(OctaveBands::SIMULATION, 0.1, 0.2)?;
+/// use sabine_acoustics::{Material, Bands, Scene};
+/// let wall = Material::uniform(Bands::SIMULATION, 0.1, 0.2)?;
 /// let room = Scene::shoebox([5.0, 4.0, 3.0], std::array::from_fn(|_| wall.clone()))?;
 /// assert!((room.volume_m3() - 60.0).abs() < 1e-9 && (room.surface_m2() - 94.0).abs() < 1e-9);
 /// # Ok::<(), sabine_acoustics::Error>(())
@@ -261,11 +261,11 @@ pub(crate) fn norm(a: [f64; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::OctaveBands;
+    use crate::Bands;
 
     #[test]
     fn the_box_knows_its_size() {
-        let m = Material::uniform(OctaveBands::SIMULATION, 0.1, 0.1).unwrap();
+        let m = Material::uniform(Bands::SIMULATION, 0.1, 0.1).unwrap();
         let scene = Scene::shoebox([10.0, 7.0, 3.0], std::array::from_fn(|_| m.clone())).unwrap();
         assert!((scene.volume_m3() - 210.0).abs() < 1e-9);
         assert!((scene.surface_m2() - 242.0).abs() < 1e-9);
@@ -276,7 +276,7 @@ mod tests {
 
     #[test]
     fn faces_of_the_box_look_inward() {
-        let m = Material::uniform(OctaveBands::SIMULATION, 0.1, 0.1).unwrap();
+        let m = Material::uniform(Bands::SIMULATION, 0.1, 0.1).unwrap();
         let scene = Scene::shoebox([4.0, 3.0, 2.0], std::array::from_fn(|_| m.clone())).unwrap();
         for i in 0..12 {
             let [a, b, c] = scene.corners_m(i);
@@ -286,7 +286,7 @@ mod tests {
 
     #[test]
     fn wild_indices_and_coordinates_are_refused() {
-        let m = Material::uniform(OctaveBands::SIMULATION, 0.1, 0.1).unwrap();
+        let m = Material::uniform(Bands::SIMULATION, 0.1, 0.1).unwrap();
         let named = || vec![NamedMaterial { name: "wall".into(), material: m.clone() }];
         let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         let bad_vertex = vec![Triangle { vertices: [0, 1, 3], material: 0 }];

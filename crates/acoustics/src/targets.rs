@@ -1,13 +1,13 @@
 //! What a room should sound like.
 
-use crate::{Error, Estimate, OctaveBands, PerBand};
+use crate::{Bands, Error, Estimate, PerBand};
 
 /// Reverberation time and equalisation per octave: what the estimator hears and the fit aims at.
 /// ```
-/// use sabine_acoustics::{Estimate, OctaveBands, PerBand, RoomTargets};
+/// use sabine_acoustics::{Estimate, Bands, PerBand, RoomTargets};
 /// let targets = RoomTargets::new(
-///     PerBand::uniform(OctaveBands::T60, Estimate::new(0.6, 0.05)),
-///     PerBand::uniform(OctaveBands::EQ, Estimate::exact(0.0)),
+///     PerBand::uniform(Bands::T60, Estimate::new(0.6, 0.05)),
+///     PerBand::uniform(Bands::EQ, Estimate::exact(0.0)),
 /// )?;
 /// let (low, high) = targets.t60_s().at_hz(1000.0).unwrap().interval(2.0);
 /// assert!((low - 0.5).abs() < 1e-9 && (high - 0.7).abs() < 1e-9);
@@ -20,14 +20,14 @@ pub struct RoomTargets {
 }
 
 impl RoomTargets {
-    /// Reverberation times in seconds at 125 Hz to 8 kHz ([`OctaveBands::T60`]) and levels in dB at 62.5 Hz to 4 kHz
-    /// ([`OctaveBands::EQ`]), the latter relative to 1 kHz, where it is 0.
+    /// Reverberation times in seconds at 125 Hz to 8 kHz ([`Bands::T60`]) and levels in dB at 62.5 Hz to 4 kHz
+    /// ([`Bands::EQ`]), the latter relative to 1 kHz, where it is 0.
     ///
     /// # Errors
     /// [`Error::BandMismatch`] for other bands, [`Error::OutOfRange`] for a time that is not positive or a level that is not
     /// finite.
     pub fn new(t60_s: PerBand<Estimate>, eq_db: PerBand<Estimate>) -> Result<Self, Error> {
-        for (found, expected) in [(t60_s.bands(), OctaveBands::T60), (eq_db.bands(), OctaveBands::EQ)] {
+        for (found, expected) in [(t60_s.bands(), Bands::T60), (eq_db.bands(), Bands::EQ)] {
             if found != expected {
                 return Err(Error::BandMismatch { left: expected, right: found });
             }

@@ -1,7 +1,7 @@
 //! Reverberation formulas: what theory expects of a room, kept apart from what is measured.
 
 use crate::error::check_range;
-use crate::{Air, Error, OctaveBands, PerBand, Scene};
+use crate::{Air, Bands, Error, PerBand, Scene};
 use std::f64::consts::{LN_10, PI};
 
 /// A room as statistical acoustics sees it: a volume, surfaces, air. All formulas assume a diffuse field; in rooms where the
@@ -54,7 +54,7 @@ impl DiffuseRoom {
     ///
     /// # Errors
     /// As [`DiffuseRoom::new`]; [`Error::BandMismatch`] if the materials are not given in these bands.
-    pub fn of_scene(scene: &Scene, air: &Air, bands: OctaveBands) -> Result<PerBand<Self>, Error> {
+    pub fn of_scene(scene: &Scene, air: &Air, bands: Bands) -> Result<PerBand<Self>, Error> {
         let exponents = air.energy_exponent_per_m(bands);
         for named in scene.materials() {
             let found = named.material.absorption().bands();
@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn a_scene_gives_the_same_room_as_its_numbers() {
-        let bands = OctaveBands::SIMULATION;
+        let bands = Bands::SIMULATION;
         let material = Material::uniform(bands, 0.1, 0.1).unwrap();
         let scene = Scene::shoebox([10.0, 7.0, 3.0], std::array::from_fn(|_| material.clone())).unwrap();
         let air = Air::default();
@@ -183,10 +183,7 @@ mod tests {
         let exponent = air.energy_exponent_per_m(bands).values()[4];
         let room = DiffuseRoom::new(210.0, &[(242.0, 0.1)], air.speed_of_sound_m_s(), exponent).unwrap();
         assert!((rooms.values()[4].eyring_t60_s() - room.eyring_t60_s()).abs() < 1e-9);
-        assert!(matches!(
-            DiffuseRoom::of_scene(&scene, &air, OctaveBands::T60),
-            Err(Error::BandMismatch { .. })
-        ));
+        assert!(matches!(DiffuseRoom::of_scene(&scene, &air, Bands::T60), Err(Error::BandMismatch { .. })));
     }
 
     #[test]

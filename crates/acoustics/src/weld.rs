@@ -108,8 +108,8 @@ impl Scene {
     /// all materials, even those that no triangle has any more.
     ///
     /// ```
-    /// use sabine_acoustics::{Material, OctaveBands, Scene};
-    /// let wall = Material::uniform(OctaveBands::SIMULATION, 0.1, 0.1)?;
+    /// use sabine_acoustics::{Material, Bands, Scene};
+    /// let wall = Material::uniform(Bands::SIMULATION, 0.1, 0.1)?;
     /// let room = Scene::shoebox([4.0, 3.0, 2.0], std::array::from_fn(|_| wall.clone()))?;
     /// let (same, report) = room.welded(Scene::WELD_TOLERANCE_M)?;
     /// assert_eq!(same, room);
@@ -170,11 +170,11 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Material, NamedMaterial, OctaveBands};
+    use crate::{Bands, Material, NamedMaterial};
     use proptest::prelude::*;
 
     fn scene(vertices: Vec<[f64; 3]>, triangles: &[([u32; 3], u32)]) -> Scene {
-        let material = Material::uniform(OctaveBands::T60, 0.1, 0.1).unwrap();
+        let material = Material::uniform(Bands::T60, 0.1, 0.1).unwrap();
         let named = |name: &str| NamedMaterial { name: name.into(), material: material.clone() };
         let triangles =
             triangles.iter().map(|&(vertices, material)| Triangle { vertices, material }).collect();

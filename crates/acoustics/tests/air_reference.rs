@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
-use sabine_acoustics::{Air, ThirdOctaveBands};
+use sabine_acoustics::{Air, Bands};
 
 /// Rows of ISO 9613-1 as published with python-acoustics: dB/km in third octaves, three digits each. They hold for the exact
 /// mid-band frequencies: at the nominal ones the same formula is off by up to 1.7 %.
@@ -19,7 +19,7 @@ fn every_reference_row_is_met_at_the_exact_centres() {
     let mut lines = table.lines();
     let centres_hz: Vec<f64> =
         lines.next().unwrap().split(',').skip(2).map(|cell| cell.trim().parse().unwrap()).collect();
-    let bands = ThirdOctaveBands::new(centres_hz[0], centres_hz[centres_hz.len() - 1]).unwrap();
+    let bands = Bands::third_octaves(centres_hz[0], centres_hz[centres_hz.len() - 1]).unwrap();
     assert_eq!(bands.len(), centres_hz.len());
     let (mut rows, mut worst, mut worst_at_nominal) = (0, 0.0_f64, 0.0_f64);
     for line in lines.filter(|line| !line.trim().is_empty()) {

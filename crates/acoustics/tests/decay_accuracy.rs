@@ -7,7 +7,7 @@
 
 mod synthetic;
 
-use sabine_acoustics::{BandParameters, NoReading, OctaveBands, RoomParameters};
+use sabine_acoustics::{BandParameters, Bands, NoReading, RoomParameters};
 use synthetic::{decay, noise};
 
 const TIMES_S: [f64; 4] = [0.2, 0.5, 1.0, 2.0];
@@ -51,7 +51,7 @@ fn intervals_cover_the_truth() {
             full += 1;
             full_hits += holds(found.interval(1.96));
         }
-        let room = RoomParameters::measure(&response, OctaveBands::new(125.0, 4000.0).unwrap()).unwrap();
+        let room = RoomParameters::measure(&response, Bands::octaves(125.0, 4000.0).unwrap()).unwrap();
         for found in room.t60_s.values().iter().flatten() {
             octaves += 1;
             octave_hits += holds(found.interval(1.96));
@@ -89,7 +89,7 @@ fn two_slopes_are_told_apart() {
 /// square of the normalised errors has a standard deviation of 0.29: the bound is 3 of them above 1.
 #[test]
 fn the_errors_of_two_slopes_in_one_octave_are_as_stated() {
-    let octave = OctaveBands::new(1000.0, 1000.0).unwrap();
+    let octave = Bands::octaves(1000.0, 1000.0).unwrap();
     for level_db in [-10.0, -20.0, -30.0] {
         let (mut squares, mut percent) = ([0.0; 2], [0.0; 2]);
         for seed in 0..24 {
@@ -125,7 +125,7 @@ fn single_slopes_stay_single() {
 /// within 4 standard deviations (0.57) of 1 at the upper end; the mean error within 4 standard errors of zero.
 #[test]
 fn decay_times_of_the_curve_are_unbiased_and_their_errors_are_as_stated() {
-    let octave = OctaveBands::new(1000.0, 1000.0).unwrap();
+    let octave = Bands::octaves(1000.0, 1000.0).unwrap();
     let t60_s = 0.8;
     let mut normalised = [const { Vec::new() }; 3];
     for seed in 0..100 {
@@ -147,8 +147,7 @@ fn decay_times_of_the_curve_are_unbiased_and_their_errors_are_as_stated() {
 /// Where the noise, the length or the sample rate leave no answer, the reason says so.
 #[test]
 fn noise_hides_what_it_hides() {
-    let room =
-        RoomParameters::measure(&decay(16000, 1.5, &[(0.5, 0.0)], -40.0, 1), OctaveBands::T60).unwrap();
+    let room = RoomParameters::measure(&decay(16000, 1.5, &[(0.5, 0.0)], -40.0, 1), Bands::T60).unwrap();
     let at = |reading: &sabine_acoustics::PerBand<sabine_acoustics::Reading>| {
         reading.at_hz(1000.0).unwrap().clone()
     };
@@ -161,13 +160,13 @@ fn noise_hides_what_it_hides() {
     assert!(matches!(room.t60_s.at_hz(8000.0), Some(Err(NoReading::AboveNyquist { sample_rate_hz: 16000 }))));
     // A decay that the lowest filter cannot follow.
     let dead = decay(16000, 0.5, &[(0.06, 0.0)], -60.0, 2);
-    let room = RoomParameters::measure(&dead, OctaveBands::EQ).unwrap();
+    let room = RoomParameters::measure(&dead, Bands::EQ).unwrap();
     assert!(matches!(
         room.t60_s.values()[0],
         Err(NoReading::FilterRinging { .. } | NoReading::Uncertain { .. } | NoReading::DynamicRange { .. })
     ));
     for seed in 0..20 {
-        let room = RoomParameters::measure(&noise(16000, 1.0, 60_000 + seed), OctaveBands::T60).unwrap();
+        let room = RoomParameters::measure(&noise(16000, 1.0, 60_000 + seed), Bands::T60).unwrap();
         assert!(room.t60_s.values().iter().all(Result::is_err), "seed {seed}: {:?}", room.t60_s);
     }
 }

@@ -8,9 +8,9 @@ mod process;
 
 use process::snapshot;
 use sabine_acoustics::{
-    Channel, Error, ImpulseResponse, Levels, Material, MaterialPrior, MeasuredRoom, Measurement,
-    NamedMaterial, NewResponse, NewRoom, OctaveBands, PerBand, Receiver, SampleFormat, Scene, Source,
-    TimeZero, Triangle, read_audio, write_atomically, write_wav, write_wav_channels,
+    Bands, Channel, Error, ImpulseResponse, Levels, Material, MaterialPrior, MeasuredRoom, Measurement,
+    NamedMaterial, NewResponse, NewRoom, PerBand, Receiver, SampleFormat, Scene, Source, TimeZero, Triangle,
+    read_audio, write_atomically, write_wav, write_wav_channels,
 };
 use std::io::Write;
 use std::path::Path;
@@ -21,7 +21,7 @@ const MANY: usize = 500_000;
 
 fn room(samples: usize) -> NewRoom {
     let place = |id: &str, x: f64| (id.to_owned(), [x, 1.0, 1.0]);
-    let material = Material::uniform(OctaveBands::T60, 0.2, 0.1).unwrap();
+    let material = Material::uniform(Bands::T60, 0.2, 0.1).unwrap();
     let faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
     let vertices = vec![[0.0; 3], [9.0, 0.0, 0.0], [0.0, 9.0, 0.0], [0.0, 0.0, 9.0]];
     let triangles = faces.map(|vertices| Triangle { vertices, material: 0 }).into();
@@ -37,10 +37,7 @@ fn room(samples: usize) -> NewRoom {
         samples: ImpulseResponse::new(vec![0.5; samples], 48_000).unwrap(),
     };
     NewRoom {
-        priors: vec![MaterialPrior {
-            absorption: None,
-            absorption_sd: PerBand::uniform(OctaveBands::T60, 0.2),
-        }],
+        priors: vec![MaterialPrior { absorption: None, absorption_sd: PerBand::uniform(Bands::T60, 0.2) }],
         scene,
         air: None,
         measurement: Measurement { time_zero: TimeZero::Emission, levels: Levels::Absolute },

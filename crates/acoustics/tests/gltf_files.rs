@@ -3,7 +3,7 @@
 
 use base64::Engine;
 use proptest::prelude::*;
-use sabine_acoustics::{Error, Material, MeasuredRoom, Mesh, OctaveBands, Scene};
+use sabine_acoustics::{Bands, Error, Material, MeasuredRoom, Mesh, Scene};
 use serde_json::{Value, json};
 use std::path::Path;
 use tempfile::TempDir;
@@ -14,7 +14,7 @@ fn corners() -> Vec<[f64; 3]> {
 }
 
 fn shoebox() -> Scene {
-    let wall = Material::uniform(OctaveBands::T60, 0.1, 0.1).unwrap();
+    let wall = Material::uniform(Bands::T60, 0.1, 0.1).unwrap();
     Scene::shoebox([4.0, 3.0, 2.0], std::array::from_fn(|_| wall.clone())).unwrap()
 }
 
@@ -95,7 +95,7 @@ fn read_with(mut document: Value, bin: &[u8]) -> Result<Mesh, Error> {
 }
 
 fn scene(mesh: Mesh) -> Scene {
-    let material = Material::uniform(OctaveBands::T60, 0.1, 0.1).unwrap();
+    let material = Material::uniform(Bands::T60, 0.1, 0.1).unwrap();
     let materials = mesh.material_names().iter().map(|name| (name.clone(), material.clone())).collect();
     mesh.into_scene(&materials).unwrap()
 }

@@ -6,12 +6,12 @@ mod synthetic;
 
 use proptest::prelude::*;
 use sabine_acoustics::{
-    BandParameters, Estimate, ImpulseResponse, NoReading, OctaveBands, Reading, RoomParameters, equalisation,
+    BandParameters, Bands, Estimate, ImpulseResponse, NoReading, Reading, RoomParameters, equalisation,
 };
 
 /// Every reading of a response: octaves and full band.
 fn readings(response: &ImpulseResponse) -> Vec<(&'static str, f64, Reading)> {
-    let bands = OctaveBands::SIMULATION;
+    let bands = Bands::SIMULATION;
     let room = RoomParameters::measure(response, bands).unwrap();
     let full = BandParameters::full_band(response);
     let mut all = Vec::new();
@@ -100,7 +100,7 @@ fn a_pulse_on_noise_has_no_decay_time() {
 #[test]
 fn a_truncated_response_is_read_as_far_as_it_goes() {
     let response = synthetic::decay(16000, 0.3, &[(1.0, 0.0)], -80.0, 5);
-    let room = RoomParameters::measure(&response, OctaveBands::EQ).unwrap();
+    let room = RoomParameters::measure(&response, Bands::EQ).unwrap();
     // 18 dB of decay.
     for (i, (t20, t60)) in room.t20_s.values().iter().zip(room.t60_s.values()).enumerate() {
         assert!(t20.is_err(), "{i}: {t20:?}");
@@ -112,7 +112,7 @@ fn a_truncated_response_is_read_as_far_as_it_goes() {
     let mut short = vec![0.0; 400];
     short.extend_from_slice(&response.samples()[..960]);
     let short = ImpulseResponse::new(short, 16000).unwrap();
-    let room = RoomParameters::measure(&short, OctaveBands::EQ).unwrap();
+    let room = RoomParameters::measure(&short, Bands::EQ).unwrap();
     assert!(room.c80_db.values().iter().all(|c| matches!(c, Err(NoReading::TooShort { .. }))));
     // 10 ms of what comes after 50 ms are not the late energy.
     assert!(room.c50_db.values().iter().all(Result::is_err));
@@ -133,8 +133,8 @@ fn offset_and_silence_do_not_disturb() {
     let silent = BandParameters::full_band(&framed).t60_s.unwrap();
     assert!((silent.value - plain.value).abs() < 0.5 * plain.standard_error);
     let (a, b) = (
-        RoomParameters::measure(&clean, OctaveBands::EQ).unwrap(),
-        RoomParameters::measure(&framed, OctaveBands::EQ).unwrap(),
+        RoomParameters::measure(&clean, Bands::EQ).unwrap(),
+        RoomParameters::measure(&framed, Bands::EQ).unwrap(),
     );
     for (a, b) in a.t60_s.values().iter().zip(b.t60_s.values()) {
         let (a, b) = (a.clone().unwrap(), b.clone().unwrap());

@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used)] // the helpers of tests may panic as the tests do
 
 use sabine_acoustics::{
-    Air, Error, ImpulseResponse, Levels, MaterialPrior, MeasuredRoom, Measurement, NewResponse, NewRoom,
-    OctaveBands, Receiver, SampleFormat, Scene, Source, TimeZero, library_material, write_wav,
+    Air, Bands, Error, ImpulseResponse, Levels, MaterialPrior, MeasuredRoom, Measurement, NewResponse,
+    NewRoom, Receiver, SampleFormat, Scene, Source, TimeZero, library_material, write_wav,
 };
 use std::path::Path;
 use tempfile::TempDir;
@@ -63,7 +63,7 @@ fn a_good_room_is_read_as_it_stands() {
     assert_eq!(room.scene().triangles().len(), 12);
     let names: Vec<_> = room.scene().materials().iter().map(|m| m.name.as_str()).collect();
     assert_eq!(names, ["floor", "wall"]);
-    assert_eq!(room.bands(), OctaveBands::new(500.0, 1000.0).unwrap());
+    assert_eq!(room.bands(), Bands::octaves(500.0, 1000.0).unwrap());
     let (floor, wall) = (&room.priors()[0], &room.priors()[1]);
     assert_eq!(floor.absorption, None);
     assert_eq!(floor.absorption_sd.values(), [MaterialPrior::UNKNOWN_ABSORPTION_SD; 2]);
@@ -313,7 +313,7 @@ fn each_fault_of_a_response_is_named_with_its_file() {
 }
 
 fn new_room() -> NewRoom {
-    let bands = OctaveBands::T60;
+    let bands = Bands::T60;
     let surface = |name: &str| library_material(name).unwrap().material(bands).unwrap();
     let scene = Scene::shoebox(
         [5.0, 4.0, 3.0],

@@ -47,7 +47,7 @@ fn thrown(seed: u64, count: u32, speed_m_s: f64) -> PathSet {
 
 /// Air and walls that take nothing: 62.5 Hz in dry air, short paths.
 fn nothing_lost() -> ([Material; 1], Air) {
-    let bands = OctaveBands::new(62.5, 62.5).unwrap();
+    let bands = Bands::octaves(62.5, 62.5).unwrap();
     ([Material::uniform(bands, 0.0, 0.0).unwrap()], Air::default())
 }
 
@@ -151,7 +151,7 @@ fn short_traces_say_what_is_missing() {
     assert!(matches!(found.t30_s.values()[0], Err(NoReading::DynamicRange { needed_db: 45.0, .. })));
     let none = PathParameters::read(&PathSet::new(1, 100.0), &Conditions::new(&wall, &air)).unwrap();
     assert_eq!(none.c80_db.values()[0], Err(NoReading::NoOnset));
-    let black = [Material::uniform(OctaveBands::new(62.5, 62.5).unwrap(), 1.0, 0.0).unwrap()];
+    let black = [Material::uniform(Bands::octaves(62.5, 62.5).unwrap(), 1.0, 0.0).unwrap()];
     let mut direct = PathSet::new(1, 100.0);
     direct.push(path(2.0, 0.25, None));
     let dry = PathParameters::read(&direct, &Conditions::new(&black, &air)).unwrap();

@@ -6,9 +6,7 @@
 
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
-use sabine_acoustics::{
-    BandParameters, ImpulseResponse, NoReading, OctaveBands, Reading, RoomParameters, ThirdOctaveBands,
-};
+use sabine_acoustics::{BandParameters, Bands, ImpulseResponse, NoReading, Reading, RoomParameters};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -68,7 +66,7 @@ fn every_real_response_is_read_or_says_why_not() {
     wav_files(&data.join("rir"), &mut files);
     wav_files(&data.join("rooms"), &mut files);
     assert!(!files.is_empty());
-    let bands = OctaveBands::SIMULATION;
+    let bands = Bands::SIMULATION;
     // For each folder and band: how often T60 was read, and each reason why not; the values that were.
     let mut counts: BTreeMap<String, Vec<BTreeMap<&'static str, usize>>> = BTreeMap::new();
     let mut ratios = Vec::new();
@@ -148,7 +146,7 @@ fn bras_cr2_agrees_with_its_published_room_means() {
         .map(|line| line.split(',').map(|cell| cell.trim().parse().unwrap()).collect())
         .collect();
     let response = first_channel(&folder.join("ir/LS1_MP1.wav"));
-    let bands = ThirdOctaveBands::new(100.0, 10000.0).unwrap();
+    let bands = Bands::third_octaves(100.0, 10000.0).unwrap();
     let show = |reading: &Reading, mean: f64| match reading {
         Ok(t) => {
             format!("{:.3} ± {:.3} | {:+.1} %", t.value, t.standard_error, 100.0 * (t.value / mean - 1.0))
@@ -157,7 +155,7 @@ fn bras_cr2_agrees_with_its_published_room_means() {
     };
     println!("| Hz | published T20 | T20 here | off | T60 here | off |\n|---|---|---|---|---|---|");
     let (mut within, mut worst, mut sum_percent, mut count) = (0, 0.0_f64, 0.0, 0.0);
-    for (i, band) in BandParameters::third_octaves(&response, bands).iter().enumerate() {
+    for (i, band) in BandParameters::in_bands(&response, bands).iter().enumerate() {
         let hz = bands.nominal_hz(i);
         // The table calls 160 Hz 155 and 6300 Hz 6350.
         let Some(row) = published.iter().find(|row| (row[0] / hz - 1.0).abs() < 0.04) else { continue };

@@ -3,7 +3,7 @@
 use crate::Error;
 use realfft::num_complex::Complex32;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
-use sabine_acoustics::OctaveBands;
+use sabine_acoustics::Bands;
 use std::sync::Arc;
 
 /// Half the width of the cross-over between two bands, in octaves.
@@ -23,7 +23,7 @@ pub(crate) struct BandSplit {
 
 impl BandSplit {
     /// For signals of up to `samples` samples, padded so that what a band filter smears does not wrap around.
-    pub(crate) fn new(bands: OctaveBands, samples: usize, sample_rate_hz: u32) -> Self {
+    pub(crate) fn new(bands: Bands, samples: usize, sample_rate_hz: u32) -> Self {
         let length = (samples + samples / 16 + 64).next_power_of_two();
         let mut planner = RealFftPlanner::new();
         let forward = planner.plan_fft_forward(length);
@@ -114,7 +114,7 @@ mod tests {
     fn the_bands_add_up_to_the_input() {
         let samples: Vec<f32> =
             (0..5000).map(|i| ((i * i) as f32 * 0.37).sin() * (-(i as f32) / 900.0).exp()).collect();
-        let split = BandSplit::new(OctaveBands::SIMULATION, samples.len(), 16_000);
+        let split = BandSplit::new(Bands::SIMULATION, samples.len(), 16_000);
         let bands = bands_of(&split, &samples);
         assert_eq!(bands.len(), 8);
         for (i, &s) in samples.iter().enumerate() {
@@ -127,7 +127,7 @@ mod tests {
     fn a_tone_lands_in_its_octave() {
         let samples: Vec<f32> =
             (0..8000).map(|i| (i as f32 * 1000.0 * std::f32::consts::TAU / 16e3).sin()).collect();
-        let split = BandSplit::new(OctaveBands::SIMULATION, samples.len(), 16_000);
+        let split = BandSplit::new(Bands::SIMULATION, samples.len(), 16_000);
         let bands = bands_of(&split, &samples);
         let energy = |b: &[f32]| b[1000..7000].iter().map(|s| s * s).sum::<f32>();
         let total: f32 = bands.iter().map(|b| energy(b)).sum();

@@ -16,7 +16,7 @@ use half::f16;
 use rand::Rng;
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
-use sabine_acoustics::{Augment, ImpulseResponse, Observer, OctaveBands, report};
+use sabine_acoustics::{Augment, Bands, ImpulseResponse, Observer, report};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -302,8 +302,8 @@ impl DatasetBuilder {
             duration_s: self.config.clip.duration_s,
             mels: self.maker.mels(),
             frames: self.maker.frames(),
-            t60_bands_hz: OctaveBands::T60.iter_hz().collect(),
-            eq_bands_hz: OctaveBands::EQ.iter_hz().filter(|&hz| hz != 1000.0).collect(),
+            t60_bands_hz: Bands::T60.iter_hz().collect(),
+            eq_bands_hz: Bands::EQ.iter_hz().filter(|&hz| hz != 1000.0).collect(),
             seed: self.config.seed,
             plan_sha256: self.plan_sha256.clone(),
             shards: entries,

@@ -3,7 +3,7 @@
 use crate::eq_statistics::EqStatistics;
 use crate::error::{Error, check};
 use crate::seed::generator;
-use sabine_acoustics::{Augment, ImpulseResponse, NoReading, OctaveBands, PerBand, Signal, equalisation};
+use sabine_acoustics::{Augment, Bands, ImpulseResponse, NoReading, PerBand, Signal, equalisation};
 use sabine_eqfilter::{EqDesigner, EqFilterConfig};
 
 /// Corrections of the filter by what is still missing: a spectrum that is uneven within an octave needs one or two, a target
@@ -33,13 +33,13 @@ impl Default for EqConfig {
 
 /// Gives a response another equalisation, drawn octave by octave from normal distributions, by a linear-phase filter.
 /// ```
-/// use sabine_acoustics::{ImpulseResponse, OctaveBands, PerBand, equalisation};
+/// use sabine_acoustics::{ImpulseResponse, Bands, PerBand, equalisation};
 /// use sabine_augment::{EqAugment, EqConfig, SyntheticRoomConfig, SyntheticRooms};
 /// let room = SyntheticRooms::new(SyntheticRoomConfig::default())?.draw(1)?;
 /// let augment = EqAugment::new(EqConfig::default(), room.sample_rate_hz())?;
-/// let wanted_db = PerBand::from_fn(OctaveBands::EQ, |band| [3.0, 0.0, -3.0, 2.0, 0.0, -2.0, 4.0][band]);
+/// let wanted_db = PerBand::from_fn(Bands::EQ, |band| [3.0, 0.0, -3.0, 2.0, 0.0, -2.0, 4.0][band]);
 /// let coloured = augment.to_db(&room, &wanted_db)?;
-/// let found_db = equalisation(&coloured, OctaveBands::EQ)?;
+/// let found_db = equalisation(&coloured, Bands::EQ)?;
 /// assert!((found_db.at_hz(4000.0).unwrap().clone()?.value - 4.0).abs() < 0.5);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -56,7 +56,7 @@ impl EqAugment {
     /// [`Error::Setting`].
     pub fn new(config: EqConfig, sample_rate_hz: u32) -> Result<Self, Error> {
         check("inflation", config.inflation, 0.0, 5.0, "between 0 and 5")?;
-        let designer = EqDesigner::new(OctaveBands::EQ, sample_rate_hz, EqFilterConfig::default())
+        let designer = EqDesigner::new(Bands::EQ, sample_rate_hz, EqFilterConfig::default())
             .map_err(|e| sabine_acoustics::Error::implementation("equalisation filter", e))?;
         Ok(Self { config, designer })
     }
@@ -72,7 +72,7 @@ impl EqAugment {
         response: &ImpulseResponse,
         target_db: &PerBand<f64>,
     ) -> Result<ImpulseResponse, Error> {
-        let mut gains = PerBand::uniform(OctaveBands::EQ, 0.0);
+        let mut gains = PerBand::uniform(Bands::EQ, 0.0);
         let mut changed = response.clone();
         for round in 0..=ROUNDS {
             let missing = target_db.zip_with(&levels(&changed)?, |t, l| t - l)?;
@@ -119,7 +119,7 @@ impl Augment for EqAugment {
 }
 
 fn levels(response: &ImpulseResponse) -> Result<PerBand<f64>, Error> {
-    let readings = equalisation(response, OctaveBands::EQ)?;
+    let readings = equalisation(response, Bands::EQ)?;
     let mut values = Vec::with_capacity(readings.values().len());
     for (centre_hz, reading) in readings.iter() {
         match reading {
@@ -127,7 +127,7 @@ fn levels(response: &ImpulseResponse) -> Result<PerBand<f64>, Error> {
             Err(reason) => return Err(no_level(centre_hz, reason)),
         }
     }
-    Ok(PerBand::new(OctaveBands::EQ, values)?)
+    Ok(PerBand::new(Bands::EQ, values)?)
 }
 
 fn no_level(centre_hz: f64, reason: &NoReading) -> Error {

@@ -4,10 +4,10 @@ use crate::error::Error;
 use crate::labels::Labels;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
-use sabine_acoustics::{OctaveBands, PerBand};
+use sabine_acoustics::{Bands, PerBand};
 
 /// Mean and standard deviation per octave of the equalisation of a collection of responses, 62.5 Hz to 4 kHz, dB re 1 kHz
-/// ([`OctaveBands::EQ`]).
+/// ([`Bands::EQ`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct EqStatistics {
     mean_db: PerBand<f64>,
@@ -21,7 +21,7 @@ impl EqStatistics {
     /// `docs/validation/estimator.md` tests the estimator are **not** among them; `docs/validation/augment.md` has the
     /// figures with and without.
     pub fn measured() -> Self {
-        let bands = OctaveBands::EQ;
+        let bands = Bands::EQ;
         let values = |v: [f64; 7]| PerBand::from_fn(bands, |i| v[i]);
         Self {
             mean_db: values(MEASURED_MEAN_DB),
@@ -37,7 +37,7 @@ impl EqStatistics {
     /// # Errors
     /// [`Error::TooFew`] where an octave has fewer than two rooms with a reading.
     pub fn fit<'a>(rooms: impl IntoIterator<Item = &'a [Labels]>) -> Result<Self, Error> {
-        let bands = OctaveBands::EQ;
+        let bands = Bands::EQ;
         let rooms: Vec<&[Labels]> = rooms.into_iter().collect();
         let responses = rooms.iter().map(|r| r.len()).sum();
         let (mut mean, mut deviation) = (Vec::new(), Vec::new());

@@ -2,8 +2,8 @@
 
 use crate::error::Error;
 use sabine_acoustics::{
-    BandParameters, DecayFit, ImpulseResponse, NoReading, OctaveBands, PerBand, Reading, RoomParameters,
-    ThirdOctaveBands, equalisation,
+    BandParameters, Bands, DecayFit, ImpulseResponse, NoReading, PerBand, Reading, RoomParameters,
+    equalisation,
 };
 
 /// What is measured on a response: reverberation time, equalisation and ratio of direct to reverberant energy, each a
@@ -25,10 +25,10 @@ impl Labels {
     /// [`Error::Acoustics`] for what [`RoomParameters::measure`] refuses; what cannot be read is no error but a reading that
     /// says why.
     pub fn measure(response: &ImpulseResponse) -> Result<Self, Error> {
-        let t60_s = PerBand::new(OctaveBands::T60, decay_times(response)?.t60_s)?;
+        let t60_s = PerBand::new(Bands::T60, decay_times(response)?.t60_s)?;
         Ok(Self {
             t60_s,
-            eq_db: equalisation(response, OctaveBands::EQ)?,
+            eq_db: equalisation(response, Bands::EQ)?,
             drr_db: BandParameters::full_band(response).drr_db,
         })
     }
@@ -58,9 +58,9 @@ pub(crate) struct DecayTimes {
 /// Measures the decays alone.
 pub(crate) fn decay_times(response: &ImpulseResponse) -> Result<DecayTimes, Error> {
     let rate = f64::from(response.sample_rate_hz());
-    let bands = OctaveBands::T60;
+    let bands = Bands::T60;
     let held = (0..bands.len()).take_while(|&b| bands.edges_hz(b).1 <= 0.5 * rate).count().max(1);
-    let lower = OctaveBands::new(125.0, bands.nominal_hz(held - 1))?;
+    let lower = Bands::octaves(125.0, bands.nominal_hz(held - 1))?;
     let measured = RoomParameters::measure(response, lower)?;
     let mut t60_s = measured.t60_s.values().to_vec();
     for band in held..bands.len() {
@@ -72,6 +72,6 @@ pub(crate) fn decay_times(response: &ImpulseResponse) -> Result<DecayTimes, Erro
 /// The reverberation time of the lowest third of an octave.
 fn lowest_third(response: &ImpulseResponse, octave_hz: f64) -> Result<Reading, Error> {
     let centre_hz = octave_hz / 10f64.powf(0.1);
-    let third = ThirdOctaveBands::new(centre_hz, centre_hz)?;
-    Ok(BandParameters::third_octaves(response, third).swap_remove(0).t60_s)
+    let third = Bands::third_octaves(centre_hz, centre_hz)?;
+    Ok(BandParameters::in_bands(response, third).swap_remove(0).t60_s)
 }

@@ -8,7 +8,7 @@ use rand::seq::IndexedRandom;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use sabine_acoustics::{
-    Air, DiffuseRoom, Material, NamedMaterial, OctaveBands, PerBand, Receiver, Scene, Source, Triangle,
+    Air, Bands, DiffuseRoom, Material, NamedMaterial, PerBand, Receiver, Scene, Source, Triangle,
     library_material,
 };
 
@@ -107,7 +107,7 @@ impl PolyhedralRoomConfig {
 /// A room that never was, ready to be traced.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PolyhedralRoom {
-    /// Closed mesh, faces turned towards the air, a material for each surface on [`OctaveBands::SIMULATION`].
+    /// Closed mesh, faces turned towards the air, a material for each surface on [`Bands::SIMULATION`].
     pub scene: Scene,
     /// Where it sounds.
     pub source: Source,
@@ -167,7 +167,7 @@ impl PolyhedralRoom {
         for _ in 0..FURNISHINGS {
             let materials = shell.materials(rng, &bodies)?;
             let scene = Scene::new(vertices.clone(), triangles.clone(), materials)?;
-            let rooms = DiffuseRoom::of_scene(&scene, &air, OctaveBands::SIMULATION)?;
+            let rooms = DiffuseRoom::of_scene(&scene, &air, Bands::SIMULATION)?;
             let mid_s: f64 = [500.0, 1000.0]
                 .iter()
                 .filter_map(|&hz| rooms.at_hz(hz))
@@ -315,12 +315,11 @@ fn pick(rng: &mut Pcg64, names: &[&'static str]) -> &'static str {
 
 /// A surface of the library, a little harder or softer than its table.
 fn varied(rng: &mut Pcg64, name: &str) -> Result<Material, Error> {
-    let table = library_material(name)?.material(OctaveBands::SIMULATION)?;
+    let table = library_material(name)?.material(Bands::SIMULATION)?;
     let normal: f64 = StandardNormal.sample(rng);
     let factor = (ABSORPTION_SPREAD * normal).exp();
-    let absorption = PerBand::from_fn(OctaveBands::SIMULATION, |i| {
-        (factor * table.absorption().values()[i]).clamp(0.01, 0.99)
-    });
+    let absorption =
+        PerBand::from_fn(Bands::SIMULATION, |i| (factor * table.absorption().values()[i]).clamp(0.01, 0.99));
     Ok(Material::new(absorption, table.scattering().clone())?)
 }
 
@@ -361,7 +360,7 @@ mod tests {
         let mut times: Vec<f64> = (0..200)
             .map(|seed| {
                 let room = PolyhedralRoom::draw(&PolyhedralRoomConfig::default(), seed).unwrap();
-                let rooms = DiffuseRoom::of_scene(&room.scene, &room.air, OctaveBands::SIMULATION).unwrap();
+                let rooms = DiffuseRoom::of_scene(&room.scene, &room.air, Bands::SIMULATION).unwrap();
                 rooms.at_hz(1000.0).unwrap().eyring_t60_s()
             })
             .collect();

@@ -4,7 +4,7 @@ use crate::eq_statistics::EqStatistics;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
-use sabine_acoustics::{Air, OctaveBands};
+use sabine_acoustics::{Air, Bands};
 
 /// Octaves of a synthetic room, 62.5 Hz to 8 kHz.
 const BANDS: usize = 8;
@@ -90,7 +90,7 @@ fn walk(rng: &mut Pcg64, mean_tilt: f64, tilt_sd: f64, step_sd: f64) -> [f64; BA
 }
 
 /// The reverberation time that air alone permits in each band, in seconds (20 C, 50 %).
-pub(crate) fn air_limits_s(bands: OctaveBands) -> Vec<f64> {
+pub(crate) fn air_limits_s(bands: Bands) -> Vec<f64> {
     let air = Air::default();
     (0..bands.len()).map(|band| air.t60_limit_s(bands.exact_hz(band))).collect()
 }

@@ -8,7 +8,7 @@ use rand::Rng;
 use rand_distr::{Distribution, Exp1, StandardNormal};
 use rand_pcg::Pcg64;
 use realfft::num_complex::Complex32;
-use sabine_acoustics::{ImpulseResponse, OctaveBands};
+use sabine_acoustics::{Bands, ImpulseResponse};
 use std::f64::consts::PI;
 
 /// Speed of sound at 20 C, m/s; the rooms drawn here do not turn on a tenth of a degree.
@@ -114,7 +114,7 @@ impl SyntheticRooms {
         // One transform for each power of two, so that a short response costs little.
         let longest =
             ((config.longest_s * f64::from(config.sample_rate_hz)) as usize).next_multiple_of(LENGTH_STEP);
-        let bands = OctaveBands::SIMULATION;
+        let bands = Bands::SIMULATION;
         let mut splits = vec![BandSplit::new(bands, longest, config.sample_rate_hz)];
         while splits[0].length() > 8192 {
             let half = splits[0].length() / 2;

@@ -6,7 +6,7 @@ use crate::labels::decay_times;
 use crate::seed::{derive, generator};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
-use sabine_acoustics::{Augment, DecayFit, FilterBank, ImpulseResponse, NoReading, OctaveBands};
+use sabine_acoustics::{Augment, Bands, DecayFit, FilterBank, ImpulseResponse, NoReading};
 
 /// ln(10^6): power falls by 60 dB in this many time constants.
 const LN_MILLION: f64 = 13.815_510_557_964_274;
@@ -182,7 +182,7 @@ impl Augment for T60Augment {
 
 /// A response taken apart, with the decay of each octave.
 struct Octaves {
-    bands: OctaveBands,
+    bands: Bands,
     bank: FilterBank,
     parts: Vec<Vec<f32>>,
     fits: Vec<Result<DecayFit, NoReading>>,
@@ -392,8 +392,8 @@ fn fit(samples: &[f32], rate: f64, start_s: f64, bandwidth_hz: f64) -> Result<De
 }
 
 /// 62.5 Hz up to the last octave that begins well below a frequency.
-fn octaves_below(limit_hz: f64) -> Result<OctaveBands, Error> {
-    let all = OctaveBands::new(62.5, 16_000.0)?;
+fn octaves_below(limit_hz: f64) -> Result<Bands, Error> {
+    let all = Bands::octaves(62.5, 16_000.0)?;
     let count = (0..all.len()).take_while(|&b| all.edges_hz(b).0 < 0.9 * limit_hz).count().max(1);
-    Ok(OctaveBands::new(62.5, all.nominal_hz(count - 1))?)
+    Ok(Bands::octaves(62.5, all.nominal_hz(count - 1))?)
 }

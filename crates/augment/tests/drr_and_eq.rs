@@ -7,7 +7,7 @@ use material::response;
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
-use sabine_acoustics::{BandParameters, OctaveBands, PerBand, equalisation};
+use sabine_acoustics::{BandParameters, Bands, PerBand, equalisation};
 use sabine_augment::{AugmentedResponse, Chain, DrrAugment, DrrConfig, EqAugment, EqConfig, Error};
 
 proptest! {
@@ -56,12 +56,12 @@ fn the_equalisation_is_met_within_half_a_decibel() {
         let recorded = response(rng.random_range(0.2..1.2), 0.9, 80.0, 16_000, seed);
         let mut levels: Vec<f64> = (0..7).map(|_| rng.random_range(-9.0..9.0)).collect();
         levels[4] = 0.0;
-        let target = PerBand::new(OctaveBands::EQ, levels).unwrap();
+        let target = PerBand::new(Bands::EQ, levels).unwrap();
         match augment.to_db(&recorded, &target) {
             Ok(changed) => {
                 met += 1;
                 assert_eq!(changed.samples().len(), recorded.samples().len());
-                let found = equalisation(&changed, OctaveBands::EQ).unwrap();
+                let found = equalisation(&changed, Bands::EQ).unwrap();
                 for ((hz, found), wanted) in found.iter().zip(target.values()) {
                     let found = found.as_ref().unwrap().value;
                     assert!((found - wanted).abs() < 0.5, "{hz} Hz: {found} dB for {wanted} dB");
@@ -80,7 +80,7 @@ fn the_equalisation_is_met_within_half_a_decibel() {
 #[test]
 fn a_change_of_more_than_40_db_is_refused() {
     let recorded = response(0.5, 0.8, 80.0, 16_000, 1);
-    let target = PerBand::new(OctaveBands::EQ, vec![60.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).unwrap();
+    let target = PerBand::new(Bands::EQ, vec![60.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).unwrap();
     let refused = EqAugment::new(EqConfig::default(), 16_000).unwrap().to_db(&recorded, &target);
     assert!(matches!(refused, Err(Error::Setting { .. })), "{refused:?}");
     assert!(EqAugment::new(EqConfig { inflation: f64::NAN, ..EqConfig::default() }, 16_000).is_err());

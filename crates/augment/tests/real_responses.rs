@@ -5,7 +5,7 @@ mod material;
 
 use material::{quantile, shared_data};
 use sabine_acoustics::{
-    Augment, BandParameters, FilterBank, ImpulseResponse, OctaveBands, PerBand, RoomParameters, equalisation,
+    Augment, BandParameters, Bands, FilterBank, ImpulseResponse, PerBand, RoomParameters, equalisation,
 };
 use sabine_augment::{
     DrrAugment, DrrConfig, EqAugment, EqConfig, EqStatistics, Labels, MeasuredResponse, ResponseCorpus,
@@ -47,7 +47,7 @@ const TARGETS_S: [f64; 6] = [0.1, 0.2, 0.4, 0.7, 1.1, 1.5];
 /// What can be judged in an octave: bandwidth times reverberation time of 16 at least, before and as wanted (ISO 3382-2, 7.3,
 /// for the filters of ordinary instruments). Below, the filter rings about as long as the room and its direct sound is read.
 fn is_usable(octave: usize, before_s: f64, wanted_s: f64) -> bool {
-    let (low_hz, high_hz) = OctaveBands::T60.edges_hz(octave);
+    let (low_hz, high_hz) = Bands::T60.edges_hz(octave);
     // At 16 kHz the 8 kHz octave is read in its lowest third.
     let width_hz = if octave == 6 { 0.2316 * 6310.0 } else { high_hz - low_hz };
     before_s.min(wanted_s) * width_hz >= 16.0
@@ -137,7 +137,7 @@ fn peak_index(response: &ImpulseResponse) -> usize {
 fn measured_decays_go_on_below_their_noise() {
     let Some(corpus) = corpus() else { return };
     let augment = T60Augment::new(T60Config::default()).unwrap();
-    let bands = OctaveBands::new(250.0, 4000.0).unwrap();
+    let bands = Bands::octaves(250.0, 4000.0).unwrap();
     let mut judged = 0;
     for (i, measured) in few_of_each(&corpus).into_iter().enumerate() {
         let before = RoomParameters::measure(&measured.response, bands).unwrap();
@@ -204,13 +204,13 @@ fn ratio_and_equalisation_of_measured_responses_meet_their_targets() {
             let mut levels: Vec<f64> =
                 (0..7).map(|o| f64::from((7 * i as i32 + 5 * k + 3 * o) % 13) - 6.0).collect();
             levels[4] = 0.0;
-            let target = PerBand::new(OctaveBands::EQ, levels).unwrap();
+            let target = PerBand::new(Bands::EQ, levels).unwrap();
             let Ok(changed) = eq.to_db(response, &target) else {
                 refused[1] += 1;
                 continue;
             };
             met[1] += 1;
-            let found = equalisation(&changed, OctaveBands::EQ).unwrap();
+            let found = equalisation(&changed, Bands::EQ).unwrap();
             for ((hz, found), wanted) in found.iter().zip(target.values()) {
                 let Ok(found) = found else { continue };
                 assert!(

@@ -4,7 +4,7 @@
 mod material;
 
 use material::{quantile, response};
-use sabine_acoustics::{Augment, FilterBank, ImpulseResponse, OctaveBands};
+use sabine_acoustics::{Augment, Bands, FilterBank, ImpulseResponse};
 use sabine_augment::{Error, Labels, T60Augment, T60Config};
 
 /// Reverberation times of the octaves that can be read.
@@ -57,7 +57,7 @@ fn the_decay_goes_on_below_the_old_noise_floor() {
     let augment = T60Augment::new(T60Config::default()).unwrap();
     let changed = augment.by_factor(&recorded, 1.0, 1).unwrap();
     let bands =
-        FilterBank::new(OctaveBands::new(500.0, 4000.0).unwrap(), 16_000).unwrap().split(changed.samples());
+        FilterBank::new(Bands::octaves(500.0, 4000.0).unwrap(), 16_000).unwrap().split(changed.samples());
     for (hz, band) in bands.iter() {
         let level_db = |from_s: f64| {
             let block = &band[(from_s * 16e3) as usize..][..1600];

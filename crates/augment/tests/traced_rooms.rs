@@ -5,8 +5,8 @@ mod material;
 
 use material::{response, speech};
 use sabine_acoustics::{
-    Air, Contribution, DiffuseRoom, ImpulseResponse, Observer, OctaveBands, PathSet, Propagator, Receiver,
-    Scene, Source,
+    Air, Bands, Contribution, DiffuseRoom, ImpulseResponse, Observer, PathSet, Propagator, Receiver, Scene,
+    Source,
 };
 use sabine_augment::{
     DatasetBuilder, DatasetConfig, DatasetSources, Error, Manifest, Partition, PolyhedralRoomConfig,
@@ -55,7 +55,7 @@ fn render(
     seed: u64,
 ) -> Result<ImpulseResponse, sabine_acoustics::Error> {
     assert!(!paths.is_empty());
-    let rooms = DiffuseRoom::of_scene(scene, air, OctaveBands::SIMULATION)?;
+    let rooms = DiffuseRoom::of_scene(scene, air, Bands::SIMULATION)?;
     let t60_s = rooms.at_hz(1000.0).unwrap().eyring_t60_s();
     Ok(response(t60_s, 1.5, 80.0, 16_000, seed))
 }

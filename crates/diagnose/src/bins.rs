@@ -1,6 +1,6 @@
 //! The time bins in which energies are compared.
 
-use sabine_acoustics::OctaveBands;
+use sabine_acoustics::Bands;
 
 /// Shortest bin, in seconds.
 const SHORTEST_S: f64 = 0.01;
@@ -17,7 +17,7 @@ pub(crate) struct Bins {
 }
 
 impl Bins {
-    pub fn new(bands: OctaveBands, band: usize) -> Self {
+    pub fn new(bands: Bands, band: usize) -> Self {
         let (low, high) = bands.edges_hz(band);
         let width_s = SHORTEST_S.max(BANDWIDTH_TIMES / (high - low));
         // The direct sound stays clear of the first bin's end, lest a small error of its time move it into the next.

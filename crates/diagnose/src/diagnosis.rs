@@ -1,7 +1,7 @@
 //! What a diagnosis says.
 
 use crate::ExtendedModel;
-use sabine_acoustics::{OctaveBands, PerBand};
+use sabine_acoustics::{Bands, PerBand};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -224,7 +224,7 @@ pub struct Diagnosis {
     /// Prediction of positions not seen; `None` with fewer than two receivers.
     pub held_out: Option<HeldOut>,
     /// Octaves of everything by band.
-    pub bands: OctaveBands,
+    pub bands: Bands,
     /// Where it is wrong.
     pub residuals: Vec<ResidualCell>,
     /// Decay curves at held-out positions, or at all where none could be held out.
@@ -241,7 +241,7 @@ pub struct Diagnosis {
 
 impl FittedMaterial {
     /// The fitted absorption in its bands.
-    pub fn per_band(&self, bands: OctaveBands) -> PerBand<f64> {
+    pub fn per_band(&self, bands: Bands) -> PerBand<f64> {
         PerBand::from_fn(bands, |b| self.absorption[b])
     }
 }

@@ -84,7 +84,7 @@ pub(crate) fn extended_model(bench: &Workbench, search: &Search<'_>, state: &Sta
                 });
             }
             "room_modes" => {
-                model.wave_below_hz = survey.octaves_of_modes.checked_sub(1).map(|b| bands.edges_hz(b).1)
+                model.wave_below_hz = survey.bands_of_modes.checked_sub(1).map(|b| bands.edges_hz(b).1)
             }
             "truncation" => model.truncation = Some([values[0], values[1]]),
             "sound_speed" => model.temperature_c = Some(values[0]),

@@ -9,11 +9,12 @@ use crate::kernel::BandKernel;
 use crate::traced_pair::{BandState, Single};
 use crate::views::BandView;
 use crate::workbench::Workbench;
+use sabine_acoustics::Bands;
 
 /// Half of a gate, in units of one over the bandwidth.
 const HALF_BANDWIDTH_TIMES: f64 = 0.7;
-/// Octaves below this are too slow for single reflections, in Hz.
-pub(crate) const LOWEST_HZ: f64 = 1500.0;
+/// Narrower bands are too slow for single reflections, in Hz: octaves from 2 kHz on are not, nor third octaves from 5 kHz on.
+const LEAST_WIDTH_HZ: f64 = 1000.0;
 /// Paths are known this well in time: a centimetre of way, in seconds.
 const TIME_SD_S: f64 = 3e-5;
 /// What a single reflection may be off by for other reasons, as a share of its energy: materials, edges of the gate.
@@ -103,6 +104,12 @@ fn meeting(source: [f64; 3], receiver: [f64; 3], single: &Single) -> [f64; 3] {
     std::array::from_fn(|k| 0.5 * (source[k] + x * d[k] + receiver[k] + (single.length_m - x) * a[k]))
 }
 
+/// Whether a band lets single reflections be told apart.
+pub(crate) fn is_fast(bands: Bands, band: usize) -> bool {
+    let (low_hz, high_hz) = bands.edges_hz(band);
+    high_hz - low_hz >= LEAST_WIDTH_HZ
+}
+
 /// Gates of all first-order reflections of the pairs that count, under fitted absorption and the causes at work. `shift_s` is how much later
 /// than predicted the direct sound and each single of a pair come by the fit of the arrival times.
 pub(crate) fn gates(
@@ -127,7 +134,7 @@ pub(crate) fn gates(
         // Energies relative to the direct sound, by band and single.
         let energies: Vec<Vec<f64>> = (0..bands)
             .map(|band| {
-                if survey.bands.nominal_hz(band) < LOWEST_HZ {
+                if !is_fast(survey.bands, band) {
                     return Vec::new();
                 }
                 let state = &states[band];

@@ -1,6 +1,6 @@
 //! What an octave filter does to a pulse: over which times it spreads the energy, and how alike it leaves two of them.
 
-use sabine_acoustics::{Error, FilterBank, OctaveBands};
+use sabine_acoustics::{Bands, Error, FilterBank};
 
 /// Ringing to either side that is kept, in units of one over the bandwidth: what is left out is below -50 dB.
 const REACH_BANDWIDTH_TIMES: f64 = 6.0;
@@ -27,7 +27,7 @@ pub(crate) struct BandKernel {
 
 impl BandKernel {
     /// The kernels of all bands; `cell_s` is the width of the cells of [`BandKernel::likeness`].
-    pub fn all(bands: OctaveBands, rate_hz: u32, cell_s: f64) -> Result<Vec<Self>, Error> {
+    pub fn all(bands: Bands, rate_hz: u32, cell_s: f64) -> Result<Vec<Self>, Error> {
         let (low, high) = bands.edges_hz(0);
         let rate = f64::from(rate_hz);
         let half = (REACH_BANDWIDTH_TIMES / (high - low) * rate).ceil() as usize;
@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn the_energy_of_a_pulse_lies_about_its_instant() {
-        let bands = OctaveBands::new(500.0, 1000.0).unwrap();
+        let bands = Bands::octaves(500.0, 1000.0).unwrap();
         for kernel in BandKernel::all(bands, 16000, 1e-3).unwrap() {
             assert!((kernel.before(0.0) - 0.5).abs() < 1e-6);
             assert!(kernel.before(-kernel.reach_s()) < 1e-4 && kernel.before(kernel.reach_s()) > 1.0 - 1e-4);
@@ -151,7 +151,7 @@ mod tests {
     #[test]
     fn likeness_adds_up_to_one_over_twice_the_bandwidth() {
         // Parseval: the squared autocorrelation of a flat band of width B integrates to 1 / (2 B).
-        let bands = OctaveBands::new(1000.0, 1000.0).unwrap();
+        let bands = Bands::octaves(1000.0, 1000.0).unwrap();
         let kernel = &BandKernel::all(bands, 48000, 1e-3).unwrap()[0];
         let integral: f64 = 1e-3 * (kernel.likeness[0] + 2.0 * kernel.likeness[1..].iter().sum::<f64>());
         let (low, high) = bands.edges_hz(0);
@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn most_of_an_octave_is_its_own() {
-        let bands = OctaveBands::T60;
+        let bands = Bands::T60;
         for (band, kernel) in BandKernel::all(bands, 48000, 1e-3).unwrap().iter().enumerate() {
             assert!(kernel.shares[band] > 0.85, "{:?}", kernel.shares);
             assert!((kernel.shares.iter().sum::<f64>() - 1.0).abs() < 1e-12);

@@ -307,7 +307,7 @@ impl Model for HarmonicModel<'_> {
 pub(crate) fn of_response(
     filtered: &[Vec<f32>],
     complete: &dyn Fn(usize) -> bool,
-    bands: sabine_acoustics::OctaveBands,
+    bands: sabine_acoustics::Bands,
     direct: f64,
     rate_hz: f64,
 ) -> Vec<LeadInBand> {

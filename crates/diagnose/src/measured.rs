@@ -4,7 +4,7 @@ use crate::bins::Bins;
 use crate::gates::{self, EarlySamples};
 use crate::kernel::BandKernel;
 use crate::lead_in::{self, LeadInBand};
-use sabine_acoustics::{FilterBank, ImpulseResponse, NoReading, OctaveBands, Onset};
+use sabine_acoustics::{Bands, FilterBank, ImpulseResponse, NoReading, Onset};
 
 /// The direct sound's largest sample is looked for so long after the onset, in seconds.
 const DIRECT_S: f64 = 0.8e-3;
@@ -45,11 +45,7 @@ pub(crate) struct Measured {
 }
 
 impl Measured {
-    pub fn new(
-        response: &ImpulseResponse,
-        bands: OctaveBands,
-        kernels: &[BandKernel],
-    ) -> Result<Self, NoReading> {
+    pub fn new(response: &ImpulseResponse, bands: Bands, kernels: &[BandKernel]) -> Result<Self, NoReading> {
         let sample_rate_hz = response.sample_rate_hz();
         let rate = f64::from(sample_rate_hz);
         let onset = Onset::find(response.samples(), sample_rate_hz)?;
@@ -64,7 +60,7 @@ impl Measured {
     /// With times from an instant (seconds from the first sample) other than that of its direct sound, which it need not have.
     pub fn read(
         response: &ImpulseResponse,
-        bands: OctaveBands,
+        bands: Bands,
         kernels: &[BandKernel],
         direct_s: f64,
     ) -> Result<Self, NoReading> {
@@ -89,7 +85,7 @@ impl Measured {
             .collect();
         let mut early = EarlySamples::new(bands.len(), direct_s - BEFORE_S, rate);
         for (band, samples) in filtered.values().iter().enumerate() {
-            if bank.is_complete(band) && bands.nominal_hz(band) >= gates::LOWEST_HZ {
+            if bank.is_complete(band) && gates::is_fast(bands, band) {
                 early.fill(band, samples, BEFORE_S + PEAKS_S, kernels[band].energy);
             }
         }

@@ -106,11 +106,11 @@ pub(crate) fn planes(scene: &Scene) -> (Vec<Plane>, Vec<f64>) {
 mod tests {
     #![allow(clippy::unwrap_used)] // a panic is how a test fails
     use super::*;
-    use sabine_acoustics::{Material, OctaveBands};
+    use sabine_acoustics::{Bands, Material};
 
     #[test]
     fn a_box_has_six_planes_of_the_right_size() {
-        let hard = Material::uniform(OctaveBands::T60, 0.1, 0.0).unwrap();
+        let hard = Material::uniform(Bands::T60, 0.1, 0.0).unwrap();
         let scene = Scene::shoebox([5.0, 4.0, 3.0], std::array::from_fn(|_| hard.clone())).unwrap();
         let (planes, areas) = planes(&scene);
         let found: Vec<f64> = planes.iter().map(|p| p.area_m2).collect();

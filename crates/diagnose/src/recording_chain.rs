@@ -5,7 +5,7 @@ use crate::{Error, ExtendedModel};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
-use sabine_acoustics::{FilterBank, ImpulseResponse, OctaveBands};
+use sabine_acoustics::{Bands, FilterBank, ImpulseResponse};
 
 /// Rates of energy are laid down on a grid of this step and interpolated between.
 const STEP_S: f64 = 2e-3;
@@ -20,7 +20,7 @@ const TAPS: i64 = 48;
 #[derive(Clone, Debug)]
 pub(crate) struct RecordingChain {
     model: ExtendedModel,
-    bands: OctaveBands,
+    bands: Bands,
 }
 
 /// The octave filters of the measurement on a unit pulse.
@@ -37,7 +37,7 @@ struct Filters {
 
 impl RecordingChain {
     /// A model that has passed its checks, and its bands.
-    pub fn new(model: ExtendedModel, bands: OctaveBands) -> Self {
+    pub fn new(model: ExtendedModel, bands: Bands) -> Self {
         Self { model, bands }
     }
 
@@ -118,7 +118,7 @@ impl RecordingChain {
 }
 
 impl Filters {
-    fn new(bands: OctaveBands, rate_hz: u32) -> Result<Self, Error> {
+    fn new(bands: Bands, rate_hz: u32) -> Result<Self, Error> {
         let bank = FilterBank::new(bands, rate_hz)?;
         let (low, high) = bands.edges_hz(0);
         let half = (REACH_BANDWIDTH_TIMES / (high - low) * f64::from(rate_hz)).ceil() as usize;

@@ -3,8 +3,8 @@
 use crate::recording_chain::RecordingChain;
 use crate::{Error, ExtendedModel};
 use sabine_acoustics::{
-    Air, Conditions, Directivity, Error as Cause, ImpulseResponse, Material, MeasuredRoom, NamedMaterial,
-    OctaveBands, Orientation, PerBand, Receiver, Scene, Source, Triangle, write_atomically,
+    Air, Bands, Conditions, Directivity, Error as Cause, ImpulseResponse, Material, MeasuredRoom,
+    NamedMaterial, Orientation, PerBand, Receiver, Scene, Source, Triangle, write_atomically,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
@@ -226,8 +226,8 @@ impl ExtendedModel {
     fn pattern(
         &self,
         source: &Source,
-        own: OctaveBands,
-        bands: OctaveBands,
+        own: Bands,
+        bands: Bands,
     ) -> Result<Option<(Directivity, Orientation)>, Fault> {
         if self.directed_share.is_empty() {
             return Ok(None);
@@ -243,9 +243,8 @@ impl ExtendedModel {
     }
 
     /// Everything that can be said without the room; the bands.
-    fn check(&self) -> Result<OctaveBands, Fault> {
-        let bands =
-            OctaveBands::from_centres_hz(&self.centres_hz).map_err(|e| ("centres_hz".to_owned(), e))?;
+    fn check(&self) -> Result<Bands, Fault> {
+        let bands = Bands::from_centres_hz(&self.centres_hz).map_err(|e| ("centres_hz".to_owned(), e))?;
         let check = Checks { bands: bands.len() };
         let empty = Vec::new();
         let coupled = self.coupled.as_ref();

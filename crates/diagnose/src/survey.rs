@@ -1,7 +1,7 @@
 //! What was measured, as effects see it.
 
 use crate::Plane;
-use sabine_acoustics::{Air, Measurement, OctaveBands};
+use sabine_acoustics::{Air, Bands, Measurement};
 
 /// One response of the survey.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,7 +36,7 @@ pub struct Place {
 /// What the room file and the responses say, before any fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survey {
-    pub(crate) bands: OctaveBands,
+    pub(crate) bands: Bands,
     pub(crate) air: Air,
     pub(crate) air_assumed: bool,
     pub(crate) measurement: Measurement,
@@ -49,13 +49,13 @@ pub struct Survey {
     pub(crate) planes: Vec<Plane>,
     pub(crate) material_areas_m2: Vec<f64>,
     pub(crate) bent: Vec<usize>,
-    /// Lowest octaves for which there is a wave solution.
-    pub(crate) octaves_of_modes: usize,
+    /// Lowest bands for which there is a wave solution.
+    pub(crate) bands_of_modes: usize,
 }
 
 impl Survey {
-    /// Octaves in which energies are compared.
-    pub fn bands(&self) -> OctaveBands {
+    /// Bands in which energies are compared.
+    pub fn bands(&self) -> Bands {
         self.bands
     }
 

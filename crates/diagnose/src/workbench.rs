@@ -153,8 +153,8 @@ impl Workbench {
                 .collect(),
             responses,
             box_m: [corner(f64::min, f64::INFINITY), corner(f64::max, f64::NEG_INFINITY)],
-            octaves_of_modes: if config.wave_solutions {
-                waves::octaves_of_modes(room.scene(), &materials, &room.air())
+            bands_of_modes: if config.wave_solutions {
+                waves::bands_of_modes(room.scene(), &materials, &room.air())
             } else {
                 0
             },

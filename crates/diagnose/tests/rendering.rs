@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
 use sabine_acoustics::{
-    FilterBank, ImpulseResponse, MeasuredRoom, OctaveBands, Propagator, SampleFormat, Signal, encode_wav,
+    Bands, FilterBank, ImpulseResponse, MeasuredRoom, Propagator, SampleFormat, Signal, encode_wav,
 };
 use sabine_diagnose::{Error, ExtendedModel, ExtendedRoom};
 use sabine_propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 const RATE_HZ: u32 = 32_000;
 const CENTRES: &str = "centres_hz = [125, 250, 500, 1000, 2000, 4000, 8000]\ncauses = []\n";
-const BANDS: OctaveBands = OctaveBands::T60;
+const BANDS: Bands = Bands::T60;
 
 fn fixture() -> MeasuredRoom {
     MeasuredRoom::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/room")).unwrap()

@@ -1,7 +1,7 @@
 //! Times of a design, and the taps of many, for `docs/validation/peers/eqfilter_peers.py`, which runs this program and the peers
 //! in turn so that all see the same machine.
 
-use sabine_acoustics::{OctaveBands, PerBand};
+use sabine_acoustics::{Bands, PerBand};
 use sabine_eqfilter::{EqDesigner, EqFilter, EqFilterConfig};
 use std::hint::black_box;
 use std::io::Write;
@@ -14,9 +14,9 @@ fn gain_sets() -> Vec<PerBand<f64>> {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 33) as f64 / f64::from(1_u32 << 31) * 30.0 - 15.0
     };
-    let mut sets: Vec<_> = (0..200).map(|_| PerBand::from_fn(OctaveBands::EQ, |_| uniform())).collect();
+    let mut sets: Vec<_> = (0..200).map(|_| PerBand::from_fn(Bands::EQ, |_| uniform())).collect();
     for sign in [15.0, -15.0] {
-        sets.push(PerBand::from_fn(OctaveBands::EQ, |b| if b % 2 == 0 { sign } else { -sign }));
+        sets.push(PerBand::from_fn(Bands::EQ, |b| if b % 2 == 0 { sign } else { -sign }));
     }
     sets
 }
@@ -38,7 +38,7 @@ fn report(name: &str, sets: &[PerBand<f64>], mut design: impl FnMut(&PerBand<f64
 
 fn main() {
     let (sets, config) = (gain_sets(), EqFilterConfig::default());
-    let designer = EqDesigner::new(OctaveBands::EQ, 16_000, config).expect("valid");
+    let designer = EqDesigner::new(Bands::EQ, 16_000, config).expect("valid");
     if std::env::args().any(|argument| argument == "--taps") {
         let mut out = std::io::stdout().lock();
         for gains in &sets {

@@ -2,13 +2,13 @@
 #![allow(missing_docs)] // criterion's macros
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use sabine_acoustics::{OctaveBands, PerBand};
+use sabine_acoustics::{Bands, PerBand};
 use sabine_eqfilter::{EqDesigner, EqFilter, EqFilterConfig};
 use std::hint::black_box;
 
 fn design(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("design");
-    let bands = OctaveBands::EQ;
+    let bands = Bands::EQ;
     let moderate = PerBand::new(bands, vec![4.0, -3.0, 6.0, -5.0, 0.0, 3.0, -8.0]).expect("seven bands");
     let hard = PerBand::from_fn(bands, |b| if b % 2 == 0 { 15.0 } else { -15.0 });
     for rate_hz in [16_000, 48_000] {

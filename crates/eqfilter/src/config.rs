@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::error::check_range;
-use sabine_acoustics::OctaveBands;
+use sabine_acoustics::Bands;
 
 /// Settings of [`crate::EqFilter::design`] and its variants.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,14 +35,14 @@ impl EqFilterConfig {
         Self { delay_s: 0.032, above: Some(AboveBand { from_band_hz: 8000.0, gain_db: -50.0 }) };
 
     /// Delay in samples, or why the settings do not go together.
-    pub(crate) fn check(&self, bands: OctaveBands, sample_rate_hz: u32) -> Result<usize, Error> {
+    pub(crate) fn check(&self, bands: Bands, sample_rate_hz: u32) -> Result<usize, Error> {
         let rate = f64::from(sample_rate_hz);
         check_range("sample_rate_hz", rate, 1e3, 768e3, "between 1 kHz and 768 kHz")?;
         check_range("delay_s", self.delay_s, 1e-3, 1.0, "between 1 ms and 1 s")?;
         if let Some(above) = self.above {
             check_range("above.gain_db", above.gain_db, -120.0, 120.0, "between -120 and 120 dB")?;
             let highest_hz = bands.nominal_hz(bands.len() - 1);
-            let from = OctaveBands::new(above.from_band_hz, above.from_band_hz)?;
+            let from = Bands::octaves(above.from_band_hz, above.from_band_hz)?;
             if from.nominal_hz(0) <= highest_hz {
                 return Err(Error::AboveOverlaps { from_hz: above.from_band_hz, band_hz: highest_hz });
             }

@@ -4,7 +4,7 @@ use crate::grid::{Grid, kaiser_half};
 use crate::octave::active_bands;
 use crate::solve::{Problem, solve};
 use crate::{EqFilter, EqFilterConfig, Error};
-use sabine_acoustics::{OctaveBands, PerBand};
+use sabine_acoustics::{Bands, PerBand};
 
 /// Parts that an octave is made of.
 const PARTS_PER_OCTAVE: i32 = 5;
@@ -18,9 +18,9 @@ const PARTS_PER_OCTAVE: i32 = 5;
 /// a rule). Where nothing does, it comes near, and [`EqFilter::realised_db`] says what it gives.
 ///
 /// ```
-/// use sabine_acoustics::{OctaveBands, PerBand};
+/// use sabine_acoustics::{Bands, PerBand};
 /// use sabine_eqfilter::{EqDesigner, EqFilterConfig};
-/// let designer = EqDesigner::new(OctaveBands::T60, 48_000, EqFilterConfig::default())?;
+/// let designer = EqDesigner::new(Bands::T60, 48_000, EqFilterConfig::default())?;
 /// for tilt_db in [-3.0, 0.0, 3.0] {
 ///     let gains = PerBand::from_fn(designer.bands(), |band| tilt_db * band as f64);
 ///     let filter = designer.design(&gains)?;
@@ -30,7 +30,7 @@ const PARTS_PER_OCTAVE: i32 = 5;
 /// ```
 #[derive(Clone, Debug)]
 pub struct EqDesigner {
-    bands: OctaveBands,
+    bands: Bands,
     sample_rate_hz: u32,
     config: EqFilterConfig,
     /// Samples on either side of the middle tap.
@@ -51,7 +51,7 @@ impl EqDesigner {
     /// [`Error::OutOfRange`] for a setting out of its range, [`Error::AboveOverlaps`] if `config.above` starts at a band that
     /// is among `bands`, [`Error::NothingBelowNyquist`] if no band's centre lies below half the sample rate,
     /// [`Error::Acoustics`] for an unknown octave.
-    pub fn new(bands: OctaveBands, sample_rate_hz: u32, config: EqFilterConfig) -> Result<Self, Error> {
+    pub fn new(bands: Bands, sample_rate_hz: u32, config: EqFilterConfig) -> Result<Self, Error> {
         let half = config.check(bands, sample_rate_hz)?;
         let active = active_bands(bands, sample_rate_hz);
         let (lowest_hz, nyquist_hz) = (bands.exact_hz(0), f64::from(sample_rate_hz) / 2.0);
@@ -66,7 +66,7 @@ impl EqDesigner {
             .collect();
         let free = centres_octaves.len();
         if let Some(above) = config.above {
-            let from_hz = OctaveBands::new(above.from_band_hz, above.from_band_hz)?.exact_hz(0);
+            let from_hz = Bands::octaves(above.from_band_hz, above.from_band_hz)?.exact_hz(0);
             // It begins where the lowest part of its lowest octave would lie.
             let octaves = (from_hz / lowest_hz).ln() / octave.ln() - 2.0 / f64::from(PARTS_PER_OCTAVE);
             if to_hz(octaves) < nyquist_hz {
@@ -84,12 +84,12 @@ impl EqDesigner {
     }
 
     /// Whether it was planned for these.
-    pub(crate) fn is_for(&self, bands: OctaveBands, sample_rate_hz: u32, config: EqFilterConfig) -> bool {
+    pub(crate) fn is_for(&self, bands: Bands, sample_rate_hz: u32, config: EqFilterConfig) -> bool {
         self.bands == bands && self.sample_rate_hz == sample_rate_hz && self.config == config
     }
 
     /// The bands that it takes gains for.
-    pub fn bands(&self) -> OctaveBands {
+    pub fn bands(&self) -> Bands {
         self.bands
     }
 

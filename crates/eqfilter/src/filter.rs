@@ -4,7 +4,7 @@ use crate::grid::Grid;
 use crate::octave::active_bands;
 use crate::plans::planned;
 use crate::{EqFilterConfig, Error, convolve};
-use sabine_acoustics::{OctaveBands, PerBand, Signal};
+use sabine_acoustics::{Bands, PerBand, Signal};
 
 /// How the phase of a filter runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,9 +18,9 @@ pub enum Phase {
 /// An FIR filter with given gains in octave bands.
 ///
 /// ```
-/// use sabine_acoustics::{OctaveBands, PerBand};
+/// use sabine_acoustics::{Bands, PerBand};
 /// use sabine_eqfilter::{EqFilter, EqFilterConfig};
-/// let gains = PerBand::new(OctaveBands::EQ, vec![-6.0, 3.0, 0.0, 1.0, 0.0, -2.0, -8.0])?;
+/// let gains = PerBand::new(Bands::EQ, vec![-6.0, 3.0, 0.0, 1.0, 0.0, -2.0, -8.0])?;
 /// let filter = EqFilter::design(&gains, 16_000, EqFilterConfig::PAPER)?;
 /// assert_eq!((filter.taps().len(), filter.delay_samples()), (1025, 512));
 /// for (realised, wanted) in filter.realised_db().values().iter().zip(gains.values()) {
@@ -138,7 +138,7 @@ impl EqFilter {
 }
 
 /// Mean power gain of some taps over each octave in dB.
-pub(crate) fn band_gains_db(taps: &[f32], sample_rate_hz: u32, bands: OctaveBands) -> PerBand<Option<f64>> {
+pub(crate) fn band_gains_db(taps: &[f32], sample_rate_hz: u32, bands: Bands) -> PerBand<Option<f64>> {
     let active = active_bands(bands, sample_rate_hz);
     let gains = Grid::new(taps.len() / 2, sample_rate_hz).band_gains_db(taps, bands, active);
     PerBand::from_fn(bands, |b| gains.get(b).copied())

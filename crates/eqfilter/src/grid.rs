@@ -3,7 +3,7 @@
 use crate::octave::{support_hz, weight};
 use realfft::num_complex::Complex;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
-use sabine_acoustics::OctaveBands;
+use sabine_acoustics::Bands;
 use std::sync::Arc;
 
 /// Shape of the Kaiser window on the taps: its main lobe is 1.6 times as wide as without a window, its side lobes are 30 dB down.
@@ -66,7 +66,7 @@ impl Grid {
     }
 
     /// Mean over an octave of the products of the responses: the quadratic form of its power gain, row by row.
-    pub fn power_form(&self, bands: OctaveBands, band: usize, responses: &[Vec<f64>]) -> Vec<f64> {
+    pub fn power_form(&self, bands: Bands, band: usize, responses: &[Vec<f64>]) -> Vec<f64> {
         let weights = self.weights(bands, band);
         // Only the bins that count, so that the products run over neighbours in memory.
         let picked: Vec<Vec<f64>> =
@@ -88,7 +88,7 @@ impl Grid {
     }
 
     /// Mean power gain over an octave of a filter of at most `2 half + 1` taps, for each of the first `active` bands, in dB.
-    pub fn band_gains_db(&self, taps: &[f32], bands: OctaveBands, active: usize) -> Vec<f64> {
+    pub fn band_gains_db(&self, taps: &[f32], bands: Bands, active: usize) -> Vec<f64> {
         let mut time = vec![0.0; self.length];
         for (to, &from) in time.iter_mut().zip(taps) {
             *to = f64::from(from);
@@ -105,7 +105,7 @@ impl Grid {
     ///
     /// A low octave holds few bins: there the power between bins is interpolated, by a sinc in a window (cos^4) of sixteen bins,
     /// and the weights are the mean of the octave's shape with that kernel. A high octave is smooth over a bin.
-    fn weights(&self, bands: OctaveBands, band: usize) -> Vec<(usize, f64)> {
+    fn weights(&self, bands: Bands, band: usize) -> Vec<(usize, f64)> {
         /// From this many bins up an octave is smooth over a bin.
         const FINE: usize = 100;
         /// Points between bins.

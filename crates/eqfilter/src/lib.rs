@@ -10,11 +10,11 @@
 //! # Example
 //!
 //! ```
-//! use sabine_acoustics::{OctaveBands, PerBand};
+//! use sabine_acoustics::{Bands, PerBand};
 //! use sabine_eqfilter::{EqFilter, EqFilterConfig};
 //!
 //! // 15 dB up and down from octave to octave, through 64 ms of taps.
-//! let gains = PerBand::from_fn(OctaveBands::EQ, |band| if band % 2 == 0 { 15.0 } else { -15.0 });
+//! let gains = PerBand::from_fn(Bands::EQ, |band| if band % 2 == 0 { 15.0 } else { -15.0 });
 //! let filter = EqFilter::design(&gains, 48_000, EqFilterConfig::default())?;
 //! assert_eq!((filter.taps().len(), filter.delay_samples()), (3073, 1536));
 //! assert_eq!(filter.delay_s(), 0.032);

@@ -3,11 +3,11 @@
 //! They are those of [`sabine_acoustics`]'s filter bank, written here once more so that a design needs no filtering: adjacent
 //! bands cross over between their centres, sine against cosine of a smooth step, and the squares of their gains add up to one.
 
-use sabine_acoustics::OctaveBands;
+use sabine_acoustics::Bands;
 use std::f64::consts::FRAC_PI_2;
 
 /// Power gain at `hz` of an octave band, 0 to 1.
-pub(crate) fn weight(bands: OctaveBands, band: usize, hz: f64) -> f64 {
+pub(crate) fn weight(bands: Bands, band: usize, hz: f64) -> f64 {
     let (low_hz, high_hz) = bands.edges_hz(band);
     let per_octave = 1.0 / (high_hz / low_hz).ln();
     let rise = step((hz / low_hz).ln() * per_octave + 0.5);
@@ -16,14 +16,14 @@ pub(crate) fn weight(bands: OctaveBands, band: usize, hz: f64) -> f64 {
 }
 
 /// The range of frequencies in Hz outside which [`weight`] is zero: the centres of the adjacent octaves.
-pub(crate) fn support_hz(bands: OctaveBands, band: usize) -> (f64, f64) {
+pub(crate) fn support_hz(bands: Bands, band: usize) -> (f64, f64) {
     let (low_hz, high_hz) = bands.edges_hz(band);
     let half = (high_hz / low_hz).sqrt();
     (low_hz / half, high_hz * half)
 }
 
 /// Number of bands whose centre lies below half the sample rate: those whose gain can be set and measured.
-pub(crate) fn active_bands(bands: OctaveBands, sample_rate_hz: u32) -> usize {
+pub(crate) fn active_bands(bands: Bands, sample_rate_hz: u32) -> usize {
     (0..bands.len()).take_while(|&b| bands.exact_hz(b) < f64::from(sample_rate_hz) / 2.0).count()
 }
 
@@ -39,7 +39,7 @@ mod tests {
 
     #[test]
     fn powers_of_adjacent_bands_add_up_to_one() {
-        let bands = OctaveBands::SIMULATION;
+        let bands = Bands::SIMULATION;
         for i in 0..=100 {
             let hz = bands.exact_hz(0) * (bands.exact_hz(7) / bands.exact_hz(0)).powf(f64::from(i) / 100.0);
             let sum: f64 = (0..bands.len()).map(|b| weight(bands, b, hz)).sum();

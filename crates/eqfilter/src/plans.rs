@@ -1,7 +1,7 @@
 //! Plans kept from call to call.
 
 use crate::{EqDesigner, EqFilterConfig, Error};
-use sabine_acoustics::OctaveBands;
+use sabine_acoustics::Bands;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Plans that are kept, the one used last at the end. About 0.2 MB each at 16 kHz, 0.6 MB at 48 kHz.
@@ -11,7 +11,7 @@ const KEPT: usize = 8;
 
 /// The plan for these bands, rate and settings: one that is kept, or a new one.
 pub(crate) fn planned(
-    bands: OctaveBands,
+    bands: Bands,
     sample_rate_hz: u32,
     config: EqFilterConfig,
 ) -> Result<Arc<EqDesigner>, Error> {

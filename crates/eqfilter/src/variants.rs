@@ -6,7 +6,7 @@ use crate::grid::fast_length;
 use crate::{EqFilter, EqFilterConfig, Error, Phase};
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
-use sabine_acoustics::{OctaveBands, PerBand};
+use sabine_acoustics::{Bands, PerBand};
 
 /// Least magnitude, relative to the largest, whose logarithm enters the minimum phase: -120 dB.
 const LEAST_MAGNITUDE: f64 = 1e-6;
@@ -31,7 +31,7 @@ impl EqFilter {
         let mut points: Vec<(f64, f64)> =
             (0..bands.len()).map(|b| (bands.exact_hz(b).log2(), gains_db.values()[b])).collect();
         if let Some(above) = config.above {
-            let from = OctaveBands::new(above.from_band_hz, above.from_band_hz)?;
+            let from = Bands::octaves(above.from_band_hz, above.from_band_hz)?;
             points.push((from.exact_hz(0).log2(), above.gain_db));
         }
         let length = fast_length(4 * half);

@@ -4,7 +4,7 @@
 
 use proptest::prelude::*;
 use proptest::test_runner::FileFailurePersistence;
-use sabine_acoustics::{OctaveBands, PerBand, Signal};
+use sabine_acoustics::{Bands, PerBand, Signal};
 use sabine_eqfilter::{AboveBand, EqDesigner, EqFilter, EqFilterConfig, Error, Phase};
 use std::f64::consts::{PI, TAU};
 
@@ -38,13 +38,13 @@ fn octave_gain_db(taps: &[f32], centre_hz: f64, rate_hz: u32) -> f64 {
     10.0 * (sum / total).log10()
 }
 
-fn gains(bands: OctaveBands, values: &[f64]) -> PerBand<f64> {
+fn gains(bands: Bands, values: &[f64]) -> PerBand<f64> {
     PerBand::new(bands, values[..bands.len()].to_vec()).expect("one value for each band")
 }
 
 #[test]
 fn alternating_15_db_is_met_in_every_octave_at_every_rate() {
-    let bands = OctaveBands::SIMULATION;
+    let bands = Bands::SIMULATION;
     for rate_hz in [16_000, 44_100, 48_000, 96_000] {
         for sign in [15.0, -15.0] {
             let wanted = PerBand::from_fn(bands, |b| if b % 2 == 0 { sign } else { -sign });
@@ -74,7 +74,7 @@ proptest! {
         values in prop::collection::vec(-15.0..15.0_f64, 8),
         rate_hz in prop::sample::select(vec![16_000_u32, 44_100, 48_000]),
     ) {
-        let bands = OctaveBands::SIMULATION;
+        let bands = Bands::SIMULATION;
         let filter = EqFilter::design(&gains(bands, &values), rate_hz, EqFilterConfig::default()).unwrap();
         for (b, wanted) in values.iter().enumerate() {
             let found = octave_gain_db(filter.taps(), bands.exact_hz(b), rate_hz);
@@ -92,7 +92,7 @@ proptest! {
         window_method: bool,
     ) {
         let config = EqFilterConfig { delay_s, above: None };
-        let wanted = gains(OctaveBands::EQ, &values);
+        let wanted = gains(Bands::EQ, &values);
         let filter = if window_method {
             EqFilter::window_method(&wanted, rate_hz, config).unwrap()
         } else {
@@ -107,12 +107,12 @@ proptest! {
 
     #[test]
     fn minimum_phase_keeps_the_magnitude_and_comes_first(values in prop::collection::vec(-12.0..12.0_f64, 8)) {
-        let wanted = gains(OctaveBands::EQ, &values);
+        let wanted = gains(Bands::EQ, &values);
         let linear = EqFilter::design(&wanted, 16_000, EqFilterConfig::default()).unwrap();
         let minimum = EqFilter::minimum_phase(&wanted, 16_000, EqFilterConfig::default()).unwrap();
         prop_assert_eq!((minimum.phase(), minimum.delay_samples()), (Phase::Minimum, 0));
         for (b, value) in values.iter().enumerate().take(7) {
-            let hz = OctaveBands::EQ.exact_hz(b);
+            let hz = Bands::EQ.exact_hz(b);
             let found = octave_gain_db(minimum.taps(), hz, 16_000);
             prop_assert!((found - value).abs() < 0.1, "{} Hz: {} != {}", hz, found, value);
         }
@@ -127,7 +127,7 @@ proptest! {
 
 #[test]
 fn equal_gains_give_a_scaled_delay() {
-    let wanted = PerBand::uniform(OctaveBands::EQ, 6.0);
+    let wanted = PerBand::uniform(Bands::EQ, 6.0);
     let filter = EqFilter::design(&wanted, 16_000, EqFilterConfig::default()).unwrap();
     for (n, &tap) in filter.taps().iter().enumerate() {
         let expected = if n == 512 { 10_f64.powf(0.3) } else { 0.0 };
@@ -137,11 +137,11 @@ fn equal_gains_give_a_scaled_delay() {
 
 #[test]
 fn the_papers_setting_is_50_db_down_above_and_exact_below() {
-    let wanted = PerBand::new(OctaveBands::EQ, vec![4.0, -3.0, 2.0, -1.0, 0.0, 3.0, -6.0]).unwrap();
+    let wanted = PerBand::new(Bands::EQ, vec![4.0, -3.0, 2.0, -1.0, 0.0, 3.0, -6.0]).unwrap();
     for rate_hz in [16_000, 48_000] {
         let filter = EqFilter::design(&wanted, rate_hz, EqFilterConfig::PAPER).unwrap();
         for (b, (_, wanted_db)) in wanted.iter().enumerate() {
-            let found = octave_gain_db(filter.taps(), OctaveBands::EQ.exact_hz(b), rate_hz);
+            let found = octave_gain_db(filter.taps(), Bands::EQ.exact_hz(b), rate_hz);
             assert!((found - wanted_db).abs() < 0.1, "{rate_hz} Hz, band {b}: {found} != {wanted_db}");
         }
         let mut hz = 6_500.0;
@@ -155,7 +155,7 @@ fn the_papers_setting_is_50_db_down_above_and_exact_below() {
 
 #[test]
 fn bands_above_nyquist_have_no_gain_and_no_effect() {
-    let bands = OctaveBands::new(125.0, 16_000.0).unwrap();
+    let bands = Bands::octaves(125.0, 16_000.0).unwrap();
     let with = |top: f64| {
         let wanted = PerBand::from_fn(bands, |b| if b == 7 { top } else { b as f64 });
         EqFilter::design(&wanted, 16_000, EqFilterConfig::default()).unwrap()
@@ -170,11 +170,11 @@ fn bands_above_nyquist_have_no_gain_and_no_effect() {
 
 #[test]
 fn window_method_says_by_how_much_it_misses() {
-    let wanted = PerBand::from_fn(OctaveBands::EQ, |b| if b % 2 == 0 { 10.0 } else { -10.0 });
+    let wanted = PerBand::from_fn(Bands::EQ, |b| if b % 2 == 0 { 10.0 } else { -10.0 });
     let filter = EqFilter::window_method(&wanted, 16_000, EqFilterConfig::default()).unwrap();
     let mut worst: f64 = 0.0;
     for b in 0..7 {
-        let found = octave_gain_db(filter.taps(), OctaveBands::EQ.exact_hz(b), 16_000);
+        let found = octave_gain_db(filter.taps(), Bands::EQ.exact_hz(b), 16_000);
         let claimed = filter.realised_db().values()[b].unwrap();
         assert!((found - claimed).abs() < 0.1, "band {b}: {found} != {claimed}");
         worst = worst.max((found - wanted.values()[b]).abs());
@@ -184,7 +184,7 @@ fn window_method_says_by_how_much_it_misses() {
 
 #[test]
 fn the_delay_is_taken_out_or_kept_as_asked() {
-    let wanted = PerBand::new(OctaveBands::EQ, vec![0.0, 1.0, 0.0, -1.0, 0.0, 2.0, -3.0]).unwrap();
+    let wanted = PerBand::new(Bands::EQ, vec![0.0, 1.0, 0.0, -1.0, 0.0, 2.0, -3.0]).unwrap();
     let filter = EqFilter::design(&wanted, 16_000, EqFilterConfig::default()).unwrap();
     let mut samples = vec![0.0; 3000];
     samples[1000] = 1.0;
@@ -207,23 +207,23 @@ fn the_delay_is_taken_out_or_kept_as_asked() {
 #[test]
 fn a_short_delay_comes_near_and_says_how_near() {
     // 4 ms resolve 250 Hz: the octave at 62.5 Hz cannot differ from its neighbours by 15 dB, and the filter says so.
-    let wanted = PerBand::new(OctaveBands::EQ, vec![15.0, -15.0, 0.0, 0.0, 0.0, 0.0, 0.0]).unwrap();
+    let wanted = PerBand::new(Bands::EQ, vec![15.0, -15.0, 0.0, 0.0, 0.0, 0.0, 0.0]).unwrap();
     let config = EqFilterConfig { delay_s: 0.004, above: None };
     let filter = EqFilter::design(&wanted, 16_000, config).unwrap();
     let misses: Vec<f64> =
         (0..7).map(|b| filter.realised_db().values()[b].unwrap() - wanted.values()[b]).collect();
     assert!(misses[0].abs().max(misses[1].abs()) > 1.0, "{misses:?}");
     for b in 0..7 {
-        let found = octave_gain_db(filter.taps(), OctaveBands::EQ.exact_hz(b), 16_000);
+        let found = octave_gain_db(filter.taps(), Bands::EQ.exact_hz(b), 16_000);
         assert!((found - filter.realised_db().values()[b].unwrap()).abs() < 0.2, "band {b}");
     }
 }
 
 #[test]
 fn the_same_gains_give_the_same_bits_from_any_plan() {
-    let wanted = PerBand::from_fn(OctaveBands::T60, |b| (b as f64).sin() * 9.0);
+    let wanted = PerBand::from_fn(Bands::T60, |b| (b as f64).sin() * 9.0);
     let once = EqFilter::design(&wanted, 44_100, EqFilterConfig::default()).unwrap();
-    let planner = EqDesigner::new(OctaveBands::T60, 44_100, EqFilterConfig::default()).unwrap();
+    let planner = EqDesigner::new(Bands::T60, 44_100, EqFilterConfig::default()).unwrap();
     assert_eq!(planner.design(&wanted).unwrap(), once);
     assert_eq!(EqFilter::design(&wanted, 44_100, EqFilterConfig::default()).unwrap(), once);
     assert_eq!(planner.taps(), once.taps().len());
@@ -231,7 +231,7 @@ fn the_same_gains_give_the_same_bits_from_any_plan() {
 
 #[test]
 fn wrong_settings_and_gains_are_named() {
-    let flat = PerBand::uniform(OctaveBands::EQ, 0.0);
+    let flat = PerBand::uniform(Bands::EQ, 0.0);
     let design = |rate_hz, config| EqFilter::design(&flat, rate_hz, config);
     let good = EqFilterConfig::default();
     let out_of_range = |result| match result {
@@ -246,16 +246,16 @@ fn wrong_settings_and_gains_are_named() {
     assert!(matches!(design(16_000, above(4000.0, 0.0)), Err(Error::AboveOverlaps { .. })));
     assert!(design(16_000, above(8000.0, 0.0)).is_ok());
     assert!(matches!(design(16_000, above(9000.0, 0.0)), Err(Error::Acoustics(_))));
-    let high = PerBand::uniform(OctaveBands::new(8000.0, 16_000.0).unwrap(), 0.0);
+    let high = PerBand::uniform(Bands::octaves(8000.0, 16_000.0).unwrap(), 0.0);
     assert!(matches!(EqFilter::design(&high, 8_000, good), Err(Error::NothingBelowNyquist { .. })));
     for bad in [f64::NAN, 121.0] {
-        let wanted = PerBand::from_fn(OctaveBands::EQ, |b| if b == 2 { bad } else { 0.0 });
+        let wanted = PerBand::from_fn(Bands::EQ, |b| if b == 2 { bad } else { 0.0 });
         for result in
             [EqFilter::design(&wanted, 16_000, good), EqFilter::window_method(&wanted, 16_000, good)]
         {
             assert!(matches!(result, Err(Error::Gain { band_hz: 250.0, .. })));
         }
     }
-    let designer = EqDesigner::new(OctaveBands::T60, 16_000, good).unwrap();
+    let designer = EqDesigner::new(Bands::T60, 16_000, good).unwrap();
     assert!(matches!(designer.design(&flat), Err(Error::Bands { planned: 7, given: 7, .. })));
 }

@@ -1,11 +1,11 @@
 //! The final judge: the gain of a designed filter as the project's own octave filter bank measures it.
 
-use sabine_acoustics::{FilterBank, OctaveBands, PerBand};
+use sabine_acoustics::{Bands, FilterBank, PerBand};
 use sabine_eqfilter::{EqFilter, EqFilterConfig};
 
 /// Energy of each octave of an impulse through the taps, relative to that of the impulse, in dB.
 fn measured_db(taps: &[f32], delay: usize, rate_hz: u32) -> Vec<f64> {
-    let bank = FilterBank::new(OctaveBands::SIMULATION, rate_hz).expect("a common rate");
+    let bank = FilterBank::new(Bands::SIMULATION, rate_hz).expect("a common rate");
     // A second of room on either side for the bank's own ringing.
     let (middle, length) = (rate_hz as usize, 2 * rate_hz as usize);
     let (mut impulse, mut filtered) = (vec![0.0; length], vec![0.0; length]);
@@ -20,7 +20,7 @@ fn measured_db(taps: &[f32], delay: usize, rate_hz: u32) -> Vec<f64> {
 
 #[test]
 fn the_filter_bank_measures_the_gains_that_were_wanted() {
-    let bands = OctaveBands::SIMULATION;
+    let bands = Bands::SIMULATION;
     let mut state = 1_u64;
     let mut uniform = || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

@@ -8,10 +8,10 @@ use sabine_acoustics::{Estimate, RoomEstimator, RoomTargets, Signal};
 /// Says the same whatever it hears: the mean of the training labels, with their deviation as the standard error.
 ///
 /// ```
-/// use sabine_acoustics::{Estimate, OctaveBands, PerBand, RoomEstimator, RoomTargets, Signal};
+/// use sabine_acoustics::{Estimate, Bands, PerBand, RoomEstimator, RoomTargets, Signal};
 /// use sabine_estimator::ConstantEstimator;
-/// let t60_s = PerBand::uniform(OctaveBands::T60, Estimate::new(0.6, 0.3));
-/// let eq_db = PerBand::uniform(OctaveBands::EQ, Estimate::new(0.0, 4.0));
+/// let t60_s = PerBand::uniform(Bands::T60, Estimate::new(0.6, 0.3));
+/// let eq_db = PerBand::uniform(Bands::EQ, Estimate::new(0.0, 4.0));
 /// let guess = ConstantEstimator::new(RoomTargets::new(t60_s, eq_db)?);
 /// let speech = Signal::new(vec![0.1; 16_000], 16_000)?;
 /// assert_eq!(guess.estimate(&speech)?.t60_s().at_hz(500.0).map(|t| t.value), Some(0.6));

@@ -1,6 +1,6 @@
 //! Between the outputs of the network and seconds and decibels.
 
-use sabine_acoustics::{Estimate, OctaveBands, PerBand};
+use sabine_acoustics::{Bands, Estimate, PerBand};
 use serde::{Deserialize, Serialize};
 
 /// Number of reverberation times: 125 Hz to 8 kHz.
@@ -9,7 +9,7 @@ pub const T60_COUNT: usize = 7;
 pub const EQ_COUNT: usize = 6;
 /// Number of labels, reverberation times first.
 pub const LABEL_COUNT: usize = T60_COUNT + EQ_COUNT;
-/// Index of the 1 kHz band among [`OctaveBands::EQ`]: the reference, which has no label.
+/// Index of the 1 kHz band among [`Bands::EQ`]: the reference, which has no label.
 const EQ_REFERENCE: usize = 4;
 
 /// Nominal centre of a label's octave in Hz.
@@ -18,10 +18,10 @@ const EQ_REFERENCE: usize = 4;
 /// If `label` is not below [`LABEL_COUNT`].
 pub fn label_hz(label: usize) -> f64 {
     if label < T60_COUNT {
-        OctaveBands::T60.nominal_hz(label)
+        Bands::T60.nominal_hz(label)
     } else {
         let eq = label - T60_COUNT;
-        OctaveBands::EQ.nominal_hz(if eq < EQ_REFERENCE { eq } else { eq + 1 })
+        Bands::EQ.nominal_hz(if eq < EQ_REFERENCE { eq } else { eq + 1 })
     }
 }
 
@@ -83,8 +83,8 @@ impl LabelScale {
 
 /// Labels spread over the bands of the vocabulary; the level at 1 kHz is 0 dB exactly.
 pub(crate) fn per_band(labels: &[Estimate]) -> (PerBand<Estimate>, PerBand<Estimate>) {
-    let t60_s = PerBand::from_fn(OctaveBands::T60, |band| labels[band]);
-    let eq_db = PerBand::from_fn(OctaveBands::EQ, |band| match band {
+    let t60_s = PerBand::from_fn(Bands::T60, |band| labels[band]);
+    let eq_db = PerBand::from_fn(Bands::EQ, |band| match band {
         EQ_REFERENCE => Estimate::exact(0.0),
         below if below < EQ_REFERENCE => labels[T60_COUNT + below],
         above => labels[T60_COUNT + above - 1],

@@ -8,15 +8,15 @@ mod ergodic;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use ergodic::Ergodic;
-use sabine_acoustics::{Air, Estimate, Material, OctaveBands, PerBand};
+use sabine_acoustics::{Air, Bands, Estimate, Material, PerBand};
 use sabine_optimize::{AbsorptionPrior, FitConfig, MaterialFitter, SlopeObjective};
 
 fn fits(criterion: &mut Criterion) {
-    let octaves = OctaveBands::SIMULATION;
+    let octaves = Bands::SIMULATION;
     let materials = vec![Material::uniform(octaves, 0.1, 0.5).unwrap(); 6];
     let priors = vec![AbsorptionPrior::uniform(octaves, 0.15, 0.1); 6];
     let targets = [1.4, 1.2, 1.0, 0.8, 0.7, 0.6, 0.4].map(Estimate::exact).to_vec();
-    let targets = PerBand::new(OctaveBands::T60, targets).unwrap();
+    let targets = PerBand::new(Bands::T60, targets).unwrap();
     let mut group = criterion.benchmark_group("fit_t60");
     group.sample_size(10);
     for rays in [1000, 4000, 16000] {

@@ -1,7 +1,7 @@
 //! Settings of a fit and what is known of the materials beforehand.
 
 use crate::Error;
-use sabine_acoustics::{OctaveBands, PerBand};
+use sabine_acoustics::{Bands, PerBand};
 
 /// Which slope of the simulated decay is made to meet the target.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -26,7 +26,7 @@ pub struct AbsorptionPrior {
 
 impl AbsorptionPrior {
     /// The same mean and standard deviation in every band.
-    pub fn uniform(bands: OctaveBands, mean: f64, standard_deviation: f64) -> Self {
+    pub fn uniform(bands: Bands, mean: f64, standard_deviation: f64) -> Self {
         Self {
             mean: PerBand::uniform(bands, mean),
             standard_deviation: PerBand::uniform(bands, standard_deviation),

@@ -102,7 +102,7 @@ impl History {
         let mut weights: Vec<f32> = self.order.iter().map(weight).collect();
         // Few, if any: the ways around edges.
         for (contribution, diffraction) in paths.diffractions() {
-            let gain = diffraction.octave_energy_gain(materials[0].bands(), band, self.speed_m_s) as f32;
+            let gain = diffraction.band_energy_gain(materials[0].bands(), band, self.speed_m_s) as f32;
             let places = self.order.iter().zip(&mut weights).filter(|(i, _)| **i as usize == *contribution);
             places.for_each(|(_, w)| *w *= gain);
         }

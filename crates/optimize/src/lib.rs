@@ -32,10 +32,10 @@
 //!         });
 //!     }
 //! }
-//! let octaves = OctaveBands::SIMULATION;
+//! let octaves = Bands::SIMULATION;
 //! let wall = Material::uniform(octaves, 0.1, 0.0)?;
 //! let prior = AbsorptionPrior::uniform(octaves, 0.1, 0.1);
-//! let target_s = PerBand::uniform(OctaveBands::T60, Estimate::exact(0.5));
+//! let target_s = PerBand::uniform(Bands::T60, Estimate::exact(0.5));
 //! let fit = MaterialFitter::new(FitConfig::default())?
 //!     .fit_t60(&[&paths], &[wall], &[prior], &Air::default(), &target_s, &())?;
 //!

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::pulse::Pulse;
 use sabine_acoustics::{
-    DecayFit, FilterBank, ImpulseResponse, NoReading, OctaveBands, PerBand, Reading, RoomParameters,
+    Bands, DecayFit, FilterBank, ImpulseResponse, NoReading, PerBand, Reading, RoomParameters,
 };
 
 /// What follows the onset by less than this is direct sound, which the source's directivity changes, not decay; in seconds.
@@ -23,7 +23,7 @@ const MOST_NOISE: f64 = 0.5;
 /// sinks into the noise, free of that noise, with the number of independent values that each bin holds.
 #[derive(Clone, Debug)]
 pub struct MeasuredDecay {
-    bands: OctaveBands,
+    bands: Bands,
     onset_s: f64,
     t30_s: PerBand<Reading>,
     decays: Vec<Result<BinnedDecay, NoReading>>,
@@ -51,7 +51,7 @@ impl MeasuredDecay {
     ///
     /// # Errors
     /// [`Error::NoOnset`] for a response without a direct sound that stands out.
-    pub fn new(response: &ImpulseResponse, bands: OctaveBands) -> Result<Self, Error> {
+    pub fn new(response: &ImpulseResponse, bands: Bands) -> Result<Self, Error> {
         let parameters = RoomParameters::measure(response, bands)?;
         let onset_s = parameters.onset.clone().map_err(|source| Error::NoOnset { source })?.time_s;
         let rate = f64::from(response.sample_rate_hz());
@@ -79,7 +79,7 @@ impl MeasuredDecay {
     }
 
     /// The bands.
-    pub fn bands(&self) -> OctaveBands {
+    pub fn bands(&self) -> Bands {
         self.bands
     }
 

@@ -19,7 +19,7 @@ pub(crate) trait SlopeModel: Send + Sync {
 /// not traced again.
 ///
 /// ```
-/// use sabine_acoustics::{Air, Contribution, Material, Objective, OctaveBands, PathSet, Reflection};
+/// use sabine_acoustics::{Air, Contribution, Material, Objective, Bands, PathSet, Reflection};
 /// use sabine_optimize::{FitConfig, SlopeEvaluation, SlopeObjective};
 /// // A corridor in which a path meets the one material every 10 m.
 /// let mut paths = PathSet::new(1, 2000.0);
@@ -29,7 +29,7 @@ pub(crate) trait SlopeModel: Send + Sync {
 ///         departure: [1.0, 0.0, 0.0], arrival: [1.0, 0.0, 0.0], batch: None });
 ///     chain = paths.reflect(chain, 0, Reflection::Specular);
 /// }
-/// let materials = [Material::uniform(OctaveBands::T60, 0.2, 0.0)?];
+/// let materials = [Material::uniform(Bands::T60, 0.2, 0.0)?];
 /// let config = FitConfig { objective: SlopeObjective::Paper, ..FitConfig::default() };
 /// let cost = SlopeEvaluation::new(&config, &[&paths], &materials, &Air::default(), 0, 1.0)?;
 /// // 0.969 dB at every reflection, 34.32 reflections a second, and 0.15 dB/s in the air.

@@ -85,13 +85,13 @@ impl Pulse {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sabine_acoustics::{FilterBank, OctaveBands};
+    use sabine_acoustics::{Bands, FilterBank};
 
     /// The 1 kHz octave at 16 kHz.
     fn octave() -> (Vec<f32>, Pulse) {
         let mut impulse = vec![0.0; 8001];
         impulse[4000] = 1.0;
-        let bands = OctaveBands::new(1000.0, 1000.0).unwrap();
+        let bands = Bands::octaves(1000.0, 1000.0).unwrap();
         let filtered = FilterBank::new(bands, 16_000).unwrap().analyse(&impulse).values()[0].clone();
         let pulse = Pulse::new(&filtered, 4000, 16_000.0);
         (filtered, pulse)

@@ -4,7 +4,7 @@ use crate::fitter::Trace;
 use crate::objective::check_paths;
 use crate::prediction::t60_of_traces;
 use crate::{AbsorptionPrior, Error, MaterialFit, MaterialFitter, Unreachable, UnreachableReason};
-use sabine_acoustics::{Air, Estimate, Material, Observer, OctaveBands, PathSet, PerBand, Reading, report};
+use sabine_acoustics::{Air, Bands, Estimate, Material, Observer, PathSet, PerBand, Reading, report};
 use std::time::Instant;
 
 /// What traces a room again, with other random numbers and as many rays as are asked for.
@@ -368,7 +368,7 @@ fn not_verified(
     t60_error: f64,
 ) -> Vec<NotVerified> {
     let mut found = Vec::new();
-    let octaves: OctaveBands = target.bands();
+    let octaves: Bands = target.bands();
     for b in 0..octaves.len() {
         let band_hz = octaves.nominal_hz(b);
         if !fit.is_reachable(band_hz) {

@@ -8,14 +8,14 @@ mod ergodic;
 use ergodic::Ergodic;
 use rand::{Rng, SeedableRng};
 use sabine_acoustics::{
-    Air, Contribution, Estimate, Material, NoReading, OctaveBands, PathSet, PerBand, Reflection,
+    Air, Bands, Contribution, Estimate, Material, NoReading, PathSet, PerBand, Reflection,
 };
 use sabine_optimize::{
     AbsorptionPrior, FitConfig, MaterialFit, MaterialFitter, SlopeEvaluation, SlopeObjective,
     UndeterminedKind, UnreachableReason, Warning,
 };
 
-const OCTAVES: OctaveBands = OctaveBands::SIMULATION;
+const OCTAVES: Bands = Bands::SIMULATION;
 
 fn six_materials() -> Ergodic {
     Ergodic {
@@ -39,7 +39,7 @@ fn priors(count: usize) -> Vec<AbsorptionPrior> {
 }
 
 fn exact(targets_s: [f64; 7]) -> PerBand<Estimate> {
-    PerBand::new(OctaveBands::T60, targets_s.map(Estimate::exact).to_vec()).unwrap()
+    PerBand::new(Bands::T60, targets_s.map(Estimate::exact).to_vec()).unwrap()
 }
 
 fn fit_with(
@@ -119,7 +119,7 @@ fn of_all_materials_that_meet_the_target_the_most_probable_are_found() {
 fn one_material_is_found_from_another_seed() {
     let truth = [0.05, 0.08, 0.12, 0.2, 0.35, 0.5, 0.7];
     let (room, air) = (one_material(), Air::default());
-    let t60 = |i: usize| room.eyring_s(&truth[i..=i], &air, OctaveBands::T60.exact_hz(i));
+    let t60 = |i: usize| room.eyring_s(&truth[i..=i], &air, Bands::T60.exact_hz(i));
     let fit = fit_with(
         FitConfig::default(),
         &room.trace(7),
@@ -149,10 +149,10 @@ fn standard_errors_cover() {
             .map(|_| prior.iter().map(|(m, s)| (m + s * normal()).clamp(0.01, 0.98)).collect())
             .collect();
         let measured = (0..7).map(|i| {
-            let t60_s = room.eyring_s(&truth[i], &air, OctaveBands::T60.exact_hz(i));
+            let t60_s = room.eyring_s(&truth[i], &air, Bands::T60.exact_hz(i));
             Estimate::new(t60_s * (1.0 + 0.05 * normal()), 0.05 * t60_s)
         });
-        let targets = PerBand::new(OctaveBands::T60, measured.collect()).unwrap();
+        let targets = PerBand::new(Bands::T60, measured.collect()).unwrap();
         let priors: Vec<_> = prior.iter().map(|&(m, s)| AbsorptionPrior::uniform(OCTAVES, m, s)).collect();
         let fit = fit_with(FitConfig::default(), &room.trace(trial), &priors, &targets);
         for (i, truth) in truth.iter().enumerate() {

@@ -10,13 +10,13 @@ use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
 use ergodic::Ergodic;
 use proptest::prelude::*;
-use sabine_acoustics::{Air, Material, Objective, OctaveBands, PathSet};
+use sabine_acoustics::{Air, Bands, Material, Objective, PathSet};
 use sabine_optimize::{
     FitConfig, ForArgmin, Logit, RegularisedSlope, SlopeEvaluation, SlopeObjective, minimise,
 };
 use std::sync::LazyLock;
 
-/// 2 kHz of [`OctaveBands::SIMULATION`].
+/// 2 kHz of [`Bands::SIMULATION`].
 const BAND: usize = 5;
 
 static PATHS: LazyLock<[PathSet; 2]> = LazyLock::new(|| {
@@ -25,7 +25,7 @@ static PATHS: LazyLock<[PathSet; 2]> = LazyLock::new(|| {
 });
 
 fn objective(objective: SlopeObjective, target_s: f64) -> SlopeEvaluation {
-    let materials = vec![Material::uniform(OctaveBands::SIMULATION, 0.1, 0.4).unwrap(); 3];
+    let materials = vec![Material::uniform(Bands::SIMULATION, 0.1, 0.4).unwrap(); 3];
     let config = FitConfig { objective, ..FitConfig::default() };
     let paths: Vec<&PathSet> = PATHS.iter().collect();
     SlopeEvaluation::new(&config, &paths, &materials, &Air::default(), BAND, target_s).unwrap()

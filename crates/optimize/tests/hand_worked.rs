@@ -3,7 +3,7 @@
 // A test that cannot be set up should fail.
 #![allow(clippy::unwrap_used)]
 
-use sabine_acoustics::{Air, Contribution, Material, Objective, OctaveBands, PathSet, Reflection};
+use sabine_acoustics::{Air, Bands, Contribution, Material, Objective, PathSet, Reflection};
 use sabine_optimize::{FitConfig, SlopeEvaluation, SlopeObjective};
 
 const A: u32 = 0;
@@ -29,7 +29,7 @@ fn paths() -> PathSet {
 }
 
 fn evaluation(objective: SlopeObjective) -> SlopeEvaluation {
-    let wall = Material::uniform(OctaveBands::T60, 0.1, 0.0).unwrap();
+    let wall = Material::uniform(Bands::T60, 0.1, 0.0).unwrap();
     let config = FitConfig { objective, ..FitConfig::default() };
     SlopeEvaluation::new(&config, &[&paths()], &[wall.clone(), wall], &Air::default(), 0, 0.3).unwrap()
 }
@@ -37,7 +37,7 @@ fn evaluation(objective: SlopeObjective) -> SlopeEvaluation {
 /// What air takes at 125 Hz, in dB/s: it adds to the slope of every path.
 fn air_db_per_s() -> f64 {
     let air = Air::default();
-    air.attenuation_db_per_m(OctaveBands::T60.exact_hz(0)) * air.speed_of_sound_m_s()
+    air.attenuation_db_per_m(Bands::T60.exact_hz(0)) * air.speed_of_sound_m_s()
 }
 
 #[test]

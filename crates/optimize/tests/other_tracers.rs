@@ -8,8 +8,8 @@ mod mirrors;
 
 use mirrors::{Hearing, RECEIVERS, SOURCES};
 use sabine_acoustics::{
-    Air, Estimate, ImpulseResponse, Levels, Material, Measurement, NamedMaterial, OctaveBands, PathSet,
-    PerBand, Propagator, Receiver, Scene, Source, TimeZero,
+    Air, Bands, Estimate, ImpulseResponse, Levels, Material, Measurement, NamedMaterial, PathSet, PerBand,
+    Propagator, Receiver, Scene, Source, TimeZero,
 };
 use sabine_optimize::{
     AbsorptionPrior, DecayMisfit, Error, FitConfig, MaterialFitter, MeasuredDecay, MeasuredPair, ResponseFit,
@@ -21,8 +21,8 @@ use sabine_testkit::ShoeboxImages;
 const DURATION_S: f64 = 0.7;
 const RATE_HZ: u32 = 16_000;
 const RAYS: usize = 8_000;
-fn octaves() -> OctaveBands {
-    OctaveBands::new(1000.0, 2000.0).unwrap()
+fn octaves() -> Bands {
+    Bands::octaves(1000.0, 2000.0).unwrap()
 }
 
 fn room(faces: [usize; 6], absorption: &[[f64; 2]]) -> Scene {

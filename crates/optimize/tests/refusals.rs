@@ -6,11 +6,11 @@
 mod ergodic;
 
 use ergodic::Ergodic;
-use sabine_acoustics::{Air, Estimate, Material, OctaveBands, PathSet, PerBand};
+use sabine_acoustics::{Air, Bands, Estimate, Material, PathSet, PerBand};
 use sabine_optimize::{AbsorptionPrior, Error, FitConfig, MaterialFit, MaterialFitter};
 use std::ops::ControlFlow;
 
-const OCTAVES: OctaveBands = OctaveBands::SIMULATION;
+const OCTAVES: Bands = Bands::SIMULATION;
 
 fn room() -> Ergodic {
     Ergodic { shares: vec![0.7, 0.3], mean_free_path_m: 3.0, rays: 64, duration_s: 0.6 }
@@ -18,7 +18,7 @@ fn room() -> Ergodic {
 
 fn fit(paths: &[&PathSet], priors: &[AbsorptionPrior], target: Estimate) -> Result<MaterialFit, Error> {
     let materials = vec![Material::uniform(OCTAVES, 0.1, 0.5).unwrap(); 2];
-    let targets = PerBand::uniform(OctaveBands::T60, target);
+    let targets = PerBand::uniform(Bands::T60, target);
     MaterialFitter::new(FitConfig::default())?.fit_t60(
         paths,
         &materials,
@@ -69,7 +69,7 @@ fn priors_that_contradict_themselves_or_the_bounds() {
         assert!(matches!(run(prior(0.1, deviation)), Error::Prior { field: "standard_deviation", .. }));
     }
     assert!(matches!(run(prior(1.0, 0.0)), Error::ContradictoryPrior { material: 1, .. }));
-    let other_bands = AbsorptionPrior::uniform(OctaveBands::T60, 0.1, 0.1);
+    let other_bands = AbsorptionPrior::uniform(Bands::T60, 0.1, 0.1);
     assert!(matches!(run(other_bands), Error::Acoustics(_)));
     assert!(matches!(
         fit(&[&paths], std::slice::from_ref(&good), Estimate::exact(0.5)),
@@ -119,7 +119,7 @@ fn settings_out_of_range() {
 fn the_observer_can_stop_it() {
     let paths = room().trace(1);
     let materials = vec![Material::uniform(OCTAVES, 0.1, 0.5).unwrap(); 2];
-    let targets = PerBand::uniform(OctaveBands::T60, Estimate::exact(0.5));
+    let targets = PerBand::uniform(Bands::T60, Estimate::exact(0.5));
     let stop = |_: &str, done: u64, _: u64| {
         if done >= 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };

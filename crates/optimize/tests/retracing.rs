@@ -6,13 +6,13 @@
 mod ergodic;
 
 use ergodic::Ergodic;
-use sabine_acoustics::{Air, Estimate, Material, OctaveBands, PathSet, PerBand, Reading};
+use sabine_acoustics::{Air, Bands, Estimate, Material, PathSet, PerBand, Reading};
 use sabine_optimize::{
     AbsorptionPrior, Error, FitConfig, MaterialFitter, PredictedChange, Retrace, RetraceConfig, RetracedFit,
 };
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-const OCTAVES: OctaveBands = OctaveBands::T60;
+const OCTAVES: Bands = Bands::T60;
 
 fn room(rays: usize) -> Ergodic {
     Ergodic { shares: vec![0.6, 0.3, 0.1], mean_free_path_m: 3.0, rays, duration_s: 1.0 }

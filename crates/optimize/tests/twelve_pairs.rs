@@ -8,8 +8,8 @@ mod mirrors;
 use mirrors::{Hearing, RECEIVERS, SOURCES, Walls};
 use nalgebra::{DMatrix, DVector};
 use sabine_acoustics::{
-    Air, ImpulseResponse, Levels, Material, Measurement, OctaveBands, PathSet, Propagator, Receiver, Scene,
-    Source, TimeZero,
+    Air, Bands, ImpulseResponse, Levels, Material, Measurement, PathSet, Propagator, Receiver, Scene, Source,
+    TimeZero,
 };
 use sabine_optimize::{AbsorptionPrior, FitConfig, MaterialFitter, MeasuredDecay, MeasuredPair};
 use sabine_propagate::{PathTracer, TracerConfig};
@@ -22,7 +22,7 @@ const PRIOR: (f64, f64) = (0.2, 0.2);
 const REFLECTION_ERROR: f64 = 0.05;
 
 fn hearing() -> Hearing {
-    Hearing { octaves: OctaveBands::new(1000.0, 8000.0).unwrap(), rate_hz: 32_000, duration_s: 0.45 }
+    Hearing { octaves: Bands::octaves(1000.0, 8000.0).unwrap(), rate_hz: 32_000, duration_s: 0.45 }
 }
 
 fn pairs() -> Vec<(Source, Receiver)> {

@@ -21,7 +21,7 @@ fn a_million() -> (PathSet, Vec<Material>) {
     let paths = trace((1e6 / per_ray).round() as usize);
     let softer = (0..6).map(|i| {
         let absorption = 0.05 + 0.05 * f64::from(i);
-        Material::uniform(OctaveBands::SIMULATION, absorption, 0.2).unwrap()
+        Material::uniform(Bands::SIMULATION, absorption, 0.2).unwrap()
     });
     (paths, softer.collect())
 }

@@ -14,14 +14,14 @@ use sabine_acoustics::{Conditions, Orientation, PathSet};
 /// [`PressureRenderer`](crate::PressureRenderer) gives, to the same accuracy.
 ///
 /// ```
-/// use sabine_acoustics::{Air, Conditions, Contribution, Material, OctaveBands, Orientation, PathSet};
+/// use sabine_acoustics::{Air, Conditions, Contribution, Material, Bands, Orientation, PathSet};
 /// use sabine_propagate::{AmbisonicRenderer, RenderConfig};
 /// let mut paths = PathSet::new(1, 34.0);
 /// paths.push(Contribution {
 ///     length_m: 3.432, log_weight: 0.0, chain: PathSet::DIRECT, tail: PathSet::DIRECT,
 ///     departure: [0.0, -1.0, 0.0], arrival: [0.0, 1.0, 0.0], batch: None,
 /// });
-/// let wall = [Material::uniform(OctaveBands::new(62.5, 125.0)?, 0.1, 0.1)?];
+/// let wall = [Material::uniform(Bands::octaves(62.5, 125.0)?, 0.1, 0.1)?];
 /// let air = Air::default();
 /// let conditions = Conditions::new(&wall, &air);
 /// let renderer = AmbisonicRenderer::new(1, RenderConfig::default())?;

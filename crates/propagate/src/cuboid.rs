@@ -228,10 +228,10 @@ mod tests {
     #![allow(clippy::unwrap_used)] // a panic is how a test fails
     use super::*;
     use crate::vector::sub;
-    use sabine_acoustics::{Air, Material, OctaveBands, Scene};
+    use sabine_acoustics::{Air, Bands, Material, Scene};
 
-    fn bands() -> OctaveBands {
-        OctaveBands::new(1000.0, 1000.0).unwrap()
+    fn bands() -> Bands {
+        Bands::octaves(1000.0, 1000.0).unwrap()
     }
 
     fn scene(turn: f64) -> Scene {

@@ -48,7 +48,7 @@ const SIGHT_END_M: f64 = 1e-3;
 /// // A screen 1.5 m wide and 2 m high stands in the open; 1 m behind it the sound arrives over all four edges.
 /// let vertices = vec![[0.0, 0.0, 0.0], [0.0, 1.5, 0.0], [0.0, 1.5, 2.0], [0.0, 0.0, 2.0]];
 /// let triangles = [[0, 1, 2], [0, 2, 3]].map(|vertices| Triangle { vertices, material: 0 });
-/// let wood = NamedMaterial { name: "wood".into(), material: Material::uniform(OctaveBands::T60, 0.1, 0.1)? };
+/// let wood = NamedMaterial { name: "wood".into(), material: Material::uniform(Bands::T60, 0.1, 0.1)? };
 /// let scene = Scene::new(vertices, triangles.to_vec(), vec![wood.clone()])?;
 /// let mut paths = PathSet::new(1, 100.0);
 /// let mesh = MeshScene::new(&scene)?;

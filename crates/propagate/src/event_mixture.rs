@@ -104,11 +104,11 @@ impl EventMixture {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sabine_acoustics::{OctaveBands, PerBand};
+    use sabine_acoustics::{Bands, PerBand};
 
     #[test]
     fn two_halves_are_as_likely_as_the_whole() {
-        let bands = OctaveBands::new(125.0, 500.0).unwrap();
+        let bands = Bands::octaves(125.0, 500.0).unwrap();
         let scattering = PerBand::new(bands, vec![0.1, 0.4, 0.9]).unwrap();
         let material = Material::new(PerBand::uniform(bands, 0.1), scattering).unwrap();
         let probabilities = EventProbabilities::new([&material].into_iter());
@@ -123,7 +123,7 @@ mod tests {
 
     #[test]
     fn hundreds_of_events_neither_overflow_nor_vanish() {
-        let bands = OctaveBands::new(125.0, 500.0).unwrap();
+        let bands = Bands::octaves(125.0, 500.0).unwrap();
         let scattering = PerBand::new(bands, vec![0.001, 0.5, 1.0]).unwrap();
         let material = Material::new(PerBand::uniform(bands, 0.1), scattering).unwrap();
         let probabilities = EventProbabilities::new([&material].into_iter());

@@ -20,10 +20,10 @@
 //! axis feels few reflections:
 //!
 //! ```
-//! use sabine_acoustics::{Air, Material, OctaveBands, Propagator, Receiver, Scene, Source};
+//! use sabine_acoustics::{Air, Material, Bands, Propagator, Receiver, Scene, Source};
 //! use sabine_propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 //!
-//! let bands = OctaveBands::new(250.0, 500.0)?;
+//! let bands = Bands::octaves(250.0, 500.0)?;
 //! let wall = Material::uniform(bands, 0.1, 0.0)?; // absorbs a tenth, scatters nothing
 //! let room = Scene::shoebox([10.0, 7.0, 3.0], std::array::from_fn(|_| wall.clone()))?;
 //! let source = Source::omni("S", [2.0, 3.0, 1.5])?;

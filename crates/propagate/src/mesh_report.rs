@@ -27,9 +27,9 @@ const LISTED: usize = 5;
 /// mesh holds sound; the edges say where to look if it does not.
 ///
 /// ```
-/// use sabine_acoustics::{Material, OctaveBands, Scene};
+/// use sabine_acoustics::{Material, Bands, Scene};
 /// use sabine_propagate::MeshReport;
-/// let plaster = Material::uniform(OctaveBands::SIMULATION, 0.1, 0.1)?;
+/// let plaster = Material::uniform(Bands::SIMULATION, 0.1, 0.1)?;
 /// let room = Scene::shoebox([10.0, 7.0, 3.0], std::array::from_fn(|_| plaster.clone()))?;
 /// let report = MeshReport::inspect(&room, [2.0, 3.0, 1.5])?;
 /// assert!(report.is_closed() && (report.volume_m3 - 210.0).abs() < 1e-9);

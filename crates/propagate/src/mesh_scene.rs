@@ -15,9 +15,9 @@ use std::ops::ControlFlow;
 /// their sides, so that no ray slips through an edge by rounding.
 ///
 /// ```
-/// use sabine_acoustics::{Material, OctaveBands, RayScene, Scene};
+/// use sabine_acoustics::{Material, Bands, RayScene, Scene};
 /// use sabine_propagate::MeshScene;
-/// let plaster = Material::uniform(OctaveBands::SIMULATION, 0.1, 0.1)?;
+/// let plaster = Material::uniform(Bands::SIMULATION, 0.1, 0.1)?;
 /// let room = Scene::shoebox([10.0, 7.0, 3.0], std::array::from_fn(|_| plaster.clone()))?;
 /// let mesh = MeshScene::new(&room)?;
 /// let up = mesh.closest_hit([2.0, 3.0, 1.5], [0.0, 0.0, 1.0], f64::INFINITY).unwrap();
@@ -130,7 +130,7 @@ mod tests {
     use super::*;
     use crate::random::{direction, generator};
     use rand::Rng;
-    use sabine_acoustics::{Material, NamedMaterial, OctaveBands, Triangle};
+    use sabine_acoustics::{Bands, Material, NamedMaterial, Triangle};
 
     #[test]
     fn the_nearest_triangle_is_that_of_a_plain_search() {
@@ -149,7 +149,7 @@ mod tests {
             vertices.extend(corners);
         }
         let triangles = (0..400).map(|i| Triangle { vertices: [3 * i, 3 * i + 1, 3 * i + 2], material: 0 });
-        let material = Material::uniform(OctaveBands::T60, 0.1, 0.1).unwrap();
+        let material = Material::uniform(Bands::T60, 0.1, 0.1).unwrap();
         let materials = vec![NamedMaterial { name: "any".into(), material }];
         let mesh = MeshScene::new(&Scene::new(vertices, triangles.collect(), materials).unwrap()).unwrap();
         let mut flat = 0;

@@ -54,9 +54,9 @@ pub struct Frame {
 /// The result depends on the seed and on the sequence of places, not on the time that passes or on the number of threads.
 ///
 /// ```
-/// use sabine_acoustics::{Air, Material, OctaveBands, Receiver, Scene, Source};
+/// use sabine_acoustics::{Air, Material, Bands, Receiver, Scene, Source};
 /// use sabine_propagate::{MovingConfig, MovingTracer};
-/// let wall = Material::uniform(OctaveBands::new(500.0, 1000.0)?, 0.2, 0.3)?;
+/// let wall = Material::uniform(Bands::octaves(500.0, 1000.0)?, 0.2, 0.3)?;
 /// let room = Scene::shoebox([8.0, 5.0, 3.0], std::array::from_fn(|_| wall.clone()))?;
 /// let air = Air::default();
 /// let mut tracer = MovingTracer::new(room, air.clone(), MovingConfig::default())?;

@@ -129,11 +129,11 @@ fn area(polygon: &[[f64; 2]]) -> f64 {
 mod tests {
     use super::*;
     use crate::mesh_scene::MeshScene;
-    use sabine_acoustics::{Material, OctaveBands, Scene};
+    use sabine_acoustics::{Bands, Material, Scene};
 
     #[test]
     fn patches_hold_all_of_the_wall_and_no_more() {
-        let m = Material::uniform(OctaveBands::T60, 0.1, 0.5).unwrap();
+        let m = Material::uniform(Bands::T60, 0.1, 0.5).unwrap();
         let scene = Scene::shoebox([10.0, 7.0, 3.0], std::array::from_fn(|_| m.clone())).unwrap();
         let mesh = MeshScene::new(&scene).unwrap();
         let patches = Patches::new(&mesh.surfaces, 0.35);

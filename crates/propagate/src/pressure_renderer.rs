@@ -57,7 +57,7 @@ impl RenderConfig {
 /// The lowest octave's gain extends down to 0 Hz, the highest one's up to half the sample rate.
 ///
 /// ```
-/// use sabine_acoustics::{Air, Contribution, Material, OctaveBands, PathSet};
+/// use sabine_acoustics::{Air, Contribution, Material, Bands, PathSet};
 /// use sabine_propagate::{PressureRenderer, RenderConfig};
 /// let mut paths = PathSet::new(1, 34.0);
 /// let ahead = [1.0, 0.0, 0.0];
@@ -66,7 +66,7 @@ impl RenderConfig {
 ///     departure: ahead, arrival: ahead, batch: None,
 /// };
 /// paths.push(direct);
-/// let wall = Material::uniform(OctaveBands::SIMULATION, 0.1, 0.1)?;
+/// let wall = Material::uniform(Bands::SIMULATION, 0.1, 0.1)?;
 /// let air = Air::default();
 /// let response = PressureRenderer::new(RenderConfig::default())?.render(&paths, &[wall], &air)?;
 /// // The area of the pulse is 1/5, and it stands 5 m / 343.2 m/s after emission.

@@ -98,12 +98,12 @@ mod tests {
     use crate::mesh_scene::MeshScene;
     use crate::random::{direction, generator};
     use crate::vector::unit;
-    use sabine_acoustics::{Material, OctaveBands, Scene};
+    use sabine_acoustics::{Bands, Material, Scene};
 
     const SIZE_M: Vec3 = [10.0, 7.0, 3.0];
 
     fn the_box() -> MeshScene {
-        let m = Material::uniform(OctaveBands::T60, 0.1, 0.5).unwrap();
+        let m = Material::uniform(Bands::T60, 0.1, 0.5).unwrap();
         MeshScene::new(&Scene::shoebox(SIZE_M, std::array::from_fn(|_| m.clone())).unwrap()).unwrap()
     }
 

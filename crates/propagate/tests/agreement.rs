@@ -9,7 +9,7 @@ use shoebox::*;
 
 /// A box whose surfaces scatter differently, and differently in each octave: from not at all to all.
 fn banded_scene() -> Scene {
-    let bands = OctaveBands::new(250.0, 2000.0).unwrap();
+    let bands = Bands::octaves(250.0, 2000.0).unwrap();
     let material = |a: f64, s: [f64; 4]| {
         Material::new(PerBand::uniform(bands, a), PerBand::new(bands, s.to_vec()).unwrap()).unwrap()
     };
@@ -30,7 +30,7 @@ fn banded_scene() -> Scene {
 /// The same box with one octave only.
 fn only(scene: &Scene, band: usize) -> Scene {
     let hz = scene.materials()[0].material.bands().nominal_hz(band);
-    let one = OctaveBands::new(hz, hz).unwrap();
+    let one = Bands::octaves(hz, hz).unwrap();
     scene
         .with_materials(scene.materials().iter().map(|named| named.material.resampled(one)).collect())
         .unwrap()
@@ -66,7 +66,7 @@ fn the_tracer_agrees_with_the_reference_in_every_octave() {
 }
 
 /// Two rooms and a doorway of 0.9 m2 in the wall between them.
-fn coupled_rooms(bands: OctaveBands, scattering: &[f64]) -> Scene {
+fn coupled_rooms(bands: Bands, scattering: &[f64]) -> Scene {
     let wall = |a: f64| {
         let scattering = PerBand::new(bands, scattering.to_vec()).unwrap();
         Material::new(PerBand::uniform(bands, a), scattering).unwrap()
@@ -90,7 +90,7 @@ fn coupled_rooms(bands: OctaveBands, scattering: &[f64]) -> Scene {
 /// early and late, and where only a doorway leads from room to room; and they find it more precisely.
 #[test]
 fn both_ends_agree_with_one_and_are_more_precise() {
-    let bands = OctaveBands::new(500.0, 1000.0).unwrap();
+    let bands = Bands::octaves(500.0, 1000.0).unwrap();
     let scene = coupled_rooms(bands, &[0.1, 0.4]);
     let air = Air::default();
     let read = |bidirectional: bool, seed: u64| {

@@ -12,7 +12,7 @@ fn contribution(length_m: f64, energy: f64, arrival: [f64; 3], batch: Option<u8>
     Contribution { length_m, log_weight: energy.ln(), chain, tail, departure: arrival, arrival, batch }
 }
 
-fn wall(bands: OctaveBands) -> Material {
+fn wall(bands: Bands) -> Material {
     Material::uniform(bands, 0.0, 0.0).unwrap()
 }
 
@@ -42,7 +42,7 @@ fn energy(channel: &[f32]) -> f64 {
 #[test]
 fn a_single_path_has_the_exact_harmonics_in_all_channels() {
     let air = Air::default();
-    let material = [wall(OctaveBands::SIMULATION)];
+    let material = [wall(Bands::SIMULATION)];
     let conditions = Conditions::new(&material, &air);
     let mut random = Random(77);
     for order in 1..=3 {
@@ -78,7 +78,7 @@ fn a_diffuse_field_has_the_channel_energies_of_sn3d() {
         paths.push(contribution(length_m, 1e-5, random.direction(), Some((i % 32) as u8)));
     }
     let air = Air::default();
-    let material = [wall(OctaveBands::new(125.0, 500.0).unwrap())];
+    let material = [wall(Bands::octaves(125.0, 500.0).unwrap())];
     let conditions = Conditions::new(&material, &air);
     let seeds = 10;
     for order in 1..=3 {
@@ -127,7 +127,7 @@ fn sampled_paths_keep_their_side() {
         paths.push(contribution(10.0 + 180.0 * random.uniform(), 1e-4, left, Some((i % 32) as u8)));
     }
     let air = Air::default();
-    let material = [wall(OctaveBands::new(250.0, 500.0).unwrap())];
+    let material = [wall(Bands::octaves(250.0, 500.0).unwrap())];
     let config = RenderConfig { sample_rate_hz: 16_000, ..Default::default() };
     let response = AmbisonicRenderer::new(3, config)
         .unwrap()
@@ -143,7 +143,7 @@ fn sampled_paths_keep_their_side() {
 
 #[test]
 fn the_first_channel_decays_as_the_mono_response() {
-    let bands = OctaveBands::SIMULATION;
+    let bands = Bands::SIMULATION;
     let absorption = vec![0.10, 0.11, 0.13, 0.16, 0.18, 0.20, 0.22, 0.25];
     let scattering = vec![0.1, 0.12, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6];
     let wall =

@@ -13,8 +13,8 @@ const SOURCE_M: [f64; 3] = [2.0, 3.0, 1.5];
 const RECEIVER_M: [f64; 3] = [7.0, 4.0, 1.6];
 const BIN_S: f64 = 1e-3;
 
-fn one_band() -> OctaveBands {
-    OctaveBands::new(1000.0, 1000.0).unwrap()
+fn one_band() -> Bands {
+    Bands::octaves(1000.0, 1000.0).unwrap()
 }
 
 fn speed_m_s() -> f64 {
@@ -148,7 +148,7 @@ fn symmetric_positions_count_no_path_twice() {
 
 #[test]
 fn six_materials_in_eight_octaves_decay_as_image_sources_do() {
-    let bands = OctaveBands::SIMULATION;
+    let bands = Bands::SIMULATION;
     let absorption: [[f64; 8]; 6] = [
         [0.02, 0.02, 0.03, 0.03, 0.04, 0.05, 0.05, 0.05],
         [0.30, 0.25, 0.20, 0.15, 0.10, 0.08, 0.07, 0.06],
@@ -228,7 +228,7 @@ fn a_lossless_room_keeps_its_energy() {
 /// Sound takes the same ways back.
 #[test]
 fn source_and_receiver_may_be_exchanged() {
-    let bands = OctaveBands::new(500.0, 1000.0).unwrap();
+    let bands = Bands::octaves(500.0, 1000.0).unwrap();
     let wall = |a: f64, s: f64| Material::uniform(bands, a, s).unwrap();
     let scene = Scene::shoebox(
         SIZE_M,

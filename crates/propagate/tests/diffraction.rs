@@ -199,7 +199,7 @@ proptest! {
         let (gain, other) = (there.energy_gain(hz, SPEED_M_S), back.energy_gain(hz, SPEED_M_S));
         prop_assert!(gain.is_finite() && (gain - other).abs() <= 1e-12 * gain);
         for band in 0..8 {
-            let mean = there.octave_energy_gain(OctaveBands::SIMULATION, band, SPEED_M_S);
+            let mean = there.band_energy_gain(Bands::SIMULATION, band, SPEED_M_S);
             prop_assert!(mean.is_finite() && mean >= 0.0);
         }
     }
@@ -212,11 +212,11 @@ fn the_octave_mean_is_the_mean_over_the_octave() {
     {
         let edge = wedge(TAU, source, receiver, visible);
         for band in 0..8 {
-            let (low, high) = OctaveBands::SIMULATION.edges_hz(band);
+            let (low, high) = Bands::SIMULATION.edges_hz(band);
             let values =
                 (0..400).map(|i| edge.energy_gain(low + (high - low) * (f64::from(i) + 0.5) / 400.0, 330.0));
             let expected = db(values.sum::<f64>() / 400.0);
-            let found = db(edge.octave_energy_gain(OctaveBands::SIMULATION, band, 330.0));
+            let found = db(edge.band_energy_gain(Bands::SIMULATION, band, 330.0));
             assert!((found - expected).abs() < 0.2, "{visible:?} band {band}: {found} != {expected} dB");
         }
     }
@@ -246,7 +246,7 @@ fn what_is_no_wedge_or_no_shadow_is_refused() {
 // ---- Edges of meshes
 
 fn hard() -> Material {
-    Material::uniform(OctaveBands::SIMULATION, 0.1, 0.1).unwrap()
+    Material::uniform(Bands::SIMULATION, 0.1, 0.1).unwrap()
 }
 
 /// Each face by its own corners, none shared, as many real files have it.

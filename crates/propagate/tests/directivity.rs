@@ -18,7 +18,7 @@ fn trace(scene: &Scene, from: [f64; 3], to: [f64; 3], config: TracerConfig) -> P
 /// and 1 / Q of it for a directional one that is as loud on its axis, less what the air takes.
 #[test]
 fn the_reverberation_of_a_directional_source_falls_by_its_factor() {
-    let bands = OctaveBands::new(125.0, 250.0).unwrap();
+    let bands = Bands::octaves(125.0, 250.0).unwrap();
     let wall = Material::uniform(bands, 0.0, 1.0).unwrap();
     let config = TracerConfig { rays: 4_000, duration_s: 0.5, ..Default::default() };
     let paths = trace(&box_scene(&wall), [1.0, 1.2, 0.9], [3.6, 2.9, 1.7], config);
@@ -55,7 +55,7 @@ fn direct_energy(paths: &PathSet, conditions: &Conditions) -> f64 {
 
 #[test]
 fn a_cardioid_sends_ahead_and_nothing_back() {
-    let bands = OctaveBands::new(125.0, 250.0).unwrap();
+    let bands = Bands::octaves(125.0, 250.0).unwrap();
     let wall = Material::uniform(bands, 0.3, 0.2).unwrap();
     let config = TracerConfig { rays: 1, image_order: 0, ..Default::default() };
     let paths = trace(&box_scene(&wall), [1.0, 2.0, 1.5], [4.0, 2.0, 1.5], config);
@@ -81,7 +81,7 @@ fn a_cardioid_sends_ahead_and_nothing_back() {
 /// Turning a source in a room is turning the room, the receiver and the source the other way about it.
 #[test]
 fn a_turned_scene_is_a_turned_source() {
-    let bands = OctaveBands::new(125.0, 250.0).unwrap();
+    let bands = Bands::octaves(125.0, 250.0).unwrap();
     let walls: Vec<Material> =
         (0..6).map(|i| Material::uniform(bands, 0.1 + 0.1 * f64::from(i), 0.1).unwrap()).collect();
     let room = Scene::shoebox([5.0, 4.0, 3.0], std::array::from_fn(|i| walls[i].clone())).unwrap();
@@ -119,12 +119,12 @@ fn a_turned_scene_is_a_turned_source() {
 
 #[test]
 fn directivities_on_other_bands_are_refused() {
-    let bands = OctaveBands::new(125.0, 250.0).unwrap();
+    let bands = Bands::octaves(125.0, 250.0).unwrap();
     let wall = Material::uniform(bands, 0.3, 0.2).unwrap();
     let config = TracerConfig { rays: 1, image_order: 0, ..Default::default() };
     let paths = trace(&box_scene(&wall), [1.0, 2.0, 1.5], [4.0, 2.0, 1.5], config);
     let (walls, air) = (vec![wall; 6], Air::default());
-    let other = Directivity::first_order_per_band(&PerBand::uniform(OctaveBands::T60, 0.7)).unwrap();
+    let other = Directivity::first_order_per_band(&PerBand::uniform(Bands::T60, 0.7)).unwrap();
     let conditions = Conditions::new(&walls, &air).with_source(&other, Orientation::default());
     assert!(matches!(paths.energies_under(&conditions), Err(sabine_acoustics::Error::BandMismatch { .. })));
     let fitting = other.resampled(bands);

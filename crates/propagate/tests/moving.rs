@@ -7,7 +7,7 @@ use sabine_propagate::*;
 const SIZE_M: [f64; 3] = [8.0, 5.0, 3.0];
 
 fn room() -> (Scene, Vec<Material>) {
-    let wall = Material::uniform(OctaveBands::new(500.0, 1000.0).unwrap(), 0.2, 0.3).unwrap();
+    let wall = Material::uniform(Bands::octaves(500.0, 1000.0).unwrap(), 0.2, 0.3).unwrap();
     (Scene::shoebox(SIZE_M, std::array::from_fn(|_| wall.clone())).unwrap(), vec![wall; 6])
 }
 

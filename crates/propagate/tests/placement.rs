@@ -22,7 +22,7 @@ fn refusal(scene: &Scene, from: [f64; 3], to: [f64; 3]) -> sabine_propagate::Err
 
 /// The box, and whatever other triangles.
 fn box_with(extra: &[[[f64; 3]; 3]], without: &[usize]) -> Scene {
-    let plain = uniform_box(SIZE_M, OctaveBands::T60, 0.2, 0.3);
+    let plain = uniform_box(SIZE_M, Bands::T60, 0.2, 0.3);
     let mut vertices = plain.vertices().to_vec();
     let mut triangles: Vec<Triangle> =
         plain.triangles().iter().enumerate().filter(|(i, _)| !without.contains(i)).map(|(_, t)| *t).collect();
@@ -44,7 +44,7 @@ fn screen(x: f64, y0: f64, y1: f64) -> [[[f64; 3]; 3]; 2] {
 fn body(low: [f64; 3], high: [f64; 3]) -> Vec<[[f64; 3]; 3]> {
     let inner = Scene::shoebox(
         std::array::from_fn(|i| high[i] - low[i]),
-        std::array::from_fn(|_| Material::uniform(OctaveBands::T60, 0.1, 0.1).unwrap()),
+        std::array::from_fn(|_| Material::uniform(Bands::T60, 0.1, 0.1).unwrap()),
     )
     .unwrap();
     (0..12).map(|i| inner.corners_m(i).map(|c| std::array::from_fn(|k| c[k] + low[k]))).collect()
@@ -259,7 +259,7 @@ fn places_that_are_no_numbers_are_refused() {
 
 /// A heap of bodies, 12 triangles each, turned about the vertical.
 fn heap(bodies: usize) -> Scene {
-    let wall = uniform_box(SIZE_M, OctaveBands::T60, 0.1, 0.1);
+    let wall = uniform_box(SIZE_M, Bands::T60, 0.1, 0.1);
     let (mut vertices, mut triangles) = (wall.vertices().to_vec(), wall.triangles().to_vec());
     let n = (bodies as f64).cbrt().ceil() as usize;
     let cell = SIZE_M.map(|side| side / n as f64);
@@ -303,7 +303,7 @@ fn a_room_without_area_and_wild_settings_are_refused() {
     let flat = Scene::new(
         vec![[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]],
         vec![Triangle { vertices: [0, 1, 2], material: 0 }],
-        uniform_box(SIZE_M, OctaveBands::T60, 0.1, 0.1).materials()[..1].to_vec(),
+        uniform_box(SIZE_M, Bands::T60, 0.1, 0.1).materials()[..1].to_vec(),
     )
     .unwrap();
     assert!(matches!(MeshScene::new(&flat), Err(sabine_propagate::Error::NoSurface { triangles: 1 })));
@@ -322,7 +322,7 @@ fn a_room_without_area_and_wild_settings_are_refused() {
 /// Absorption and scattering at their limits, in one octave or in all.
 #[test]
 fn extreme_materials_give_finite_energies() {
-    let bands = OctaveBands::new(500.0, 1000.0).unwrap();
+    let bands = Bands::octaves(500.0, 1000.0).unwrap();
     for (s0, s1) in [(0.0, 0.0), (1.0, 1.0), (0.0, 1.0)] {
         for a in [0.0, 1.0] {
             let wall = Material::new(

@@ -9,7 +9,7 @@ use sabine_acoustics::*;
 use sabine_propagate::*;
 
 /// Energy that the octave filter passes of a unit impulse.
-fn passed(rate_hz: f64, bands: OctaveBands, band: usize) -> f64 {
+fn passed(rate_hz: f64, bands: Bands, band: usize) -> f64 {
     let mut impulse = vec![0.0f32; rate_hz as usize];
     impulse[rate_hz as usize / 2] = 1.0;
     octave(&impulse, rate_hz, bands, band).iter().map(|v| v * v).sum()
@@ -17,7 +17,7 @@ fn passed(rate_hz: f64, bands: OctaveBands, band: usize) -> f64 {
 
 /// A room with decay times from 1.3 s at 62.5 Hz down to 0.37 s at 8 kHz.
 fn room() -> (PathSet, Vec<Material>) {
-    let bands = OctaveBands::SIMULATION;
+    let bands = Bands::SIMULATION;
     let absorption = vec![0.10, 0.11, 0.13, 0.16, 0.18, 0.20, 0.22, 0.25];
     let scattering = vec![0.1, 0.12, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6];
     let wall =
@@ -94,7 +94,7 @@ fn decaying(max_length_m: f64) -> PathSet {
 #[test]
 fn noise_has_the_energy_of_the_paths_in_every_octave() {
     let paths = decaying(300.0);
-    let bands = OctaveBands::SIMULATION;
+    let bands = Bands::SIMULATION;
     let wall = Material::uniform(bands, 0.0, 0.0).unwrap();
     let wanted: Vec<f64> = paths
         .energies(std::slice::from_ref(&wall), &Air::default())
@@ -142,7 +142,7 @@ fn noise_has_the_energy_of_the_paths_in_every_octave() {
 #[test]
 fn flat_sampled_energy_gives_its_broadband_energy() {
     let paths = decaying(300.0);
-    let bands = OctaveBands::new(125.0, 250.0).unwrap(); // air takes next to nothing here
+    let bands = Bands::octaves(125.0, 250.0).unwrap(); // air takes next to nothing here
     let wall = Material::uniform(bands, 0.0, 0.0).unwrap();
     let wanted: f64 = paths.energies(std::slice::from_ref(&wall), &Air::default()).unwrap()[0]
         .iter()
@@ -171,7 +171,7 @@ fn flat_sampled_energy_gives_its_broadband_energy() {
 /// A reflection that every octave passes alike is a unit impulse of its amplitude; at a whole sample it is one sample.
 #[test]
 fn a_flat_reflection_is_an_impulse_at_any_rate() {
-    let bands = OctaveBands::new(62.5, 125.0).unwrap();
+    let bands = Bands::octaves(62.5, 125.0).unwrap();
     let dry = Material::uniform(bands, 0.0, 0.0).unwrap();
     let air = Air::default();
     for rate in [8_000u32, 16_000, 22_050, 44_100, 48_000, 96_000] {
@@ -192,7 +192,7 @@ fn a_flat_reflection_is_an_impulse_at_any_rate() {
 /// Energies of the octaves appear as gains at their centres.
 #[test]
 fn a_coloured_reflection_has_the_gain_of_each_octave_at_its_centre() {
-    let bands = OctaveBands::SIMULATION;
+    let bands = Bands::SIMULATION;
     let absorption = vec![0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.6, 0.2];
     let wall = Material::new(PerBand::new(bands, absorption).unwrap(), PerBand::uniform(bands, 0.0)).unwrap();
     let mut paths = PathSet::new(1, 100.0);
@@ -255,12 +255,12 @@ fn settings_and_bands_that_cannot_be_rendered_are_refused() {
     }
     let mut paths = PathSet::new(1, 10.0);
     paths.push(path(1.0, 0.0, PathSet::DIRECT, None));
-    let high = Material::uniform(OctaveBands::new(8000.0, 16000.0).unwrap(), 0.1, 0.1).unwrap();
+    let high = Material::uniform(Bands::octaves(8000.0, 16000.0).unwrap(), 0.1, 0.1).unwrap();
     let renderer =
         PressureRenderer::new(RenderConfig { sample_rate_hz: 8_000, ..Default::default() }).unwrap();
     let error = renderer.render(&paths, &[high], &Air::default()).unwrap_err();
     assert!(matches!(error, sabine_propagate::Error::NoBand { sample_rate_hz: 8_000 }));
-    let two = Material::uniform(OctaveBands::T60, 0.1, 0.1).unwrap();
+    let two = Material::uniform(Bands::T60, 0.1, 0.1).unwrap();
     let error = renderer.render(&paths, &[two.clone(), two], &Air::default()).unwrap_err();
     assert!(matches!(error, sabine_propagate::Error::Acoustics(_)));
 }
@@ -269,13 +269,13 @@ fn settings_and_bands_that_cannot_be_rendered_are_refused() {
 #[test]
 fn black_walls_leave_the_direct_sound() {
     let (paths, _) = room();
-    let black = Material::uniform(OctaveBands::SIMULATION, 1.0, 0.3).unwrap();
+    let black = Material::uniform(Bands::SIMULATION, 1.0, 0.3).unwrap();
     let response = render(&paths, &vec![black; 6], RenderConfig::default());
     let arrival = (f64::from(paths.lengths_m()[0]) / 343.2 * 48e3) as usize;
     assert!(response.samples()[arrival + 4_000..].iter().all(|s| s.abs() < 1e-4 * response.peak()));
     let silent = render(
         &PathSet::new(6, 34.3),
-        &vec![Material::uniform(OctaveBands::T60, 0.5, 0.5).unwrap(); 6],
+        &vec![Material::uniform(Bands::T60, 0.5, 0.5).unwrap(); 6],
         RenderConfig::default(),
     );
     assert!(silent.samples().iter().all(|&s| s == 0.0));

@@ -6,13 +6,13 @@ use parry3d::query::{Ray, RayCast};
 use parry3d::shape::TriMesh;
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
-use sabine_acoustics::{Material, NamedMaterial, OctaveBands, RayScene, Scene, Triangle};
+use sabine_acoustics::{Bands, Material, NamedMaterial, RayScene, Scene, Triangle};
 use sabine_propagate::{BruteForceScene, MeshScene};
 
 type Corners = [[f64; 3]; 3];
 
 fn soup(triangles: &[Corners]) -> Scene {
-    let material = Material::uniform(OctaveBands::T60, 0.1, 0.1).unwrap();
+    let material = Material::uniform(Bands::T60, 0.1, 0.1).unwrap();
     let indices = (0..triangles.len() as u32)
         .map(|i| Triangle { vertices: [3 * i, 3 * i + 1, 3 * i + 2], material: 0 });
     Scene::new(
@@ -114,7 +114,7 @@ proptest! {
 
 #[test]
 fn axis_parallel_rays_and_limits_agree() {
-    let m = Material::uniform(OctaveBands::T60, 0.1, 0.1).unwrap();
+    let m = Material::uniform(Bands::T60, 0.1, 0.1).unwrap();
     let scene = Scene::shoebox([4.0, 3.0, 2.0], std::array::from_fn(|_| m.clone())).unwrap();
     let (fast, plain) = (MeshScene::new(&scene).unwrap(), BruteForceScene::new(&scene).unwrap());
     for axis in 0..3 {
@@ -132,7 +132,7 @@ fn axis_parallel_rays_and_limits_agree() {
 
 #[test]
 fn a_ray_that_is_no_ray_hits_nothing() {
-    let m = Material::uniform(OctaveBands::T60, 0.1, 0.1).unwrap();
+    let m = Material::uniform(Bands::T60, 0.1, 0.1).unwrap();
     let scene = Scene::shoebox([4.0, 3.0, 2.0], std::array::from_fn(|_| m.clone())).unwrap();
     let mesh = MeshScene::new(&scene).unwrap();
     let nan = f64::NAN;

@@ -4,8 +4,8 @@
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
 use sabine_acoustics::{
-    Air, Error as AcousticsError, ImpulseResponse, Material, OctaveBands, PerBand, Propagator, Receiver,
-    Scene, Source,
+    Air, Bands, Error as AcousticsError, ImpulseResponse, Material, PerBand, Propagator, Receiver, Scene,
+    Source,
 };
 use sabine_propagate::wave::{Crossover, WaveConfig, WaveSolver};
 use sabine_propagate::{Error, PathTracer, PressureRenderer, RenderConfig, TracerConfig};
@@ -15,7 +15,7 @@ use std::f64::consts::TAU;
 const SIZE_M: [f64; 3] = [5.03, 4.37, 2.73];
 
 fn wall(absorption: f64) -> Material {
-    Material::uniform(OctaveBands::SIMULATION, absorption, 0.0).unwrap()
+    Material::uniform(Bands::SIMULATION, absorption, 0.0).unwrap()
 }
 
 fn speed_m_s() -> f64 {
@@ -220,7 +220,7 @@ fn finer_grids_converge_in_second_order() {
 
 #[test]
 fn each_octave_has_its_absorption() {
-    let bands = OctaveBands::new(62.5, 250.0).unwrap();
+    let bands = Bands::octaves(62.5, 250.0).unwrap();
     let values = [0.05, 0.25, 0.1];
     let absorption = PerBand::new(bands, values.to_vec()).unwrap();
     let material = Material::new(absorption, PerBand::uniform(bands, 0.0)).unwrap();
@@ -362,7 +362,7 @@ fn threads_change_nothing() {
 #[test]
 #[ignore = "a measurement, not a test"]
 fn time_and_memory_of_sixty_cubic_metres() {
-    let bands = OctaveBands::new(62.5, 250.0).unwrap();
+    let bands = Bands::octaves(62.5, 250.0).unwrap();
     let absorption = PerBand::new(bands, vec![0.05, 0.1, 0.15]).unwrap();
     let material = Material::new(absorption, PerBand::uniform(bands, 0.0)).unwrap();
     let scene = Scene::shoebox(SIZE_M, std::array::from_fn(|_| material.clone())).unwrap();

@@ -41,10 +41,10 @@
 //! ```
 //! Have you an impulse response (a sweep, a balloon) instead of speech? Then measure, do not guess: `measure_response -- response.wav`.
 //! ```
-//! use sabine::acoustics::{Channel, ImpulseResponse, OctaveBands, RoomParameters, read_audio};
+//! use sabine::acoustics::{Channel, ImpulseResponse, Bands, RoomParameters, read_audio};
 //! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
 //! let response: ImpulseResponse = read_audio("fixtures/room/ir/talker_microphone.wav", Channel::Mono)?.into();
-//! let room = RoomParameters::measure(&response, OctaveBands::T60)?;
+//! let room = RoomParameters::measure(&response, Bands::T60)?;
 //! let t60 = room.t60_s.at_hz(1000.0).ok_or("no such octave")?.clone()?;
 //! assert!((t60.value - 0.763).abs() < 3.0 * t60.standard_error + 0.02);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -55,7 +55,7 @@
 //! person, to 5 cm; finer detail belongs into scattering. Materials from the library or a table, and **how far you trust them**
 //! (`absorption_sd`): the fit moves what you doubt.
 //! ```
-//! use sabine::acoustics::{MeasuredRoom, OctaveBands, library_material};
+//! use sabine::acoustics::{MeasuredRoom, Bands, library_material};
 //! use sabine::propagate::MeshReport;
 //! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
 //! let room = MeasuredRoom::read("fixtures/room")?;
@@ -64,7 +64,7 @@
 //! let mesh = MeshReport::inspect(room.scene(), room.source("talker")?.position_m)?;
 //! assert!(mesh.is_closed() && mesh.escape_rate() == 0.0);
 //! // What a thin carpet swallows at 1 kHz, from the library.
-//! let carpet = library_material("carpet_thin")?.material(OctaveBands::T60)?;
+//! let carpet = library_material("carpet_thin")?.material(Bands::T60)?;
 //! assert_eq!(carpet.absorption().at_hz(1000.0), Some(&0.2));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -72,7 +72,7 @@
 //! # 4. Simulate it
 //! `trace_room -- --room DIR --out DIR`. Paths are traced once; materials, air and directivity act on them afterwards.
 //! ```
-//! use sabine::acoustics::{DiffuseRoom, MeasuredRoom, OctaveBands, PathParameters, Propagator};
+//! use sabine::acoustics::{DiffuseRoom, MeasuredRoom, Bands, PathParameters, Propagator};
 //! use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 //! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
 //! let room = MeasuredRoom::read("fixtures/room")?;
@@ -111,9 +111,9 @@
 //! The matched response and its filter are good for any dry sound; `live_match` does it while somebody speaks, `walk_through` while somebody
 //! walks. For head responses turn on the feature `sofa`.
 //! ```
-//! use sabine::acoustics::{OctaveBands, PerBand, Signal};
+//! use sabine::acoustics::{Bands, PerBand, Signal};
 //! use sabine::eqfilter::{EqFilter, EqFilterConfig, PartitionedConfig, PartitionedConvolver, convolve};
-//! let gains_db = PerBand::from_fn(OctaveBands::EQ, |band| if band == 4 { 6.0 } else { 0.0 }); // 1 kHz
+//! let gains_db = PerBand::from_fn(Bands::EQ, |band| if band == 4 { 6.0 } else { 0.0 }); // 1 kHz
 //! let filter = EqFilter::design(&gains_db, 48_000, EqFilterConfig::default())?;
 //! let tone = (0..48_000).map(|n| (std::f32::consts::TAU * n as f32 / 48.0).sin()).collect();
 //! let louder = filter.apply(&Signal::new(tone, 48_000)?)?;

@@ -3,9 +3,9 @@
 use crate::low_end::{JoinedWaves, LowEnd};
 use crate::{Error, Recording, Warning};
 use sabine_acoustics::{
-    Air, EnergyDecayCurve, Estimate, FilterBank, ImpulseResponse, Material, MeasuredRoom, Observer,
-    OctaveBands, PerBand, Propagator, Reading, RoomEstimator, RoomParameters, RoomTargets, Signal,
-    equalisation, report, resample,
+    Air, Bands, EnergyDecayCurve, Estimate, FilterBank, ImpulseResponse, Material, MeasuredRoom, Observer,
+    PerBand, Propagator, Reading, RoomEstimator, RoomParameters, RoomTargets, Signal, equalisation, report,
+    resample,
 };
 use sabine_eqfilter::{AboveBand, EqFilter, EqFilterConfig};
 use sabine_estimator::Estimator;
@@ -204,7 +204,7 @@ fn match_targets(
 ) -> Result<RoomMatch, Error> {
     let room = input.room;
     let (source, receiver) = (room.source(input.source)?, room.receiver(input.receiver)?);
-    let bands = OctaveBands::SIMULATION;
+    let bands = Bands::SIMULATION;
     let air = room.air();
     let materials_before: Vec<Material> =
         room.scene().materials().iter().map(|named| named.material.resampled(bands)).collect();
@@ -213,7 +213,7 @@ fn match_targets(
         .zip(room.priors())
         .map(|(material, prior)| AbsorptionPrior {
             mean: material.absorption().clone(),
-            standard_deviation: prior.absorption_sd.resampled(bands),
+            standard_deviation: prior.absorption_sd.averaged(bands),
         })
         .collect();
     let scene = room.scene().with_materials(materials_before.clone())?;
@@ -242,7 +242,7 @@ fn match_targets(
         let fit = fitter.fit_t60(&[&paths], &materials_before, &priors, &air, &aim, observer)?;
         clock.lap("fit");
         let response = renderer.render(&paths, &fit.materials, &air)?;
-        let parameters = RoomParameters::measure(&response, OctaveBands::T60)?;
+        let parameters = RoomParameters::measure(&response, Bands::T60)?;
         clock.lap("render");
         let next = corrected(&aim, targets.t60_s(), &parameters.t30_s, &fit);
         corrections += 1;
@@ -254,7 +254,7 @@ fn match_targets(
     let mut waves = None;
     if let Some(low_end) = low_end {
         let (joined, found) = low_end.join((source, receiver), &fit.materials, &air, &response, observer)?;
-        parameters = RoomParameters::measure(&joined, OctaveBands::T60)?;
+        parameters = RoomParameters::measure(&joined, Bands::T60)?;
         (response, waves) = (joined, Some(found));
         clock.lap("waves");
     }
@@ -262,7 +262,7 @@ fn match_targets(
     warn_of_misses(targets.t60_s(), &parameters.t30_s, &fit, &mut warnings);
     warn_of_fit(&fit, room, &mut warnings);
     warnings.extend(fit.unreachable.iter().map(|u| Warning::Unreachable(u.clone())));
-    let eq_simulated_db = equalisation(&response, OctaveBands::EQ)?
+    let eq_simulated_db = equalisation(&response, Bands::EQ)?
         .map(|reading| reading.as_ref().map_or(f64::NAN, |estimate| estimate.value));
     let eq_filter = {
         let above = config.above_8_khz_db.map(|gain_db| AboveBand { from_band_hz: 8000.0, gain_db });
@@ -408,7 +408,7 @@ fn to_full_scale(sound: Signal) -> Result<(Signal, f64), Error> {
 fn decay_curves(response: &ImpulseResponse) -> Result<PerBand<EnergyDecayCurve>, Error> {
     let rate = response.sample_rate_hz();
     let step = (f64::from(rate) * DECAY_STEP_S).round() as usize;
-    let bank = FilterBank::new(OctaveBands::T60, rate)?;
+    let bank = FilterBank::new(Bands::T60, rate)?;
     Ok(bank.split(response.samples()).map(|band| {
         let energy: Vec<f64> =
             band.chunks(step).map(|bin| bin.iter().map(|&s| f64::from(s) * f64::from(s)).sum()).collect();

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
 use sabine::acoustics::{
-    Error, Estimate, MeasuredRoom, NoReading, OctaveBands, PathSet, PerBand, Propagator, RoomEstimator,
+    Bands, Error, Estimate, MeasuredRoom, NoReading, PathSet, PerBand, Propagator, RoomEstimator,
     RoomTargets, Signal, equalisation,
 };
 use sabine::propagate::{PathTracer, TracerConfig};
@@ -22,8 +22,8 @@ impl RoomEstimator for Told {
 const EQ_DB: [f64; 7] = [-3.0, 2.0, 1.0, 0.5, 0.0, -2.0, -5.0];
 
 fn told(t60_s: [f64; 7]) -> Told {
-    let t60 = PerBand::from_fn(OctaveBands::T60, |i| Estimate::new(t60_s[i], 0.05));
-    let eq = PerBand::from_fn(OctaveBands::EQ, |i| Estimate::new(EQ_DB[i], 1.0));
+    let t60 = PerBand::from_fn(Bands::T60, |i| Estimate::new(t60_s[i], 0.05));
+    let eq = PerBand::from_fn(Bands::EQ, |i| Estimate::new(EQ_DB[i], 1.0));
     Told(RoomTargets::new(t60, eq).unwrap())
 }
 
@@ -63,7 +63,7 @@ fn targets_are_reached_and_the_equalisation_is_the_one_heard() {
     // The response through the filter, up to 2 kHz: at 4 kHz the step to -50 dB at 8 kHz reaches into the octave.
     let through = sabine::eqfilter::convolve(matched.response.samples(), matched.eq_filter.taps());
     let through = Signal::new(through, matched.response.sample_rate_hz()).unwrap();
-    let heard = equalisation(&through.into(), OctaveBands::EQ).unwrap();
+    let heard = equalisation(&through.into(), Bands::EQ).unwrap();
     for (band, wanted) in EQ_DB.iter().enumerate().take(6) {
         let level_db = heard.values()[band].as_ref().unwrap().value;
         assert!((level_db - wanted).abs() < 1.5, "band {band}: {level_db} dB for {wanted} dB");

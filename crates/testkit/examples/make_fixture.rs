@@ -8,8 +8,8 @@ use rand_pcg::Pcg64Mcg;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
 use sabine_acoustics::{
-    Air, Channel, ImpulseResponse, Levels, Material, MaterialPrior, Measurement, NamedMaterial, NewResponse,
-    NewRoom, OctaveBands, PerBand, Receiver, SampleFormat, Scene, Source, TimeZero, Triangle,
+    Air, Bands, Channel, ImpulseResponse, Levels, Material, MaterialPrior, Measurement, NamedMaterial,
+    NewResponse, NewRoom, PerBand, Receiver, SampleFormat, Scene, Source, TimeZero, Triangle,
     library_material, read_audio, write_atomically, write_wav,
 };
 use sabine_testkit::{PhononConfig, Phonons};
@@ -18,9 +18,9 @@ use std::error::Error;
 use std::path::Path;
 
 /// Bands of the room's tables, as most rooms have them.
-const TABLES: OctaveBands = OctaveBands::T60;
+const TABLES: Bands = Bands::T60;
 /// Bands of the truth.
-const TRUTH: OctaveBands = OctaveBands::SIMULATION;
+const TRUTH: Bands = Bands::SIMULATION;
 /// Longer than the longest reverberation time.
 const DURATION_S: f64 = 1.25;
 /// Level of the noise below the speech, in dB.

@@ -1,7 +1,7 @@
 //! Octave bands of a response, by one long Fourier transform.
 
 use realfft::RealFftPlanner;
-use sabine_acoustics::OctaveBands;
+use sabine_acoustics::Bands;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// What adds up to one across the bands.
@@ -15,7 +15,7 @@ pub(crate) enum Complement {
 
 /// Filters each band's impulses by its octave and adds them up; zero phase, the outer bands reaching to 0 Hz and to Nyquist.
 pub(crate) fn join_bands(
-    bands: OctaveBands,
+    bands: Bands,
     columns: Vec<Vec<f64>>,
     sample_rate_hz: u32,
     complement: Complement,
@@ -51,7 +51,7 @@ pub(crate) fn join_bands(
 }
 
 /// Raised cosine over an octave to each side of the centre.
-fn gain(bands: OctaveBands, band: usize, frequency_hz: f64) -> f64 {
+fn gain(bands: Bands, band: usize, frequency_hz: f64) -> f64 {
     let octaves = (frequency_hz / bands.exact_hz(band)).log2();
     let (lowest, highest) = (band == 0, band + 1 == bands.len());
     if (lowest && octaves < 0.0) || (highest && octaves > 0.0) {

@@ -54,8 +54,8 @@ use noise::{BandEnergies, Noise};
 use random_room::Declared;
 use rayon::prelude::*;
 use sabine_acoustics::{
-    Air, Error, ImpulseResponse, Material, MaterialPrior, MeasuredRoom, Measurement, NamedMaterial,
-    NewResponse, NewRoom, OctaveBands, PerBand, Receiver, Scene, Source, Triangle,
+    Air, Bands, Error, ImpulseResponse, Material, MaterialPrior, MeasuredRoom, Measurement, NamedMaterial,
+    NewResponse, NewRoom, PerBand, Receiver, Scene, Source, Triangle,
 };
 use scattered_field::ScatteredField;
 use std::io;
@@ -77,7 +77,7 @@ use truth::Medium;
 #[derive(Clone, Debug)]
 pub struct Laboratory {
     config: LabConfig,
-    bands: OctaveBands,
+    bands: Bands,
     scene: Scene,
     priors: Vec<MaterialPrior>,
     air: Air,
@@ -328,7 +328,7 @@ impl Session {
 }
 
 /// The declared box: as many materials as there are, each on its faces.
-fn scene(bands: OctaveBands, declared: &Declared, truth: &Truth) -> Result<Scene, Error> {
+fn scene(bands: Bands, declared: &Declared, truth: &Truth) -> Result<Scene, Error> {
     let materials: Vec<NamedMaterial> = declared
         .absorption
         .iter()

@@ -16,9 +16,9 @@
 //! What it does **not** do: run fast, read files of users, or follow diffraction but in [`WaveGrid`].
 //!
 //! ```
-//! use sabine_acoustics::{Material, OctaveBands, Receiver, Scene, Source};
+//! use sabine_acoustics::{Material, Bands, Receiver, Scene, Source};
 //! use sabine_testkit::ShoeboxImages;
-//! let bands = OctaveBands::new(1000.0, 1000.0)?;
+//! let bands = Bands::octaves(1000.0, 1000.0)?;
 //! let hard = Material::uniform(bands, 0.1, 0.0)?;
 //! let room = Scene::shoebox([10.0, 7.0, 3.0], std::array::from_fn(|_| hard.clone()))?;
 //! let (source, receiver) = (Source::omni("s", [2.0, 3.0, 1.5])?, Receiver::omni("r", [7.0, 4.0, 1.6])?);

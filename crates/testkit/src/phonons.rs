@@ -6,7 +6,7 @@ use crate::geometry::{Vec3, add, cross, dot, first_hit, norm, scale, sub};
 use crate::own_air::{energy_exponent_per_m, speed_of_sound_m_s};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use sabine_acoustics::{Air, EnergyResponse, Error, ImpulseResponse, OctaveBands, Receiver, Scene, Source};
+use sabine_acoustics::{Air, Bands, EnergyResponse, Error, ImpulseResponse, Receiver, Scene, Source};
 use std::f64::consts::{PI, TAU};
 
 /// Batches into which the particles fall: their scatter gives the standard errors, and each has its own random numbers, so that
@@ -44,7 +44,7 @@ pub struct Phonons {
     normals: Vec<Vec3>,
     /// Per triangle and band: (1 - absorption, scattering).
     surfaces: Vec<Vec<(f64, f64)>>,
-    bands: OctaveBands,
+    bands: Bands,
 }
 
 /// What [`Phonons::energy`] finds.

@@ -1,7 +1,7 @@
 //! The committed fixtures: there, whole, and as far from their own tables as they claim.
 #![allow(clippy::unwrap_used)] // the helpers of tests may panic as the tests do
 
-use sabine_acoustics::{Channel, EnergyDecayCurve, MeasuredRoom, OctaveBands, read_audio};
+use sabine_acoustics::{Bands, Channel, EnergyDecayCurve, MeasuredRoom, read_audio};
 use sabine_testkit::assert_close;
 use std::path::{Path, PathBuf};
 
@@ -30,8 +30,8 @@ fn the_room_is_read_and_its_tables_are_wrong() {
     let truth = truth();
     assert_close("volume (m3)", room.scene().volume_m3(), 145.7, 0.1, 0.0);
     assert!(room.scene().materials().len() >= 6);
-    assert_eq!(room.bands(), OctaveBands::T60);
-    let bands = OctaveBands::from_centres_hz(&numbers(&truth["bands_hz"])).unwrap();
+    assert_eq!(room.bands(), Bands::T60);
+    let bands = Bands::from_centres_hz(&numbers(&truth["bands_hz"])).unwrap();
     let t60_s = numbers(&truth["t60_s"]);
     let at = bands.index_of(250.0).unwrap();
     let stated =

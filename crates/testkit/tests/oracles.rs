@@ -4,8 +4,8 @@
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sabine_acoustics::{
-    Air, EnergyResponse, Material, NamedMaterial, OctaveBands, PathSet, PerBand, Propagator, RayScene,
-    Receiver, Scene, Source, Triangle,
+    Air, Bands, EnergyResponse, Material, NamedMaterial, PathSet, PerBand, Propagator, RayScene, Receiver,
+    Scene, Source, Triangle,
 };
 use sabine_testkit::{
     BruteForceRays, PhononConfig, Phonons, ShoeboxImages, assert_all_close, assert_close,
@@ -14,8 +14,8 @@ use sabine_testkit::{
 
 const SIZE_M: [f64; 3] = [10.0, 7.0, 3.0];
 
-fn one_band() -> OctaveBands {
-    OctaveBands::new(1000.0, 1000.0).unwrap()
+fn one_band() -> Bands {
+    Bands::octaves(1000.0, 1000.0).unwrap()
 }
 
 fn shoebox(absorption: f64, scattering: f64) -> Scene {
@@ -81,7 +81,7 @@ fn the_first_images_are_where_the_mirror_puts_them() {
 /// Through paths, with the vocabulary's air and materials, or straight: the same energy.
 #[test]
 fn paths_carry_what_the_images_carry() {
-    let bands = OctaveBands::T60;
+    let bands = Bands::T60;
     let material = |i: usize| {
         let a = PerBand::from_fn(bands, |b| 0.05 + 0.1 * i as f64 + 0.02 * b as f64);
         Material::new(a, PerBand::uniform(bands, 0.1)).unwrap()
@@ -120,7 +120,7 @@ fn source_and_receiver_may_change_places() {
 /// between the bands nothing is lost.
 #[test]
 fn pressure_adds_up_the_images() {
-    let bands = OctaveBands::SIMULATION;
+    let bands = Bands::SIMULATION;
     let a = PerBand::from_fn(bands, |b| 0.5 - 0.05 * b as f64);
     let m = Material::new(a, PerBand::uniform(bands, 0.0)).unwrap();
     let scene = Scene::shoebox(SIZE_M, std::array::from_fn(|_| m.clone())).unwrap();
@@ -266,7 +266,7 @@ fn phonons_and_images_agree() {
 /// The pressure's power is the energy, and the seed alone decides.
 #[test]
 fn the_pressure_of_phonons_has_their_energy() {
-    let bands = OctaveBands::new(500.0, 2000.0).unwrap();
+    let bands = Bands::octaves(500.0, 2000.0).unwrap();
     let m = Material::uniform(bands, 0.2, 0.5).unwrap();
     let scene = Scene::shoebox(SIZE_M, std::array::from_fn(|_| m.clone())).unwrap();
     let (source, receiver) = places();

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// Responses that lie in a folder become a measured room:
 /// ```
 /// use sabine_acoustics::*;
-/// let bands = OctaveBands::new(500.0, 1000.0)?;
+/// let bands = Bands::octaves(500.0, 1000.0)?;
 /// let wall = Material::uniform(bands, 0.1, 0.1)?;
 /// let prior = MaterialPrior { absorption: Some(wall.absorption().clone()), absorption_sd: PerBand::uniform(bands, 0.05) };
 /// let mut samples = vec![0.0; 4800];

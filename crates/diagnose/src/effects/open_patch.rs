@@ -199,10 +199,10 @@ mod tests {
     #![allow(clippy::unwrap_used)] // a panic is how a test fails
     use super::*;
     use crate::planes::planes;
-    use sabine_acoustics::{Material, OctaveBands, Scene};
+    use sabine_acoustics::{Bands, Material, Scene};
 
     fn wall() -> OneWall {
-        let hard = Material::uniform(OctaveBands::T60, 0.1, 0.0).unwrap();
+        let hard = Material::uniform(Bands::T60, 0.1, 0.0).unwrap();
         let scene = Scene::shoebox([5.0, 4.0, 3.0], std::array::from_fn(|_| hard.clone())).unwrap();
         OneWall { index: 0, plane: planes(&scene).0[0].clone() }
     }

@@ -41,7 +41,7 @@ impl Effect for RoomModes {
     }
 
     fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {
-        if survey.octaves_of_modes == 0 { Vec::new() } else { vec![Box::new(*self)] }
+        if survey.bands_of_modes == 0 { Vec::new() } else { vec![Box::new(*self)] }
     }
 }
 

@@ -3,7 +3,7 @@
 use super::{BandState, CELL_S, NO_EXTRA, NOTHING, SCATTERING_GRID, TracedPair};
 use crate::bins::Bins;
 use crate::kernel::BandKernel;
-use sabine_acoustics::{Conditions, Error, Material, OctaveBands, PathSet, PerBand};
+use sabine_acoustics::{Bands, Conditions, Error, Material, PathSet, PerBand};
 
 impl TracedPair {
     /// Energies and the tracer's own variance at other scattering.
@@ -95,7 +95,7 @@ fn variance_of_sum(batches: &[f64]) -> f64 {
 
 /// A material that scatters more (of what it reflects specularly) or less (of what it scatters).
 pub(crate) fn scattering_more(material: &Material, extra: f64) -> Result<Material, Error> {
-    let bands: OctaveBands = material.bands();
+    let bands: Bands = material.bands();
     let changed = PerBand::from_fn(bands, |b| {
         let s = material.scattering().values()[b];
         (if extra >= 0.0 { s + (1.0 - s) * extra } else { s * (1.0 + extra) }).clamp(0.0, 1.0)

@@ -1,4 +1,4 @@
-//! What the wave equation says of the lowest octaves, in the bins in which they are measured.
+//! What the wave equation says of the lowest bands, in the bins in which they are measured.
 
 use super::Workbench;
 use crate::Error;
@@ -6,10 +6,11 @@ use crate::bins::Bins;
 use crate::kernel::BandKernel;
 use crate::measured;
 use crate::traced_pair::CELL_S;
-use sabine_acoustics::{Air, FilterBank, Material, OctaveBands, Receiver, Scene};
+use sabine_acoustics::{Air, FilterBank, Material, Receiver, Scene};
 use sabine_propagate::wave::{WaveConfig, WaveRoom, WaveSolver};
 
-/// A filter for an octave lets in what lies this far above its centre, as a factor of frequency: there it has lost 20 dB.
+/// The filter of an octave lets in what lies this far above its centre, as a factor of frequency: there it has lost 20 dB. That of a third
+/// octave lets in a third as much of the logarithm.
 const LET_IN: f64 = 1.9;
 /// Voxels per wave length at the limit: modes of the octave's middle are too low by 0.2 %.
 const POINTS_PER_WAVELENGTH: f64 = 14.0;
@@ -28,8 +29,8 @@ const MOST_UPDATES: f64 = 2e10;
 /// Largest change that counts, in nepers of energy: a node of the waves is never so deep where it is measured.
 const MOST_CHANGE: f64 = 5.0;
 
-/// How many of the lowest octaves lie below the Schroeder frequency, T by Eyring's formula; the lowest counts if it reaches below.
-pub(super) fn octaves_of_modes(scene: &Scene, materials: &[Material], air: &Air) -> usize {
+/// How many of the lowest bands lie below the Schroeder frequency, T by Eyring's formula; the lowest counts if it reaches below.
+pub(super) fn bands_of_modes(scene: &Scene, materials: &[Material], air: &Air) -> usize {
     let Some(bands) = materials.first().map(Material::bands) else { return 0 };
     let areas = scene.material_areas_m2();
     let (surface, volume_m3) = (areas.iter().sum::<f64>(), scene.volume_m3().abs());
@@ -59,21 +60,21 @@ impl Workbench {
     /// Solves the wave equation for every source at the materials of the expansion, and tabulates by how much its energies differ from
     /// those of the paths. What keeps the solver from it becomes a note, and the table stays empty.
     pub(super) fn tabulate_waves(&mut self, materials: &[Material]) -> Result<(), Error> {
-        let octaves = self.survey.octaves_of_modes;
-        if octaves == 0 {
+        let count = self.survey.bands_of_modes;
+        if count == 0 {
             return Ok(());
         }
         let started = std::time::Instant::now();
-        let plan = self.plan(octaves);
+        let plan = self.plan(count);
         if plan.updates > MOST_UPDATES {
-            self.survey.octaves_of_modes = 0;
+            self.survey.bands_of_modes = 0;
             let updates = plan.updates;
             self.notes.push(format!(
                 "Standing waves are not looked for: {updates:.0e} steps of voxels would be too many."
             ));
             return Ok(());
         }
-        let tables = self.wave_energies(octaves, plan, materials);
+        let tables = self.wave_energies(count, plan, materials);
         *self.seconds.entry("waves").or_default() += started.elapsed().as_secs_f64();
         match tables {
             Ok(tables) => {
@@ -85,7 +86,7 @@ impl Workbench {
                 Ok(())
             }
             Err(error) => {
-                self.survey.octaves_of_modes = 0;
+                self.survey.bands_of_modes = 0;
                 self.notes.push(format!("Standing waves are not looked for: {error}."));
                 Ok(())
             }
@@ -93,7 +94,7 @@ impl Workbench {
     }
 
     /// What is to be solved, and what it takes.
-    fn plan(&self, octaves: usize) -> Plan {
+    fn plan(&self, count: usize) -> Plan {
         let scene = self.resized.as_ref().unwrap_or(&self.scene);
         let corner = |fold: fn(f64, f64) -> f64, from: f64, k: usize| {
             scene.vertices().iter().map(|v| v[k]).fold(from, fold)
@@ -102,12 +103,13 @@ impl Workbench {
         let longest_m = (0..3).map(side).fold(0.0, f64::max);
         let compared_s = |pair: usize| {
             let end = |band: usize| self.states[pair][band].bins.edge_s(self.ends[pair][band]);
-            self.direct_s[pair] + (0..octaves).map(end).fold(0.0, f64::max) + MARGIN_S
+            self.direct_s[pair] + (0..count).map(end).fold(0.0, f64::max) + MARGIN_S
         };
         let slowest_m_s = self.speed_m_s.iter().copied().fold(f64::INFINITY, f64::min);
         let least_s = PERIODS * 2.0 * longest_m / slowest_m_s;
         let config = WaveConfig {
-            limit_hz: LET_IN * self.survey.bands.exact_hz(octaves - 1),
+            limit_hz: LET_IN.powf(1.0 / self.survey.bands.per_octave() as f64)
+                * self.survey.bands.exact_hz(count - 1),
             points_per_wavelength: POINTS_PER_WAVELENGTH,
             duration_s: (0..self.pairs.len()).map(compared_s).fold(least_s, f64::max),
             sample_rate_hz: RATE_HZ,
@@ -127,20 +129,20 @@ impl Workbench {
         }
         let spacing_m = slowest_m_s / (config.limit_hz * POINTS_PER_WAVELENGTH);
         let steps = config.duration_s * slowest_m_s * 3f64.sqrt() / spacing_m;
-        // An octave more lies partly below the limit.
-        let runs = (solutions.len() * (octaves + 1)) as f64;
+        // A band more lies partly below the limit.
+        let runs = (solutions.len() * (count + 1)) as f64;
         Plan { updates: runs * steps * scene.volume_m3().abs() / spacing_m.powi(3), config, solutions }
     }
 
-    /// Energies of the wave solution, `[pair][octave][bin]`.
+    /// Energies of the wave solution, `[pair][band][bin]`.
     fn wave_energies(
         &self,
-        octaves: usize,
+        count: usize,
         plan: Plan,
         materials: &[Material],
     ) -> Result<Vec<Vec<Vec<f64>>>, sabine_propagate::Error> {
         let bands = self.survey.bands;
-        let low = OctaveBands::new(bands.nominal_hz(0), bands.nominal_hz(octaves - 1))?;
+        let low = bands.part(0..count);
         let bank = FilterBank::new(low, RATE_HZ)?;
         let kernels = BandKernel::all(low, RATE_HZ, CELL_S)?;
         let solver = WaveSolver::new(plan.config)?;
@@ -158,7 +160,7 @@ impl Workbench {
                 let rate = f64::from(RATE_HZ);
                 let direct = response.lead() as f64 + self.direct_s[pair] * rate;
                 let filtered = bank.analyse(&samples);
-                found[pair] = (0..octaves)
+                found[pair] = (0..count)
                     .map(|band| {
                         let bins = Bins::new(bands, band);
                         measured::energies(&filtered.values()[band], direct, rate, bins, kernels[band].energy)

@@ -5,9 +5,9 @@ use crate::AbsorptionPrior;
 use crate::history::History;
 use crate::measured_decay::BinnedDecay;
 use crate::pulse::Pulse;
-use sabine_acoustics::{Air, Contribution, Levels, OctaveBands, PathSet, Reflection};
+use sabine_acoustics::{Air, Bands, Contribution, Levels, PathSet, Reflection};
 
-const OCTAVES: OctaveBands = OctaveBands::T60;
+const OCTAVES: Bands = Bands::T60;
 const WINDOWS: usize = 6;
 const WINDOW_S: f64 = 0.02;
 const NOISE: f64 = 0.05;

@@ -5,7 +5,7 @@
 
 use rand::{Rng, SeedableRng};
 use sabine_acoustics::{
-    Air, FilterBank, Material, NamedMaterial, OctaveBands, PerBand, Receiver, Scene, Source, Triangle,
+    Air, Bands, FilterBank, Material, NamedMaterial, PerBand, Receiver, Scene, Source, Triangle,
 };
 use sabine_testkit::{Image, ShoeboxImages};
 use std::f64::consts::PI;
@@ -17,7 +17,7 @@ pub const RECEIVERS: [[f64; 3]; 4] = [[4.9, 1.4, 1.4], [1.6, 3.6, 1.1], [3.4, 0.
 /// The octaves of a test, and what its responses are sampled with.
 #[derive(Clone, Copy)]
 pub struct Hearing {
-    pub octaves: OctaveBands,
+    pub octaves: Bands,
     pub rate_hz: u32,
     pub duration_s: f64,
 }
@@ -112,7 +112,7 @@ impl Walls {
 }
 
 /// The box, its six faces made of the given materials; no scattering, so that image sources are the whole truth.
-pub fn room(octaves: OctaveBands, faces: [usize; 6], absorption: &[Vec<f64>]) -> Scene {
+pub fn room(octaves: Bands, faces: [usize; 6], absorption: &[Vec<f64>]) -> Scene {
     let material = |a: &Vec<f64>| {
         let absorption = PerBand::new(octaves, a.clone()).unwrap();
         Material::new(absorption, PerBand::uniform(octaves, 0.0)).unwrap()

@@ -63,18 +63,16 @@ impl Model {
     }
 
     fn scene(self, absorption: f64, scattering: f64) -> Scene {
-        let material = Material::uniform(OctaveBands::SIMULATION, absorption, scattering).unwrap();
+        let material = Material::uniform(Bands::SIMULATION, absorption, scattering).unwrap();
         let materials = (0..6).map(|i| NamedMaterial { name: i.to_string(), material: material.clone() });
         Scene::new(self.vertices, self.triangles, materials.collect()).unwrap()
     }
 }
 
 fn walls(cells: u32) -> Model {
-    let plain = Scene::shoebox(
-        SIZE_M,
-        std::array::from_fn(|_| Material::uniform(OctaveBands::T60, 0.1, 0.1).unwrap()),
-    )
-    .unwrap();
+    let plain =
+        Scene::shoebox(SIZE_M, std::array::from_fn(|_| Material::uniform(Bands::T60, 0.1, 0.1).unwrap()))
+            .unwrap();
     let mut model = Model::default();
     for wall in 0..6 {
         let [a, b, _] = plain.corners_m(2 * wall);

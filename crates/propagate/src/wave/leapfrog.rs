@@ -138,11 +138,11 @@ mod tests {
     use super::*;
     use crate::random::generator;
     use rand::Rng;
-    use sabine_acoustics::{Air, Material, NamedMaterial, OctaveBands, Scene, Source, Triangle};
+    use sabine_acoustics::{Air, Bands, Material, NamedMaterial, Scene, Source, Triangle};
 
     /// A wedge-shaped room with slanted walls, and a screen in it.
     fn room() -> WaveRoom {
-        let wall = Material::uniform(OctaveBands::SIMULATION, 0.1, 0.0).unwrap();
+        let wall = Material::uniform(Bands::SIMULATION, 0.1, 0.0).unwrap();
         let (a, b) = ([0.0, 0.0], [3.1, 0.4]);
         let (c, d) = ([3.7, 2.9], [-0.3, 2.2]);
         let lift = |p: [f64; 2], z: f64| [p[0], p[1], z];

@@ -13,7 +13,7 @@ use crate::error::check_range;
 use crate::placement::check_placement;
 use crate::spectrum::Spectrum;
 use realfft::num_complex::Complex;
-use sabine_acoustics::{Air, Material, Observer, OctaveBands, Receiver, Scene, Source};
+use sabine_acoustics::{Air, Bands, Material, Observer, Receiver, Scene, Source};
 use std::f64::consts::{PI, SQRT_2};
 
 /// Periods of the lowest mode that a response must hold.
@@ -101,7 +101,7 @@ impl WaveConfig {
 /// use sabine_acoustics::*;
 /// use sabine_propagate::wave::{WaveConfig, WaveSolver};
 /// // A rigid box of 3.43 m x 2.5 m x 2 m resounds at c / 2L = 50 Hz, here heard 2 m apart along its length.
-/// let rigid = Material::uniform(OctaveBands::SIMULATION, 0.01, 0.0)?;
+/// let rigid = Material::uniform(Bands::SIMULATION, 0.01, 0.0)?;
 /// let scene = Scene::shoebox([3.432, 2.5, 2.0], std::array::from_fn(|_| rigid.clone()))?;
 /// let config = WaveConfig { limit_hz: 80.0, duration_s: 0.5, sample_rate_hz: 1000, ..Default::default() };
 /// let (source, receiver) = (Source::omni("s", [0.4, 0.4, 0.4])?, Receiver::omni("r", [3.0, 0.5, 0.5])?);
@@ -251,8 +251,8 @@ impl WaveSolver {
         self.solve(&self.prepare(scene, source, air)?, &materials, source, receivers, air, observer)
     }
 
-    /// The octaves whose absorption counts below the limit.
-    fn bands(&self, room: &WaveRoom, materials: &[Material]) -> Result<OctaveBands, Error> {
+    /// The bands whose absorption counts below the limit.
+    fn bands(&self, room: &WaveRoom, materials: &[Material]) -> Result<Bands, Error> {
         let expected = room.material_areas_m2().len();
         let (Some(first), true) = (materials.first(), materials.len() == expected) else {
             return Err(sabine_acoustics::Error::MaterialCount { expected, found: materials.len() }.into());
@@ -262,7 +262,7 @@ impl WaveSolver {
             return Err(sabine_acoustics::Error::BandMismatch { left: bands, right: other.bands() }.into());
         }
         let used = (0..bands.len()).rfind(|&i| bands.edges_hz(i).0 < self.config.limit_hz).unwrap_or(0);
-        Ok(OctaveBands::new(bands.nominal_hz(0), bands.nominal_hz(used))?)
+        Ok(bands.part(0..used + 1))
     }
 
     /// About the lowest mode of the room: half a wave along its longest side.

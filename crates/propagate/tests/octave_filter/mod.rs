@@ -1,6 +1,6 @@
 //! Octave filters in the time domain.
 
-use sabine_acoustics::{EnergyDecayCurve, OctaveBands};
+use sabine_acoustics::{Bands, EnergyDecayCurve};
 
 /// Second-order section.
 struct Section {
@@ -27,7 +27,7 @@ fn butterworth(edge_hz: f64, rate_hz: f64, high_pass: bool) -> Vec<Section> {
 }
 
 /// Octave-filtered samples; run backwards in time, so that the filter's own decay does not lengthen the room's.
-pub fn octave(samples: &[f32], rate_hz: f64, bands: OctaveBands, band: usize) -> Vec<f64> {
+pub fn octave(samples: &[f32], rate_hz: f64, bands: Bands, band: usize) -> Vec<f64> {
     let (low, high) = bands.edges_hz(band);
     let mut sections = butterworth(low, rate_hz, true);
     if high < 0.45 * rate_hz {
@@ -50,7 +50,7 @@ pub fn octave(samples: &[f32], rate_hz: f64, bands: OctaveBands, band: usize) ->
 }
 
 /// Decay time in an octave from -5 dB to `end_db`.
-pub fn measured_t_s(samples: &[f32], rate_hz: f64, bands: OctaveBands, band: usize, end_db: f64) -> f64 {
+pub fn measured_t_s(samples: &[f32], rate_hz: f64, bands: Bands, band: usize, end_db: f64) -> f64 {
     let energy: Vec<f64> = octave(samples, rate_hz, bands, band).iter().map(|v| v * v).collect();
     EnergyDecayCurve::from_energy(&energy, 1.0 / rate_hz).decay_time_s(-5.0, end_db).unwrap()
 }

@@ -122,7 +122,7 @@ pub fn materials_of(scene: &Scene) -> Vec<Material> {
     scene.materials().iter().map(|named| named.material.clone()).collect()
 }
 
-pub fn uniform_box(size_m: [f64; 3], bands: OctaveBands, absorption: f64, scattering: f64) -> Scene {
+pub fn uniform_box(size_m: [f64; 3], bands: Bands, absorption: f64, scattering: f64) -> Scene {
     let m = Material::uniform(bands, absorption, scattering).unwrap();
     Scene::shoebox(size_m, std::array::from_fn(|_| m.clone())).unwrap()
 }

@@ -1,6 +1,6 @@
 //! What must hold of a mesh that was read.
 
-use sabine_acoustics::{Material, Mesh, OctaveBands};
+use sabine_acoustics::{Material, Mesh, Bands};
 use std::path::Path;
 
 /// Reads the file and asks for a scene of it.
@@ -13,7 +13,7 @@ pub fn check(path: &Path) {
         assert!(triangle.vertices.iter().all(|&v| (v as usize) < mesh.vertices_m().len()));
         assert!((triangle.material as usize) < mesh.material_names().len());
     }
-    let material = Material::uniform(OctaveBands::T60, 0.1, 0.1).expect("a plain material");
+    let material = Material::uniform(Bands::T60, 0.1, 0.1).expect("a plain material");
     let tables = mesh.material_names().iter().map(|name| (name.clone(), material.clone())).collect();
     if let Ok(scene) = mesh.into_scene(&tables) {
         assert!(scene.volume_m3().is_finite());

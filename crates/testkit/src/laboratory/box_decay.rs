@@ -7,8 +7,6 @@ use std::f64::consts::TAU;
 const STEP_S: f64 = 1e-3;
 /// Directions in an octant.
 const DIRECTIONS: usize = 512;
-/// Bands at most, so that they fit an array.
-pub(crate) const LANES: usize = 10;
 /// A band that has fallen by this much has no say, in dB.
 const SILENT_DB: f64 = 85.0;
 
@@ -49,8 +47,8 @@ impl BoxDecay {
         Self { bands, left }
     }
 
-    /// One over what the walls have left in each band, step by step; 0 where nothing is heard any more.
-    pub(crate) fn weights(&self, medium: &Medium) -> Weights {
+    /// One over what the walls have left in each band, step by step; 0 where nothing is heard any more, or there is no band.
+    pub(crate) fn weights<const LANES: usize>(&self, medium: &Medium) -> Weights<LANES> {
         let silent = 10f64.powf(-0.1 * SILENT_DB);
         let step = |(step, left): (usize, &[f64])| {
             let mut weights = [0.0; LANES];
@@ -90,11 +88,11 @@ impl BoxDecay {
 }
 
 /// What a share of energy is worth, against the mean of its age.
-pub(crate) struct Weights {
+pub(crate) struct Weights<const LANES: usize> {
     steps: Vec<[f64; LANES]>,
 }
 
-impl Weights {
+impl<const LANES: usize> Weights<LANES> {
     pub(crate) fn at(&self, time_s: f64) -> &[f64; LANES] {
         &self.steps[((time_s / STEP_S) as usize).min(self.steps.len() - 1)]
     }
@@ -103,12 +101,12 @@ impl Weights {
 #[cfg(test)]
 mod tests {
     use crate::{LabConfig, Laboratory, ShoeboxImages};
-    use sabine_acoustics::{OctaveBands, Receiver, Source};
+    use sabine_acoustics::{Bands, Receiver, Source};
 
     /// Images between two ages, counted one by one.
     #[test]
     fn walls_leave_to_images_what_the_mean_over_directions_says() {
-        let bands = OctaveBands::new(1000.0, 1000.0).unwrap();
+        let bands = Bands::octaves(1000.0, 1000.0).unwrap();
         let config = LabConfig { seed: 3, receivers: 1, sample_rate_hz: 8000, bands, ..LabConfig::default() };
         let lab = Laboratory::new(config).unwrap();
         let (truth, scene) = (lab.truth(&[]).unwrap(), lab.true_scene(&[]).unwrap());

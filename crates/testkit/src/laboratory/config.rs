@@ -1,6 +1,6 @@
 //! What a laboratory is asked for.
 
-use sabine_acoustics::{Error, Levels, OctaveBands, TimeZero};
+use sabine_acoustics::{Bands, Error, Levels, TimeZero};
 
 /// The room to draw and how it is measured.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,7 +18,7 @@ pub struct LabConfig {
     /// Sample rate of the responses in Hz; the highest octave must lie below half of it.
     pub sample_rate_hz: u32,
     /// Octaves of the material tables and of the responses.
-    pub bands: OctaveBands,
+    pub bands: Bands,
     /// What is declared about the first sample. Unless it is the emission, latencies of 1 to 20 ms are at work.
     pub time_zero: TimeZero,
     /// What is declared about levels. Unless they are absolute, gains of -10 to 10 dB are at work.
@@ -36,7 +36,7 @@ impl Default for LabConfig {
             sessions: 1,
             turned: false,
             sample_rate_hz: 48_000,
-            bands: OctaveBands::T60,
+            bands: Bands::T60,
             time_zero: TimeZero::Emission,
             levels: Levels::Common,
             orientation: true,

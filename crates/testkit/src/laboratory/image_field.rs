@@ -1,6 +1,6 @@
 //! What mirrors send: image sources, each with a sign of its own.
 
-use super::box_decay::{BoxDecay, LANES};
+use super::box_decay::BoxDecay;
 use super::local_reaction::LocalReaction;
 use super::panel::{self, Panel};
 use super::patch::{self, Patch};
@@ -63,12 +63,28 @@ pub(crate) fn add_images(
     pair: (usize, usize),
     columns: &mut Columns,
 ) {
+    // All that there are of octaves, and of third octaves.
+    if truth.bands_hz.len() <= 10 {
+        add_images_of::<10>(truth, medium, decay, pair, columns);
+    } else {
+        add_images_of::<30>(truth, medium, decay, pair, columns);
+    }
+}
+
+/// The same for `LANES` bands at most, so that they fit an array.
+fn add_images_of<const LANES: usize>(
+    truth: &Truth,
+    medium: &Medium,
+    decay: &BoxDecay,
+    pair: (usize, usize),
+    columns: &mut Columns,
+) {
     let (source, receiver) = (&truth.sources[pair.0], truth.receivers_m[pair.1]);
     let bands = truth.bands_hz.len();
     let seed = key(truth.seed, Purpose::Signs, pair.0 * truth.receivers_m.len() + pair.1);
     let end_s = columns.start_s + columns.samples[0].len() as f64 / columns.rate_hz;
     let longest_m = end_s.min(decay.all_fallen_s(medium, LEAST_DB)) * medium.speed_m_s;
-    let axes = [0, 1, 2].map(|a| Axis::new(truth, a, source.position_m[a], receiver[a], longest_m));
+    let axes = [0, 1, 2].map(|a| Axis::<LANES>::new(truth, a, source.position_m[a], receiver[a], longest_m));
     let gains: Vec<f64> = truth.source_gains_db.iter().map(|db| 10f64.powf(db / 20.0)).collect();
     let volume_m3 = truth.volume_m3();
     // Images in a second at an age t: 4 pi c^3 t^2 / V.
@@ -78,7 +94,7 @@ pub(crate) fn add_images(
     let (panels, patches) = (Panel::all(truth), Patch::all(truth));
     panel::add_reflections(truth, medium, &panels, pair, columns);
     let local = LocalReaction::of(truth);
-    let weights = decay.weights(medium);
+    let weights = decay.weights::<LANES>(medium);
     let mut row = [0.0; LANES];
     let mut by_angle = [1.0; LANES];
     let mut amplitudes = vec![0.0; bands];
@@ -159,11 +175,11 @@ fn times_met(index: i64) -> [f64; 2] {
 }
 
 /// The images of a source along one axis.
-struct Axis {
-    images: Vec<AxisImage>,
+struct Axis<const LANES: usize> {
+    images: Vec<AxisImage<LANES>>,
 }
 
-struct AxisImage {
+struct AxisImage<const LANES: usize> {
     index: i64,
     /// From the receiver to the image.
     offset_m: f64,
@@ -173,7 +189,7 @@ struct AxisImage {
     walls: [f64; LANES],
 }
 
-impl Axis {
+impl<const LANES: usize> Axis<LANES> {
     fn new(truth: &Truth, axis: usize, source: f64, receiver: f64, longest_m: f64) -> Self {
         let side = truth.size_m[axis];
         let reach = (longest_m / side).ceil() as i64 + 1;

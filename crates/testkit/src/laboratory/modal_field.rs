@@ -8,7 +8,7 @@ use crate::own_air::energy_exponent_per_m;
 use rayon::prelude::*;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
-use sabine_acoustics::{Error, OctaveBands};
+use sabine_acoustics::{Bands, Error};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Width of the crossover between standing waves and images, in octaves.
@@ -75,7 +75,7 @@ pub(crate) fn check(truth: &Truth) -> Result<(), Error> {
 pub(crate) fn join(
     truth: &Truth,
     medium: &Medium,
-    bands: OctaveBands,
+    bands: Bands,
     index: usize,
     sample_rate_hz: u32,
     samples: Vec<f64>,
@@ -165,11 +165,12 @@ fn step(hz: f64, below_hz: f64) -> f64 {
 }
 
 /// The admittance of each face at a frequency.
-fn admittances(truth: &Truth, bands: OctaveBands, hz: f64) -> [f64; 6] {
+fn admittances(truth: &Truth, bands: Bands, hz: f64) -> [f64; 6] {
     let count = bands.len();
-    let octaves = (hz.max(1e-3) / bands.exact_hz(0)).log2().clamp(0.0, (count - 1) as f64);
-    let lower = (octaves as usize).min(count.saturating_sub(2));
-    let (upper, share) = ((lower + 1).min(count - 1), octaves - lower as f64);
+    let octaves = (hz.max(1e-3) / bands.exact_hz(0)).log2();
+    let place = (octaves * bands.per_octave() as f64).clamp(0.0, (count - 1) as f64);
+    let lower = (place as usize).min(count.saturating_sub(2));
+    let (upper, share) = ((lower + 1).min(count - 1), place - lower as f64);
     truth.faces.map(|m| {
         let absorption = &truth.materials[m].absorption;
         let value = absorption[lower] * (1.0 - share) + absorption[upper] * share;

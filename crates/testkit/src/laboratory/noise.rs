@@ -6,7 +6,7 @@ use super::stream::{Purpose, stream};
 use super::truth::Truth;
 use rand::Rng;
 use rand_distr::StandardNormal;
-use sabine_acoustics::OctaveBands;
+use sabine_acoustics::Bands;
 
 /// Energy of the recorder's noise over the whole response relative to the response's own, in dB, in the octave and the response
 /// where it is largest.
@@ -74,7 +74,7 @@ impl Noise {
         &self,
         truth: &Truth,
         index: usize,
-        bands: OctaveBands,
+        bands: Bands,
         sample_rate_hz: u32,
         samples: &mut [f64],
     ) {

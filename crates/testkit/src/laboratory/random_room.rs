@@ -8,7 +8,7 @@ use rand::Rng;
 use rand::seq::SliceRandom;
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
-use sabine_acoustics::{Error, Levels, TimeZero};
+use sabine_acoustics::{Bands, Error, Levels, TimeZero};
 
 /// Names of materials; nothing follows from them.
 const NAMES: [&str; 10] =
@@ -55,8 +55,7 @@ pub(crate) fn draw(config: &LabConfig) -> Result<(Declared, Truth), Error> {
         }
         let faces = draw_faces(&mut random);
         let count = faces.iter().max().map_or(0, |m| m + 1);
-        let declared: Vec<Vec<f64>> =
-            (0..count).map(|_| draw_table(&mut random, config.bands.len())).collect();
+        let declared: Vec<Vec<f64>> = (0..count).map(|_| draw_table(&mut random, config.bands)).collect();
         let temperature_c = 5.0 + 28.0 * unit(&mut random);
         let relative_humidity_percent = 15.0 + 70.0 * unit(&mut random);
         let sd: Vec<Vec<f64>> = (0..count)
@@ -209,14 +208,16 @@ fn draw_faces(random: &mut Pcg64Mcg) -> [usize; 6] {
 }
 
 /// A table that rises, falls or has a bump.
-fn draw_table(random: &mut Pcg64Mcg, bands: usize) -> Vec<f64> {
+fn draw_table(random: &mut Pcg64Mcg, bands: Bands) -> Vec<f64> {
     let level = (0.05f64.ln() + (0.45f64 / 0.05).ln() * unit(random)).exp();
     let tilt = 0.25 * normal(random);
-    let (bump, centre) = (0.5 * normal(random), bands as f64 * unit(random));
-    (0..bands)
+    let octaves = bands.len() as f64 / bands.per_octave() as f64;
+    let (bump, centre) = (0.5 * normal(random), octaves * unit(random));
+    (0..bands.len())
         .map(|b| {
-            let from_middle = b as f64 - 0.5 * (bands as f64 - 1.0);
-            let hill = bump * (-0.5 * (b as f64 - centre).powi(2)).exp();
+            let place = b as f64 / bands.per_octave() as f64;
+            let from_middle = place - 0.5 * (octaves - 1.0 / bands.per_octave() as f64);
+            let hill = bump * (-0.5 * (place - centre).powi(2)).exp();
             let value = level * (tilt * from_middle + hill + 0.1 * normal(random)).exp();
             // Tables have three decimals.
             (value.clamp(0.03, 0.6) * 1e3).round() / 1e3

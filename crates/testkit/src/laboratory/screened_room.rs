@@ -10,8 +10,8 @@ use crate::phonons::{PhononConfig, Phonons};
 use crate::wave_grid::{ThinScreen, WaveGrid};
 use rand_pcg::Pcg64Mcg;
 use sabine_acoustics::{
-    Air, Error, ImpulseResponse, Levels, Material, MaterialPrior, MeasuredRoom, Measurement, NamedMaterial,
-    NewResponse, NewRoom, OctaveBands, PerBand, Receiver, Scene, Source, TimeZero, Triangle,
+    Air, Bands, Error, ImpulseResponse, Levels, Material, MaterialPrior, MeasuredRoom, Measurement,
+    NamedMaterial, NewResponse, NewRoom, PerBand, Receiver, Scene, Source, TimeZero, Triangle,
 };
 use std::path::Path;
 
@@ -305,7 +305,7 @@ fn scene(
     config: ScreenedConfig,
     absorption: &[f64; 6],
 ) -> Result<Scene, Error> {
-    let bands = OctaveBands::new(OCTAVES_HZ.0, OCTAVES_HZ.1)?;
+    let bands = Bands::octaves(OCTAVES_HZ.0, OCTAVES_HZ.1)?;
     let named = tables(config, absorption)
         .into_iter()
         .zip(NAMES)
@@ -340,7 +340,7 @@ fn tables(config: ScreenedConfig, absorption: &[f64; 6]) -> Vec<Vec<f64>> {
 }
 
 fn priors(config: ScreenedConfig, absorption: &[f64; 6]) -> Result<Vec<MaterialPrior>, Error> {
-    let bands = OctaveBands::new(OCTAVES_HZ.0, OCTAVES_HZ.1)?;
+    let bands = Bands::octaves(OCTAVES_HZ.0, OCTAVES_HZ.1)?;
     let prior = |table: Vec<f64>| {
         Ok(MaterialPrior {
             absorption: Some(PerBand::new(bands, table)?),

@@ -2,7 +2,7 @@
 
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
-use sabine_acoustics::OctaveBands;
+use sabine_acoustics::Bands;
 use std::f64::consts::FRAC_PI_2;
 
 /// Width of a crossover in octaves.
@@ -12,7 +12,7 @@ const PADDING_S: f64 = 0.4;
 
 /// Filters each band's samples by its octave and adds them up. Zero phase; amplitudes add up to one at every frequency, the
 /// outer bands reaching to 0 Hz and to Nyquist: what is the same in all bands passes unchanged.
-pub(crate) fn join_steeply(bands: OctaveBands, columns: Vec<Vec<f64>>, sample_rate_hz: u32) -> Vec<f64> {
+pub(crate) fn join_steeply(bands: Bands, columns: Vec<Vec<f64>>, sample_rate_hz: u32) -> Vec<f64> {
     let n = columns.first().map_or(0, Vec::len);
     let size = padded(n, sample_rate_hz);
     let forward = RealFftPlanner::<f64>::new().plan_fft_forward(size);
@@ -30,7 +30,7 @@ pub(crate) fn join_steeply(bands: OctaveBands, columns: Vec<Vec<f64>>, sample_ra
 
 /// The same samples with an amplitude for each octave.
 pub(crate) fn colour(
-    bands: OctaveBands,
+    bands: Bands,
     mut samples: Vec<f64>,
     amplitudes: &[f64],
     sample_rate_hz: u32,
@@ -67,7 +67,7 @@ fn invert(mut spectrum: Vec<Complex<f64>>, size: usize, n: usize) -> Vec<f64> {
 }
 
 struct Gains {
-    bands: OctaveBands,
+    bands: Bands,
     bin_hz: f64,
     bins: usize,
 }
@@ -87,7 +87,7 @@ impl Gains {
 }
 
 /// Gain of a band at a frequency.
-fn share(bands: OctaveBands, band: usize, frequency_hz: f64) -> f64 {
+fn share(bands: Bands, band: usize, frequency_hz: f64) -> f64 {
     let half = (0.5 * CROSSOVER_OCTAVES).exp2();
     let (lower, upper) = bands.edges_hz(band);
     let (lowest, highest) = (band == 0, band + 1 == bands.len());
@@ -97,7 +97,7 @@ fn share(bands: OctaveBands, band: usize, frequency_hz: f64) -> f64 {
 }
 
 /// The amplitude that [`join_steeply`] gives to a frequency, from one for each octave.
-pub(crate) fn amplitude_at(bands: OctaveBands, amplitudes: &[f64], frequency_hz: f64) -> f64 {
+pub(crate) fn amplitude_at(bands: Bands, amplitudes: &[f64], frequency_hz: f64) -> f64 {
     amplitudes.iter().enumerate().map(|(band, a)| a * share(bands, band, frequency_hz)).sum()
 }
 
@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn what_all_bands_share_passes_unchanged() {
-        let bands = OctaveBands::T60;
+        let bands = Bands::T60;
         let mut click = vec![0.0; 6000];
         click[2000] = 1.0;
         let joined = join_steeply(bands, vec![click.clone(); bands.len()], 48000);
@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn a_band_alone_holds_its_share_of_the_energy() {
-        let bands = OctaveBands::T60;
+        let bands = Bands::T60;
         let mut click = vec![0.0; 96000];
         click[48000] = 1.0;
         for band in 1..bands.len() - 1 {

@@ -5,7 +5,7 @@ use super::hidden::{End, Fault, Hidden};
 use super::panel::{self, Panel};
 use super::patch::Patch;
 use crate::own_air::{energy_exponent_per_m, speed_of_sound_m_s};
-use sabine_acoustics::{Air, Error, OctaveBands, write_atomically};
+use sabine_acoustics::{Air, Bands, Error, write_atomically};
 use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::path::Path;
@@ -115,9 +115,9 @@ impl Truth {
     /// The bands.
     ///
     /// # Errors
-    /// As [`OctaveBands::from_centres_hz`].
-    pub fn bands(&self) -> Result<OctaveBands, Error> {
-        OctaveBands::from_centres_hz(&self.bands_hz)
+    /// As [`Bands::from_centres_hz`].
+    pub fn bands(&self) -> Result<Bands, Error> {
+        Bands::from_centres_hz(&self.bands_hz)
     }
 
     /// The air.

@@ -1,12 +1,12 @@
 //! Rooms of the laboratory, and what is asked of them.
 #![allow(dead_code)] // each test uses some of it
 
-use sabine_acoustics::{ImpulseResponse, Levels, OctaveBands, Receiver, Source};
+use sabine_acoustics::{Bands, ImpulseResponse, Levels, Receiver, Source};
 use sabine_testkit::{Hidden, LabConfig, Laboratory, Truth};
 
 /// One octave, which then reaches from 0 Hz to Nyquist: samples are pulses as they are.
 pub fn one_octave(seed: u64, receivers: usize, sample_rate_hz: u32) -> Laboratory {
-    let bands = OctaveBands::new(1000.0, 1000.0).unwrap();
+    let bands = Bands::octaves(1000.0, 1000.0).unwrap();
     let config = LabConfig {
         seed,
         receivers,
