@@ -1,6 +1,7 @@
 //! Surfaces that the mesh lacks, hidden in laboratory rooms: found from single early reflections, and not where there are none.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
+use sabine_acoustics::Bands;
 use sabine_diagnose::{Cause, DiagnoseConfig, Diagnoser, Diagnosis, Verdict};
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
 
@@ -9,10 +10,14 @@ fn lab(seed: u64, receivers: usize) -> Laboratory {
 }
 
 fn diagnose(lab: &Laboratory, hidden: &[Hidden]) -> Diagnosis {
+    let config = DiagnoseConfig { rays: 1000, ..DiagnoseConfig::default() };
+    diagnose_by(&Diagnoser::new(config).unwrap(), lab, hidden)
+}
+
+fn diagnose_by(diagnoser: &Diagnoser, lab: &Laboratory, hidden: &[Hidden]) -> Diagnosis {
     let folder = tempfile::tempdir().unwrap();
     let room = lab.write(hidden, &folder.path().join("room"), None).unwrap();
-    let config = DiagnoseConfig { rays: 1000, ..DiagnoseConfig::default() };
-    Diagnoser::new(config).unwrap().diagnose(&room, &[], &()).unwrap()
+    diagnoser.diagnose(&room, &[], &()).unwrap()
 }
 
 /// The one cause that is named, with a gain at positions not seen.
@@ -86,4 +91,18 @@ fn a_room_whose_mesh_is_right_lacks_no_surface() {
     {
         assert!(c.nats < 3.0, "{c:?}");
     }
+}
+
+/// Forty responses confirm every image, those of the walls too: they must not count a second time.
+#[test]
+fn a_wall_of_the_mesh_is_not_found_again_by_many_receivers() {
+    let bands = Bands::T60;
+    let config = LabConfig { seed: 8000, receivers: 40, bands, ..LabConfig::default() };
+    let lab = Laboratory::new(config).unwrap();
+    let config = DiagnoseConfig { rays: 200, ..DiagnoseConfig::default() };
+    let diagnoser = Diagnoser::new(config).unwrap().with_only(&["extra_reflector".to_owned()]).unwrap();
+    let found = diagnose_by(&diagnoser, &lab, &[]);
+    assert_eq!(found.candidates.len(), 1);
+    assert!(found.candidates[0].nats < 3.0, "{:?}", found.candidates);
+    assert!(found.causes.is_empty());
 }

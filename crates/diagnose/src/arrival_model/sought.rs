@@ -9,6 +9,13 @@ use crate::multilateration::{StrayPeak, StrayPeaks};
 use crate::traced_pair::{Arrival, Single};
 use crate::views::ArrivalView;
 
+/// Images nearer to each other than this are one, in metres.
+const SAME_M: f64 = 0.3;
+
+fn apart_m(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
+}
+
 /// A reflection that an effect adds, and how its time and its height change with parameters.
 pub(super) struct More {
     pub time_s: f64,
@@ -24,6 +31,12 @@ impl<'a> ArrivalModel<'a> {
             let survey = self.data.survey;
             let range = placed.first..placed.first + placed.parameters.len();
             let added = placed.case.more_arrival(&values[range.clone()], survey, pair)?;
+            // What comes from where a predicted reflection comes from is that one: a wall must not be found a second time.
+            let image = |direction: [f64; 3], length_m: f64| direction.map(|d| d * length_m);
+            let own = image(added.arrival, added.length_m);
+            if self.data.arrivals[pair].iter().any(|a| apart_m(own, image(a.arrival, a.length_m)) < SAME_M) {
+                return None;
+            }
             let arrival = Arrival {
                 length_m: added.length_m,
                 departure: added.departure,
