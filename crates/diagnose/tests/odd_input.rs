@@ -1,7 +1,7 @@
 //! Rooms that are not as they should be: few responses, other rates and lengths, copies, responses of another room, everything wrong.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
-use sabine_acoustics::{Channel, MeasuredRoom, SampleFormat, read_audio, write_wav};
+use sabine_acoustics::{Bands, Channel, MeasuredRoom, SampleFormat, read_audio, write_wav};
 use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, Error, Verdict};
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
 use std::path::{Path, PathBuf};
@@ -109,5 +109,26 @@ fn where_everything_is_wrong_nothing_is_called_adequate() {
     assert_ne!(found.verdict, Verdict::Adequate);
     if found.verdict == Verdict::Explained {
         notes_hold(&found, "misfit is left");
+    }
+}
+
+/// Tables and diagnosis in third octaves: a loudspeaker with a hollow that one octave would smear.
+#[test]
+fn third_octaves_show_what_octaves_smear() {
+    let folder = tempfile::tempdir().unwrap();
+    let bands = Bands::third_octaves(500.0, 2500.0).unwrap();
+    let config = LabConfig { seed: 544, receivers: 8, bands, sample_rate_hz: 16_000, ..LabConfig::default() };
+    let lab = Laboratory::new(config).unwrap();
+    let truth_db = [0.0, 0.0, 0.0, 0.0, -6.0, 0.0, 0.0, 0.0];
+    let hidden = Hidden::TransducerResponse { gains_db: truth_db.to_vec() };
+    let room = lab.write(&[hidden], &folder.path().join("room"), None).unwrap();
+    assert_eq!(room.bands(), bands);
+    let found = diagnose(&room, &[]).unwrap();
+    let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
+    assert_eq!(named, ["transducer_response"], "{:?}", found.lack_of_fit);
+    let hollow = found.causes[0].parameters.iter().find(|p| p.name == "gain_1250_hz").unwrap();
+    assert!((hollow.value + 6.0).abs() < 1.5, "{hollow:?}");
+    for beside in found.causes[0].parameters.iter().filter(|p| !p.name.contains("1250")) {
+        assert!(beside.value.abs() < 2.0, "{beside:?}");
     }
 }
