@@ -26,12 +26,15 @@ struct Arguments {
     /// Channel of files that have several, from 0; without it they must be mono
     #[arg(long)]
     channel: Option<usize>,
-    /// Lowest octave in Hz
-    #[arg(long, default_value_t = 62.5)]
-    from: f64,
-    /// Highest octave in Hz
-    #[arg(long, default_value_t = 8000.0)]
-    to: f64,
+    /// Lowest band in Hz [default: 62.5, or 50 in third octaves]
+    #[arg(long, value_name = "HZ")]
+    from: Option<f64>,
+    /// Highest band in Hz [default: 8000, or 10000 in third octaves]
+    #[arg(long, value_name = "HZ")]
+    to: Option<f64>,
+    /// Third octaves in place of octaves
+    #[arg(long)]
+    third_octaves: bool,
     /// Write all results as JSON
     #[arg(long, value_name = "F.json")]
     json: Option<PathBuf>,
@@ -53,7 +56,11 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Anything> {
-    let bands = Bands::octaves(arguments.from, arguments.to)?;
+    let bands = if arguments.third_octaves {
+        Bands::third_octaves(arguments.from.unwrap_or(50.0), arguments.to.unwrap_or(10_000.0))?
+    } else {
+        Bands::octaves(arguments.from.unwrap_or(62.5), arguments.to.unwrap_or(8000.0))?
+    };
     let channel = arguments.channel.map_or(Channel::Mono, Channel::Index);
     let (mut results, mut plots) = (Vec::new(), Vec::new());
     for path in &arguments.files {

@@ -112,14 +112,12 @@ fn print_findings(findings: &Findings, out: &Path) {
             cause.probability
         );
         for p in &cause.parameters {
-            let told = |value: f64| words::number(value, p.high - p.low);
             println!(
-                "  {:<28} {:>8} {:<6} 90 %: {} to {}",
+                "  {:<28} {:>8} {:<6} 90 %: {}",
                 words::parameter(&p.name),
-                told(p.value),
+                words::number(p.value, p.high - p.low),
                 p.unit,
-                told(p.low),
-                told(p.high)
+                words::interval(p, "to")
             );
         }
         if let Some(gain) = &cause.held_out_gain {

@@ -4,7 +4,7 @@ use crate::bars::{self, Bar};
 use crate::findings::Findings;
 use crate::residual_map::{self, ResidualMap};
 use crate::words::{
-    capital, effect, effect_of, headline, hertz, in_band, meaning, number, parameter, sentence,
+    capital, effect, effect_of, headline, hertz, in_band, interval, meaning, number, parameter, sentence,
 };
 use crate::{held_out, look_alikes};
 use sabine::diagnose::{CandidateScore, Cause, DecayCurves, FittedMaterial, ResidualCell};
@@ -92,10 +92,8 @@ fn parameters(page: &mut Page, findings: &Findings) -> Result<()> {
         if !cause.parameters.is_empty() {
             let mut rows = vec![["", "Most likely", "90 % between"].map(str::to_owned).to_vec()];
             rows.extend(cause.parameters.iter().map(|p| {
-                let told = |value: f64| number(value, p.high - p.low);
-                let interval = format!("{} and {}", told(p.low), told(p.high));
                 let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
-                vec![parameter(&p.name), told(p.value) + &unit, interval]
+                vec![parameter(&p.name), number(p.value, p.high - p.low) + &unit, interval(p, "and")]
             }));
             page.table(&rows);
         }

@@ -1,7 +1,7 @@
 //! The catalogue's identifiers in plain words.
 
 use crate::findings::Findings;
-use sabine::diagnose::{Cause, Verdict};
+use sabine::diagnose::{Cause, FoundParameter, Verdict};
 
 /// Below this probability chance is not believed, as by default in the diagnosis.
 const UNLIKELY: f64 = 0.01;
@@ -171,14 +171,21 @@ fn worst_place(findings: &Findings, after: bool) -> Option<String> {
     ))
 }
 
-/// As many figures as an interval of such a width warrants.
+/// As many figures as an interval of such a width warrants; to a thousandth where there is none.
 pub fn number(value: f64, width: f64) -> String {
-    let size = if width > 0.0 { 0.5 * width } else { 0.1 * value.abs() };
-    if size == 0.0 {
-        return "0".to_owned();
-    }
+    let size = if width > 1e-9 { 0.5 * width } else { 0.01 };
     let decimals = (1.0 - size.log10().floor()).clamp(0.0, 6.0) as usize;
     format!("{value:.decimals$}")
+}
+
+/// The 90 % interval of a parameter in words: a coordinate that the room file states has none.
+pub fn interval(p: &FoundParameter, between: &str) -> String {
+    let width = p.high - p.low;
+    if width > 1e-9 {
+        format!("{} {between} {}", number(p.low, width), number(p.high, width))
+    } else {
+        "as stated".to_owned()
+    }
 }
 
 /// With a capital at its beginning and a full stop at its end.
@@ -212,6 +219,6 @@ mod tests {
         assert_eq!(number(-0.6, 1.2), "-0.60");
         assert_eq!(number(1234.5, 300.0), "1234");
         assert_eq!(number(0.01234, 0.002), "0.0123");
-        assert_eq!(number(0.0, 0.0), "0");
+        assert_eq!(number(5.965, 0.0), "5.965");
     }
 }

@@ -356,7 +356,13 @@ fn read_text(path: &Path) -> Result<String, Error> {
 
 fn bands(centres_hz: &[f64]) -> Result<Bands, Error> {
     for &centre in centres_hz {
-        check_range("centre (Hz)", centre, 62.0, 16_500.0, "an octave centre from 62.5 to 16000")?;
+        check_range(
+            "centre (Hz)",
+            centre,
+            49.0,
+            20_500.0,
+            "the centre of an octave or third octave from 50 to 20000",
+        )?;
     }
     Bands::from_centres_hz(centres_hz)
 }

@@ -2,7 +2,7 @@
 
 use crate::diagnosis::{CandidateScore, Cause, Diagnosis, FittedMaterial, HeldOutGain, LackOfFit, Verdict};
 use crate::effect::{Effect, Evidence, Nuisance};
-use crate::found_parameters::parameters;
+use crate::found_parameters::{at_bounds, parameters};
 use crate::held_out::{Folds, decay_curves, predict};
 use crate::isolability::isolability;
 use crate::lack_of_fit;
@@ -207,6 +207,12 @@ impl Diagnoser {
             decay_curves(&bench, &before, &after, false)
         };
         let model = extension::extended_model(&bench, &search, &state);
+        let at_bounds: Vec<(&str, Vec<String>)> = state
+            .chosen
+            .iter()
+            .map(|&c| (search.candidates[c].id, at_bounds(&search, &state, c)))
+            .filter(|(_, parameters)| !parameters.is_empty())
+            .collect();
         let notes = notes(&Circumstances {
             bench: &bench,
             verdict,
@@ -217,6 +223,7 @@ impl Diagnoser {
             scattered: baseline_dispersion.iter().any(|d| *d > SCATTERED),
             unseated: &unseated,
             unconfirmed: &unconfirmed,
+            at_bounds: &at_bounds,
         });
         let mut seconds: Vec<(String, f64)> =
             bench.seconds.iter().map(|(stage, s)| ((*stage).to_owned(), *s)).collect();

@@ -8,6 +8,8 @@ use crate::search::{Search, State};
 
 /// Half the width of a 90 % interval in standard deviations.
 const HALF_90: f64 = 1.645;
+/// The data speak of a parameter if they leave less than this share of what was known of it beforehand.
+const TOLD_SHARE: f64 = 0.5;
 
 /// Fitted parameters of a chosen candidate, what it frees among what every fit leaves open included.
 pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -> Vec<FoundParameter> {
@@ -63,6 +65,21 @@ pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -
         Some((_, own)) => merged(found, &own.parameters),
         None => found,
     }
+}
+
+/// Fitted parameters of a chosen candidate that stand at the end of their range though the data speak of them, each with its value and unit.
+pub(crate) fn at_bounds(search: &Search<'_>, state: &State, candidate: usize) -> Vec<String> {
+    let case = search.candidates[candidate].case;
+    if case.evidence() == Evidence::LeadIn {
+        return Vec::new();
+    }
+    let (maximum, first) = place_of(search, state, candidate);
+    let told = case.parameters(&search.bench.survey).into_iter().enumerate().filter(|(i, p)| {
+        let value = maximum.values[first + i];
+        (value <= p.bounds.0 || value >= p.bounds.1) && maximum.sd(first + i) < TOLD_SHARE * p.prior_sd
+    });
+    told.map(|(i, p)| format!("{} ({} {})", p.name, maximum.values[first + i], p.unit).replace(" )", ")"))
+        .collect()
 }
 
 /// The fit that holds the parameters of a candidate, and where they start.

@@ -20,6 +20,8 @@ pub(crate) struct Circumstances<'a> {
     pub unseated: &'a [&'a str],
     /// Causes that do not help at positions left out.
     pub unconfirmed: &'a [&'a str],
+    /// Named causes, and their parameters that stand at the end of their range.
+    pub at_bounds: &'a [(&'a str, Vec<String>)],
 }
 
 pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
@@ -52,6 +54,12 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
     }
     if about.verdict == Verdict::Explained && about.misfit_left {
         notes.push("A significant misfit is left that none of the named causes explains.".into());
+    }
+    for (effect, parameters) in about.at_bounds {
+        notes.push(format!(
+            "{effect}: {} at the end of the range that is allowed. More than this effect may be at work.",
+            parameters.join(" and ")
+        ));
     }
     if about.bench.arrivals.iter().any(Vec::is_empty) {
         notes.push("Where the direct line is blocked, arrival times are not compared.".into());

@@ -94,8 +94,7 @@ impl Case for OneWall {
             .collect();
         let (area, sd) = *own.first()?;
         let base: f64 = here.iter().map(|g| g.1).sum();
-        // Logarithm of each hypothesis's weight, with its centre and area.
-        let mut all: Vec<(f64, [f64; 2], f64)> = Vec::new();
+        let mut all: Vec<Hypothesis> = Vec::new();
         let mut prior_sum = 0.0;
         for (i, &tried) in AREAS_M2.iter().enumerate() {
             if tried > MOST_SHARE * self.plane.area_m2 {
@@ -103,7 +102,7 @@ impl Case for OneWall {
             }
             let low = if i == 0 { 0.0 } else { AREAS_M2[i - 1] };
             let prior = (-0.5 * ((tried - area) / sd.max(0.05)).powi(2)).exp() * (tried - low);
-            let mut fitting: Vec<(f64, [f64; 2])> = Vec::new();
+            let mut fitting: Vec<Hypothesis> = Vec::new();
             for aspect in ASPECTS {
                 let sides = [tried.sqrt() * aspect, tried.sqrt() / aspect];
                 let fits =
@@ -111,65 +110,96 @@ impl Case for OneWall {
                 if !fits {
                     continue;
                 }
+                let step_m = [0, 1].map(|k| {
+                    let [low, high] = self.plane.extent_m[k];
+                    (high - low - sides[k]) / STEPS as f64
+                });
                 for step in 0..STEPS * STEPS {
-                    let centre: [f64; 2] = std::array::from_fn(|k| {
-                        let [low, high] = self.plane.extent_m[k];
-                        let at =
-                            ((if k == 0 { step / STEPS } else { step % STEPS }) as f64 + 0.5) / STEPS as f64;
-                        low + 0.5 * sides[k] + at * (high - low - sides[k])
-                    });
-                    let nats: f64 = here
+                    let place = [step / STEPS, step % STEPS].map(|n| n as f64 + 0.5);
+                    let centre =
+                        [0, 1].map(|k| self.plane.extent_m[k][0] + 0.5 * sides[k] + place[k] * step_m[k]);
+                    let ln_weight: f64 = here
                         .iter()
                         .map(|(place, present, missing)| {
                             let inside = within(*place, centre, sides);
                             mixed(*present, *missing, inside) - present
                         })
                         .sum();
-                    fitting.push((nats, centre));
+                    fitting.push(Hypothesis { ln_weight, centre, step_m, area: i });
                 }
             }
-            let count = fitting.len() as f64;
-            if count > 0.0 {
+            if !fitting.is_empty() {
                 prior_sum += prior;
-                all.extend(
-                    fitting.into_iter().map(|(nats, c)| (nats + (prior / count).max(1e-300).ln(), c, tried)),
-                );
+                let each = (prior / fitting.len() as f64).max(1e-300).ln();
+                fitting.iter_mut().for_each(|h| h.ln_weight += each);
+                all.append(&mut fitting);
             }
         }
-        let most = all.iter().map(|h| h.0).fold(f64::NEG_INFINITY, f64::max);
+        let most = all.iter().map(|h| h.ln_weight).fold(f64::NEG_INFINITY, f64::max);
         if !most.is_finite() || prior_sum <= 0.0 || !base.is_finite() {
             return None;
         }
-        let sum: f64 = all.iter().map(|h| (h.0 - most).exp()).sum();
+        let sum: f64 = all.iter().map(|h| (h.ln_weight - most).exp()).sum();
         let nats = most + sum.ln() - prior_sum.ln();
-        let weights: Vec<f64> = all.iter().map(|h| (h.0 - most).exp() / sum).collect();
-        let places: Vec<[f64; 3]> = all.iter().map(|h| self.plane.place_m(h.1)).collect();
-        let interval = |name: &str, unit: &str, value: &dyn Fn(usize) -> f64| {
-            let mut sorted: Vec<(f64, f64)> =
-                weights.iter().enumerate().map(|(i, w)| (value(i), *w)).collect();
-            sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let mean: f64 = sorted.iter().map(|(v, w)| v * w).sum();
-            let at = |mass: f64| {
-                let mut left = mass;
-                let place = sorted.iter().position(|(_, w)| {
-                    left -= w;
-                    left <= 0.0
-                });
-                sorted[place.unwrap_or(sorted.len() - 1)].0
-            };
-            FoundParameter {
-                name: name.to_owned(),
-                value: mean,
-                low: at(TAIL).min(mean),
-                high: at(1.0 - TAIL).max(mean),
-                unit: unit.to_owned(),
-            }
-        };
-        let mut parameters = vec![interval("area", "m2", &|i| all[i].2)];
+        let weights: Vec<f64> = all.iter().map(|h| (h.ln_weight - most).exp() / sum).collect();
+        let areas = all.iter().map(|h| Cell::of_area(h.area));
+        let mut parameters = vec![interval("area", "m2", areas.zip(&weights))];
         for (k, axis) in ["x", "y", "z"].iter().enumerate() {
-            parameters.push(interval(&format!("centre_{axis}"), "m", &|i| places[i][k]));
+            let along = |h: &Hypothesis| {
+                let half = (0..2).map(|i| 0.5 * h.step_m[i] * self.plane.axes[i + 1][k].abs()).sum::<f64>();
+                let value = self.plane.place_m(h.centre)[k];
+                Cell { value, low: value - half, high: value + half }
+            };
+            parameters.push(interval(&format!("centre_{axis}"), "m", all.iter().map(along).zip(&weights)));
         }
         Some(OwnEvidence { nats, parameters })
+    }
+}
+
+/// A patch that is tried.
+struct Hypothesis {
+    ln_weight: f64,
+    centre: [f64; 2],
+    /// From its centre to its neighbours'.
+    step_m: [f64; 2],
+    /// Which of [`AREAS_M2`].
+    area: usize,
+}
+
+/// A value that is tried, and all those for which it stands.
+struct Cell {
+    value: f64,
+    low: f64,
+    high: f64,
+}
+
+impl Cell {
+    fn of_area(index: usize) -> Self {
+        let value = AREAS_M2[index];
+        let before = if index == 0 { 0.5 * value } else { AREAS_M2[index - 1] };
+        let after = AREAS_M2.get(index + 1).copied().unwrap_or(value * value / before);
+        Self { value, low: (before * value).sqrt(), high: (value * after).sqrt() }
+    }
+}
+
+/// Mean and 90 % interval of weighted cells: no end is known more closely than the grid.
+fn interval<'w>(name: &str, unit: &str, weighted: impl Iterator<Item = (Cell, &'w f64)>) -> FoundParameter {
+    let mut sorted: Vec<(Cell, f64)> = weighted.map(|(cell, weight)| (cell, *weight)).collect();
+    sorted.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
+    let at = |mass: f64| {
+        let mut left = mass;
+        let place = sorted.iter().position(|(_, weight)| {
+            left -= weight;
+            left <= 0.0
+        });
+        &sorted[place.unwrap_or(sorted.len() - 1)].0
+    };
+    FoundParameter {
+        name: name.to_owned(),
+        value: sorted.iter().map(|(cell, weight)| cell.value * weight).sum(),
+        low: at(TAIL).low,
+        high: at(1.0 - TAIL).high,
+        unit: unit.to_owned(),
     }
 }
 
