@@ -47,9 +47,9 @@ pub fn section(page: &mut Page, findings: &Findings) {
     }
     page.table(&rows);
     page.paragraph(if !is_named {
-        "The free correction may bend every octave and time as it likes and explains nothing. Where it does much better than the simulation, something is missing."
+        "The free correction may bend every band and time as it likes and explains nothing. Where it does much better than the simulation, something is missing."
     } else {
-        "The free correction may bend every octave and time as it likes and explains nothing. Named causes that do as well as it have found what is wrong; where it does better, something is missing."
+        "The free correction may bend every band and time as it likes and explains nothing. Named causes that do as well as it have found what is wrong; where it does better, something is missing."
     });
 }
 

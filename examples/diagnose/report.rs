@@ -86,7 +86,7 @@ fn parameters(page: &mut Page, findings: &Findings) -> Result<()> {
             escape(&cause.explanation),
             escape(&gain_sentence(cause)),
         ));
-        if let Some(chart) = octave_chart(cause)? {
+        if let Some(chart) = band_chart(cause)? {
             page.markup(&format!("<div style=\"max-width:34rem\">{chart}</div>"));
         }
         if !cause.parameters.is_empty() {
@@ -125,7 +125,7 @@ fn gain_sentence(cause: &Cause) -> String {
 }
 
 /// Parameters that are one for each octave, as a curve.
-fn octave_chart(cause: &Cause) -> Result<Option<String>> {
+fn band_chart(cause: &Cause) -> Result<Option<String>> {
     let found: Vec<_> = cause.parameters.iter().filter_map(|p| Some((in_band(&p.name)?, p))).collect();
     let Some(((stem, _), first)) = found.first() else { return Ok(None) };
     if found.len() < 3 || found.iter().any(|((other, _), _)| other != stem) {
@@ -141,7 +141,7 @@ fn octave_chart(cause: &Cause) -> Result<Option<String>> {
     }));
     let unit = if first.unit.is_empty() { String::new() } else { format!(" ({})", first.unit) };
     let chart = Chart {
-        x_label: "Octave (Hz)".into(),
+        x_label: "Band (Hz)".into(),
         y_label: capital(&stem.replace('_', " ")) + &unit,
         x: Scale::Octaves(found.iter().map(|((_, hz), _)| *hz).collect()),
         y: None,
@@ -165,7 +165,7 @@ fn residuals(page: &mut Page, findings: &Findings) -> Result<()> {
         ResidualMap { cells, bands_hz: &findings.bands_hz, full_db, end_s, after }.svg(title)
     };
     page.markup(&format!(
-        "<p>Measured less simulated level by octave (upwards, in Hz) and time after the direct sound (to the right).</p><p class=\"key\">{full_db:.0} dB less<span class=\"scale\"></span>{full_db:.0} dB more measured than simulated; grey: not compared.</p>"
+        "<p>Measured less simulated level by band (upwards, in Hz) and time after the direct sound (to the right).</p><p class=\"key\">{full_db:.0} dB less<span class=\"scale\"></span>{full_db:.0} dB more measured than simulated; grey: not compared.</p>"
     ));
     let mean = of(None);
     if !mean.is_empty() {

@@ -11,6 +11,8 @@ const SIZE: (u32, u32) = (480, 320);
 const SMALL: (u32, u32) = (320, 220);
 /// Height of a row of the legend.
 const LEGEND_ROW: i32 = 20;
+/// Centres of bands that are told along an axis, at most.
+const MOST_CENTRES: usize = 10;
 /// Text and axes; a dark page turns it light.
 const INK: RGBColor = RGBColor(34, 34, 34);
 /// Grid lines.
@@ -224,7 +226,8 @@ impl Chart {
         if let Scale::Octaves(centres) = &self.x {
             // plotters places its own ticks on a linear axis; octaves want one at each centre.
             let plot = chart.plotting_area();
-            let every = if self.small { 2 } else { 1 };
+            // Third octaves would crowd each other: about one in an octave is told.
+            let every = centres.len().div_ceil(MOST_CENTRES) * if self.small { 2 } else { 1 };
             for &hz in centres.iter().step_by(every) {
                 let x = hz.log2();
                 plot.draw(&PathElement::new(vec![(x, y0), (x, y1)], GRID))?;

@@ -9,7 +9,7 @@ use crate::search::{Search, State};
 /// Half the width of a 90 % interval in standard deviations.
 const HALF_90: f64 = 1.645;
 /// The data speak of a parameter if they leave less than this share of what was known of it beforehand.
-const TOLD_SHARE: f64 = 0.5;
+const TOLD_SHARE: f64 = 0.8;
 
 /// Fitted parameters of a chosen candidate, what it frees among what every fit leaves open included.
 pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -> Vec<FoundParameter> {
