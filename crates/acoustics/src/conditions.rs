@@ -5,7 +5,7 @@ use crate::{Air, Bands, Directivity, Error, Material, Orientation};
 /// All that paths leave open: surfaces, air, and how source and receiver are turned and what they favour.
 ///
 /// ```
-/// use sabine_acoustics::{Air, Conditions, Directivity, Material, Bands, Orientation};
+/// use sabine_acoustics::{Air, Bands, Conditions, Directivity, Material, Orientation};
 /// let walls = [Material::uniform(Bands::T60, 0.1, 0.2)?];
 /// let (air, voice) = (Air::default(), Directivity::first_order(Directivity::SUBCARDIOID)?);
 /// let facing = Orientation::towards([0.0, 1.0, 0.0])?;

@@ -13,7 +13,7 @@ const REFERENCE_HZ: f64 = 1000.0;
 /// is what the noise leaves uncertain in this response; other positions in the room differ by more.
 ///
 /// ```
-/// use sabine_acoustics::{ImpulseResponse, Bands, equalisation};
+/// use sabine_acoustics::{Bands, ImpulseResponse, equalisation};
 /// let mut samples = vec![0.0; 4000];
 /// (samples[100], samples[101]) = (1.0, -1.0); // a difference: |H| = 2 sin(pi f / rate), 6 dB per octave
 /// let levels = equalisation(&ImpulseResponse::new(samples, 48000)?, Bands::EQ)?;

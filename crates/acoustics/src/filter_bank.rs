@@ -92,7 +92,7 @@ impl BandMask {
 /// about one over the bandwidth; what rings out beyond the ends is cut off and does not come back at the other end.
 ///
 /// ```
-/// use sabine_acoustics::{FilterBank, Bands};
+/// use sabine_acoustics::{Bands, FilterBank};
 /// let bank = FilterBank::new(Bands::SIMULATION, 48000)?;
 /// let input: Vec<f32> = (0..4800).map(|i| ((i * i) as f32 * 1e-3).sin()).collect();
 /// let bands = bank.split(&input);

@@ -14,7 +14,7 @@
 //! # Example
 //! What a room of known decay measures, and how sure the answer is:
 //! ```
-//! use sabine_acoustics::{ImpulseResponse, NoReading, Bands, RoomParameters};
+//! use sabine_acoustics::{Bands, ImpulseResponse, NoReading, RoomParameters};
 //!
 //! // White noise whose energy falls by 60 dB in 0.8 s, 50 dB above a floor of noise.
 //! let mut state = 1u32;

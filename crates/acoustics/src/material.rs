@@ -5,7 +5,7 @@ use crate::{Bands, Error, PerBand};
 
 /// How a surface treats sound energy, per octave band.
 /// ```
-/// use sabine_acoustics::{Material, Bands, PerBand};
+/// use sabine_acoustics::{Bands, Material, PerBand};
 /// let bands = Bands::octaves(500.0, 2000.0)?;
 /// let curtain = Material::new(PerBand::new(bands, vec![0.4, 0.6, 0.7])?, PerBand::uniform(bands, 0.2))?;
 /// assert_eq!(curtain.absorption().at_hz(1000.0), Some(&0.6));

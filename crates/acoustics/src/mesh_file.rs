@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 /// order in which the faces first use them. Textures, normals, colours, cameras, skins and animations are not looked at.
 ///
 /// ```
-/// use sabine_acoustics::{Material, Mesh, Bands};
+/// use sabine_acoustics::{Bands, Material, Mesh};
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("tent.obj");
 /// std::fs::write(&path, "v 0 0 0\nv 4 0 0\nv 0 4 0\nv 0 0 4\nusemtl ground\nf 1 2 3\nusemtl cloth\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;

@@ -116,7 +116,7 @@ impl BandParameters {
 /// The parameters of a response in octave bands.
 ///
 /// ```
-/// use sabine_acoustics::{ImpulseResponse, NoReading, Bands, RoomParameters};
+/// use sabine_acoustics::{Bands, ImpulseResponse, NoReading, RoomParameters};
 /// // White noise under an envelope that falls by 60 dB in 0.5 s.
 /// let mut state = 7u32;
 /// let samples = (0..16000).map(|i| {

@@ -49,7 +49,7 @@ pub struct Contribution {
 /// Energies are scaled so that the direct sound at 1 m is 1.
 ///
 /// ```
-/// use sabine_acoustics::{Air, Contribution, Material, Bands, PathSet, Reflection};
+/// use sabine_acoustics::{Air, Bands, Contribution, Material, PathSet, Reflection};
 /// let mut paths = PathSet::new(1, 100.0);
 /// let floor = paths.reflect(PathSet::DIRECT, 0, Reflection::Specular);
 /// let up = [0.0, 0.0, 1.0];

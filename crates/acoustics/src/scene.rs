@@ -26,7 +26,7 @@ pub struct NamedMaterial {
 /// Indices are checked, coordinates are finite and all materials share their bands. Whether the mesh is closed is for the
 /// tracer to say.
 /// ```
-/// use sabine_acoustics::{Material, Bands, Scene};
+/// use sabine_acoustics::{Bands, Material, Scene};
 /// let wall = Material::uniform(Bands::SIMULATION, 0.1, 0.2)?;
 /// let room = Scene::shoebox([5.0, 4.0, 3.0], std::array::from_fn(|_| wall.clone()))?;
 /// assert!((room.volume_m3() - 60.0).abs() < 1e-9 && (room.surface_m2() - 94.0).abs() < 1e-9);

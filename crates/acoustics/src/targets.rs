@@ -4,7 +4,7 @@ use crate::{Bands, Error, Estimate, PerBand};
 
 /// Reverberation time and equalisation per octave: what the estimator hears and the fit aims at.
 /// ```
-/// use sabine_acoustics::{Estimate, Bands, PerBand, RoomTargets};
+/// use sabine_acoustics::{Bands, Estimate, PerBand, RoomTargets};
 /// let targets = RoomTargets::new(
 ///     PerBand::uniform(Bands::T60, Estimate::new(0.6, 0.05)),
 ///     PerBand::uniform(Bands::EQ, Estimate::exact(0.0)),

@@ -108,7 +108,7 @@ impl Scene {
     /// all materials, even those that no triangle has any more.
     ///
     /// ```
-    /// use sabine_acoustics::{Material, Bands, Scene};
+    /// use sabine_acoustics::{Bands, Material, Scene};
     /// let wall = Material::uniform(Bands::SIMULATION, 0.1, 0.1)?;
     /// let room = Scene::shoebox([4.0, 3.0, 2.0], std::array::from_fn(|_| wall.clone()))?;
     /// let (same, report) = room.welded(Scene::WELD_TOLERANCE_M)?;

@@ -33,7 +33,7 @@ impl Default for EqConfig {
 
 /// Gives a response another equalisation, drawn octave by octave from normal distributions, by a linear-phase filter.
 /// ```
-/// use sabine_acoustics::{ImpulseResponse, Bands, PerBand, equalisation};
+/// use sabine_acoustics::{Bands, ImpulseResponse, PerBand, equalisation};
 /// use sabine_augment::{EqAugment, EqConfig, SyntheticRoomConfig, SyntheticRooms};
 /// let room = SyntheticRooms::new(SyntheticRoomConfig::default())?.draw(1)?;
 /// let augment = EqAugment::new(EqConfig::default(), room.sample_rate_hz())?;

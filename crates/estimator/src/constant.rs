@@ -8,7 +8,7 @@ use sabine_acoustics::{Estimate, RoomEstimator, RoomTargets, Signal};
 /// Says the same whatever it hears: the mean of the training labels, with their deviation as the standard error.
 ///
 /// ```
-/// use sabine_acoustics::{Estimate, Bands, PerBand, RoomEstimator, RoomTargets, Signal};
+/// use sabine_acoustics::{Bands, Estimate, PerBand, RoomEstimator, RoomTargets, Signal};
 /// use sabine_estimator::ConstantEstimator;
 /// let t60_s = PerBand::uniform(Bands::T60, Estimate::new(0.6, 0.3));
 /// let eq_db = PerBand::uniform(Bands::EQ, Estimate::new(0.0, 4.0));

@@ -19,7 +19,7 @@ pub(crate) trait SlopeModel: Send + Sync {
 /// not traced again.
 ///
 /// ```
-/// use sabine_acoustics::{Air, Contribution, Material, Objective, Bands, PathSet, Reflection};
+/// use sabine_acoustics::{Air, Bands, Contribution, Material, Objective, PathSet, Reflection};
 /// use sabine_optimize::{FitConfig, SlopeEvaluation, SlopeObjective};
 /// // A corridor in which a path meets the one material every 10 m.
 /// let mut paths = PathSet::new(1, 2000.0);

@@ -14,7 +14,7 @@ use sabine_acoustics::{Conditions, Orientation, PathSet};
 /// [`PressureRenderer`](crate::PressureRenderer) gives, to the same accuracy.
 ///
 /// ```
-/// use sabine_acoustics::{Air, Conditions, Contribution, Material, Bands, Orientation, PathSet};
+/// use sabine_acoustics::{Air, Bands, Conditions, Contribution, Material, Orientation, PathSet};
 /// use sabine_propagate::{AmbisonicRenderer, RenderConfig};
 /// let mut paths = PathSet::new(1, 34.0);
 /// paths.push(Contribution {

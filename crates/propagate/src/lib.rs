@@ -20,7 +20,7 @@
 //! axis feels few reflections:
 //!
 //! ```
-//! use sabine_acoustics::{Air, Material, Bands, Propagator, Receiver, Scene, Source};
+//! use sabine_acoustics::{Air, Bands, Material, Propagator, Receiver, Scene, Source};
 //! use sabine_propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 //!
 //! let bands = Bands::octaves(250.0, 500.0)?;

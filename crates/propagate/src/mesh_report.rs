@@ -27,7 +27,7 @@ const LISTED: usize = 5;
 /// mesh holds sound; the edges say where to look if it does not.
 ///
 /// ```
-/// use sabine_acoustics::{Material, Bands, Scene};
+/// use sabine_acoustics::{Bands, Material, Scene};
 /// use sabine_propagate::MeshReport;
 /// let plaster = Material::uniform(Bands::SIMULATION, 0.1, 0.1)?;
 /// let room = Scene::shoebox([10.0, 7.0, 3.0], std::array::from_fn(|_| plaster.clone()))?;

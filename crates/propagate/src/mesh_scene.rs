@@ -15,7 +15,7 @@ use std::ops::ControlFlow;
 /// their sides, so that no ray slips through an edge by rounding.
 ///
 /// ```
-/// use sabine_acoustics::{Material, Bands, RayScene, Scene};
+/// use sabine_acoustics::{Bands, Material, RayScene, Scene};
 /// use sabine_propagate::MeshScene;
 /// let plaster = Material::uniform(Bands::SIMULATION, 0.1, 0.1)?;
 /// let room = Scene::shoebox([10.0, 7.0, 3.0], std::array::from_fn(|_| plaster.clone()))?;

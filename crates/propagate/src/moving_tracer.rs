@@ -54,7 +54,7 @@ pub struct Frame {
 /// The result depends on the seed and on the sequence of places, not on the time that passes or on the number of threads.
 ///
 /// ```
-/// use sabine_acoustics::{Air, Material, Bands, Receiver, Scene, Source};
+/// use sabine_acoustics::{Air, Bands, Material, Receiver, Scene, Source};
 /// use sabine_propagate::{MovingConfig, MovingTracer};
 /// let wall = Material::uniform(Bands::octaves(500.0, 1000.0)?, 0.2, 0.3)?;
 /// let room = Scene::shoebox([8.0, 5.0, 3.0], std::array::from_fn(|_| wall.clone()))?;

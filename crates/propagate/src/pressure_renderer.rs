@@ -57,7 +57,7 @@ impl RenderConfig {
 /// The lowest octave's gain extends down to 0 Hz, the highest one's up to half the sample rate.
 ///
 /// ```
-/// use sabine_acoustics::{Air, Contribution, Material, Bands, PathSet};
+/// use sabine_acoustics::{Air, Bands, Contribution, Material, PathSet};
 /// use sabine_propagate::{PressureRenderer, RenderConfig};
 /// let mut paths = PathSet::new(1, 34.0);
 /// let ahead = [1.0, 0.0, 0.0];

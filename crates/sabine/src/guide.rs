@@ -41,7 +41,7 @@
 //! ```
 //! Have you an impulse response (a sweep, a balloon) instead of speech? Then measure, do not guess: `measure_response -- response.wav`.
 //! ```
-//! use sabine::acoustics::{Channel, ImpulseResponse, Bands, RoomParameters, read_audio};
+//! use sabine::acoustics::{Bands, Channel, ImpulseResponse, RoomParameters, read_audio};
 //! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
 //! let response: ImpulseResponse = read_audio("fixtures/room/ir/talker_microphone.wav", Channel::Mono)?.into();
 //! let room = RoomParameters::measure(&response, Bands::T60)?;
@@ -55,7 +55,7 @@
 //! person, to 5 cm; finer detail belongs into scattering. Materials from the library or a table, and **how far you trust them**
 //! (`absorption_sd`): the fit moves what you doubt.
 //! ```
-//! use sabine::acoustics::{MeasuredRoom, Bands, library_material};
+//! use sabine::acoustics::{Bands, MeasuredRoom, library_material};
 //! use sabine::propagate::MeshReport;
 //! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
 //! let room = MeasuredRoom::read("fixtures/room")?;
@@ -72,7 +72,7 @@
 //! # 4. Simulate it
 //! `trace_room -- --room DIR --out DIR`. Paths are traced once; materials, air and directivity act on them afterwards.
 //! ```
-//! use sabine::acoustics::{DiffuseRoom, MeasuredRoom, Bands, PathParameters, Propagator};
+//! use sabine::acoustics::{Bands, DiffuseRoom, MeasuredRoom, PathParameters, Propagator};
 //! use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 //! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
 //! let room = MeasuredRoom::read("fixtures/room")?;

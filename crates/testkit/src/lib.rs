@@ -16,7 +16,7 @@
 //! What it does **not** do: run fast, read files of users, or follow diffraction but in [`WaveGrid`].
 //!
 //! ```
-//! use sabine_acoustics::{Material, Bands, Receiver, Scene, Source};
+//! use sabine_acoustics::{Bands, Material, Receiver, Scene, Source};
 //! use sabine_testkit::ShoeboxImages;
 //! let bands = Bands::octaves(1000.0, 1000.0)?;
 //! let hard = Material::uniform(bands, 0.1, 0.0)?;

@@ -1,6 +1,6 @@
 //! What must hold of a mesh that was read.
 
-use sabine_acoustics::{Material, Mesh, Bands};
+use sabine_acoustics::{Bands, Material, Mesh};
 use std::path::Path;
 
 /// Reads the file and asks for a scene of it.
