@@ -192,5 +192,6 @@ fn wilson(hits: usize, count: usize) -> (f64, f64) {
     let p = hits as f64 / n;
     let middle = p + z * z / (2.0 * n);
     let half = z * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
-    ((middle - half) / (1.0 + z * z / n), (middle + half) / (1.0 + z * z / n))
+    // Rounding may leave the lower end of none a little below zero.
+    (((middle - half) / (1.0 + z * z / n)).max(0.0), (middle + half) / (1.0 + z * z / n))
 }
