@@ -144,11 +144,6 @@ impl Bands {
         Self { first: self.first + indices.start as u8, count: indices.len() as u8, ..*self }
     }
 
-    /// Whether these are third octaves.
-    pub fn are_third_octaves(&self) -> bool {
-        self.width == Width::Third
-    }
-
     /// Bands in an octave: one or three.
     pub fn per_octave(&self) -> usize {
         match self.width {
@@ -352,7 +347,7 @@ mod tests {
             (3, Bands::third_octaves(125.0, 160.0).unwrap())
         );
         assert_eq!(Bands::from_centres_hz(&[1000.0]).unwrap(), Bands::octaves(1000.0, 1000.0).unwrap());
-        assert!(Bands::from_centres_hz(&[800.0]).unwrap().are_third_octaves());
+        assert_eq!(Bands::from_centres_hz(&[800.0]).unwrap().per_octave(), 3);
         assert!(matches!(Bands::from_centres_hz(&[125.0, 160.0, 250.0]), Err(Error::BandOrder { .. })));
     }
 

@@ -67,7 +67,7 @@ pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -
     }
 }
 
-/// Fitted parameters of a chosen candidate that stand at the end of their range though the data speak of them, each with its value and unit.
+/// Fitted parameters of a chosen candidate that stand at the end of their range though the data speak of them, each with its value.
 pub(crate) fn at_bounds(search: &Search<'_>, state: &State, candidate: usize) -> Vec<String> {
     let case = search.candidates[candidate].case;
     if case.evidence() == Evidence::LeadIn {
@@ -76,10 +76,10 @@ pub(crate) fn at_bounds(search: &Search<'_>, state: &State, candidate: usize) ->
     let (maximum, first) = place_of(search, state, candidate);
     let told = case.parameters(&search.bench.survey).into_iter().enumerate().filter(|(i, p)| {
         let value = maximum.values[first + i];
-        (value <= p.bounds.0 || value >= p.bounds.1) && maximum.sd(first + i) < TOLD_SHARE * p.prior_sd
+        let at_end = (value <= p.bounds.0 || value >= p.bounds.1) && value != p.neutral;
+        at_end && maximum.sd(first + i) < TOLD_SHARE * p.prior_sd
     });
-    told.map(|(i, p)| format!("{} ({} {})", p.name, maximum.values[first + i], p.unit).replace(" )", ")"))
-        .collect()
+    told.map(|(i, p)| format!("{} = {:.3}", p.name, maximum.values[first + i])).collect()
 }
 
 /// The fit that holds the parameters of a candidate, and where they start.

@@ -3,6 +3,10 @@
 use crate::traced_pair::BandState;
 use std::cell::RefCell;
 
+/// Questions that are remembered: those of a few effects, and of their slopes. An effect that asks for another share in each bin
+/// must not fill the memory.
+const MOST_ASKED: usize = 8;
+
 /// Changes of one pair's bins in one band. Slopes of a fit ask for the same ones again and again, once for each parameter of every other
 /// effect and each octave that leaks in.
 #[derive(Default)]
@@ -17,6 +21,9 @@ impl HitChanges {
         let mut asked = self.asked.borrow_mut();
         let same = asked.iter().position(|(m, l, _)| *m == material && *l == ln_kept);
         let place = same.unwrap_or_else(|| {
+            if asked.len() == MOST_ASKED {
+                asked.remove(0);
+            }
             asked.push((material, ln_kept, vec![f64::NAN; state.ln_energy.len()]));
             asked.len() - 1
         });

@@ -57,7 +57,7 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
     }
     for (effect, parameters) in about.at_bounds {
         notes.push(format!(
-            "{effect}: {} at the end of the range that is allowed. More than this effect may be at work.",
+            "{effect}: the end of the range that is allowed is reached by {}. More than this effect may be at work.",
             parameters.join(" and ")
         ));
     }

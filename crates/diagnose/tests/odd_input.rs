@@ -132,3 +132,19 @@ fn third_octaves_show_what_octaves_smear() {
         assert!(beside.value.abs() < 2.0, "{beside:?}");
     }
 }
+
+/// A loudspeaker that turns from a point to a figure of eight within two octaves, more steeply than the pattern allows.
+#[test]
+fn a_parameter_at_the_end_of_its_range_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let bands = Bands::octaves(1000.0, 8000.0).unwrap();
+    let lab = Laboratory::new(LabConfig { seed: 545, receivers: 8, bands, ..LabConfig::default() }).unwrap();
+    let hidden = Hidden::SourceDirectivity { omni_share: vec![1.0, 1.0, 0.5, 0.0], axis: None };
+    let room = lab.write(&[hidden], &folder.path().join("room"), None).unwrap();
+    let found = diagnose(&room, &[]).unwrap();
+    assert_eq!(found.causes[0].effect, "source_directivity", "{:?}", found.causes);
+    notes_hold(
+        &found,
+        "source_directivity: the end of the range that is allowed is reached by directed_share_per_octave = 0.300.",
+    );
+}

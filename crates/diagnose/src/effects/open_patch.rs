@@ -194,11 +194,13 @@ fn interval<'w>(name: &str, unit: &str, weighted: impl Iterator<Item = (Cell, &'
         });
         &sorted[place.unwrap_or(sorted.len() - 1)].0
     };
+    // The mean of a skewed distribution may lie beyond either end.
+    let mean: f64 = sorted.iter().map(|(cell, weight)| cell.value * weight).sum();
     FoundParameter {
         name: name.to_owned(),
-        value: sorted.iter().map(|(cell, weight)| cell.value * weight).sum(),
-        low: at(TAIL).low,
-        high: at(1.0 - TAIL).high,
+        value: mean,
+        low: at(TAIL).low.min(mean),
+        high: at(1.0 - TAIL).high.max(mean),
         unit: unit.to_owned(),
     }
 }
