@@ -8,7 +8,6 @@ use crate::sheets;
 use crate::traced_pair::scattering_more;
 use crate::workbench::Workbench;
 use crate::{SourceDirectivity, TransducerResponse};
-use std::collections::BTreeMap;
 
 /// Least directed share that is worth a pattern, and the most.
 const DIRECTED: (f64, f64) = (0.0, 0.9);
@@ -122,8 +121,7 @@ pub(crate) fn extended_model(bench: &Workbench, search: &Search<'_>, state: &Sta
                 for (nuisance, _) in case.widens() {
                     if let Nuisance::ResponseGain(r) = nuisance {
                         let gain_db = state.energy.values[state.energy_gain(search, r)];
-                        model.response_gain_db =
-                            BTreeMap::from([(survey.responses[r].name.clone(), gain_db)]);
+                        model.response_gain_db.insert(survey.responses[r].name.clone(), gain_db);
                     }
                 }
             }
