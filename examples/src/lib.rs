@@ -1,16 +1,4 @@
-//! What the example programs share: one style of plot, one kind of page, one progress bar.
-
-mod bar;
-mod chart;
-mod output;
-mod page;
-mod spectrogram;
-
-pub use bar::Bar;
-pub use chart::{Chart, Look, Scale, Series, chart_sheet};
-pub use output::{OutputError, OutputFolder};
-pub use page::{Page, escape};
-pub use spectrogram::spectrogram_png;
+//! The code on the how-to pages, and the links between documents, under test. The examples stand beside this folder.
 
 /// The code in `docs/how-to/` is compiled and run with the tests.
 #[cfg(doctest)]

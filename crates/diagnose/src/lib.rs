@@ -52,7 +52,7 @@
 //! | what bends around a screen is found in finite differences of the wave equation, and not where sound goes straight | `tests/hidden_edges.rs` |
 //! | rendering from the extended model against closed forms | `tests/rendering.rs` |
 //!
-//! `docs/validation/diagnose.md` has the figures, `cargo run --release --example effect_atlas` makes them.
+//! `docs/validation/diagnose.md` has the figures, `cargo run --release -p sabine-validation --bin effect_atlas` makes them.
 //!
 //! # References
 //! - D. J. C. MacKay: Information Theory, Inference, and Learning Algorithms, 2003, chapters 27 and 28 (evidence, Laplace).

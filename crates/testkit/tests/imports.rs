@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
 
 /// Each package and the packages of this workspace that it may import.
-const MAY_IMPORT: [(&str, &[&str]); 11] = [
+const MAY_IMPORT: [(&str, &[&str]); 13] = [
     ("sabine-acoustics", &[]),
     ("sabine-features", &["sabine-acoustics"]),
     ("sabine-eqfilter", &["sabine-acoustics"]),
@@ -27,7 +27,9 @@ const MAY_IMPORT: [(&str, &[&str]); 11] = [
         ],
     ),
     ("sabine-testkit", &["sabine-acoustics"]),
+    ("sabine-cli", &["sabine"]),
     ("sabine-examples", &["sabine"]),
+    ("sabine-validation", &["sabine", "sabine-cli", "sabine-testkit"]),
 ];
 
 /// Libraries that live behind one crate alone, so that nobody else's users compile them.

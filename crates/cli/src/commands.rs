@@ -1,0 +1,18 @@
+//! One module for each command: its arguments, and `run`.
+
+pub mod augment;
+pub mod diagnose;
+pub mod eq;
+pub mod estimate;
+pub mod evaluate;
+pub mod fit;
+pub mod listen;
+pub mod live;
+pub mod match_room;
+pub mod measure;
+pub mod mix;
+pub mod replace;
+pub mod trace;
+pub mod train;
+pub mod validate;
+pub mod walk;

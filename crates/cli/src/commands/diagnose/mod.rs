@@ -1,0 +1,136 @@
+//! What a simulated room gets wrong against measured responses, why, and what mending it gains.
+//!
+//! Without arguments it runs on the built-in demo, whose two responses show what can be said with that little.
+
+mod bars;
+mod findings;
+mod held_out;
+mod look_alikes;
+mod report;
+#[cfg(test)]
+mod report_tests;
+mod residual_map;
+mod words;
+
+use crate::bar::Bar;
+use crate::demo::Demo;
+use crate::failure::Failure;
+use crate::output::OutputFolder;
+use crate::room::RoomArguments;
+use clap::Args;
+use findings::Findings;
+use sabine::diagnose::{DiagnoseConfig, Diagnoser, catalogue};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// Find what a simulation of a room gets wrong against measured responses.
+#[derive(Args)]
+pub struct Arguments {
+    #[command(flatten)]
+    room: RoomArguments,
+    /// Receivers that are never fitted, only predicted [default: each is held out in turn]
+    #[arg(long, value_name = "ID,...", value_delimiter = ',')]
+    hold_out: Vec<String>,
+    /// Causes to try, by their names in the catalogue [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    effects: Vec<String>,
+    /// Rays for each source-receiver pair [default: 10000]
+    #[arg(long)]
+    rays: Option<usize>,
+    /// Seed of rays and simulated measurements
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Go on although more than one ray in a thousand escapes through holes of the mesh
+    #[arg(long)]
+    allow_leaks: bool,
+    /// Folder for diagnosis.json, report.html and extended_model.toml
+    #[arg(long, value_name = "DIR", default_value = "out/diagnose")]
+    out: PathBuf,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Whatever stands in the way, in words for the user.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let mut demo = Demo::default();
+    let mut config = DiagnoseConfig {
+        seed: arguments.seed,
+        allow_leaks: arguments.allow_leaks,
+        ..DiagnoseConfig::default()
+    };
+    if let Some(rays) = arguments.rays {
+        config.rays = rays;
+    }
+    let tried = match &arguments.effects {
+        ids if ids.is_empty() => catalogue().len(),
+        ids => ids.iter().collect::<BTreeSet<_>>().len(),
+    };
+    // What a name must reach: the odds that are asked for, and the number that was tried.
+    let threshold_nats = config.naming_nats + (tried as f64).ln();
+    let mut diagnoser = Diagnoser::new(config)?;
+    if !arguments.effects.is_empty() {
+        diagnoser = diagnoser.with_only(&arguments.effects)?;
+    }
+    // A folder that cannot be written to should not cost the user a computation first.
+    let mut out = OutputFolder::create(&arguments.out)?;
+    let (room, name) = arguments.room.read(&mut demo)?;
+    let bar = Bar::new();
+    let diagnosis = diagnoser.diagnose(&room, &arguments.hold_out, &bar)?;
+    bar.finish();
+
+    let mut receivers: Vec<usize> = room.responses().iter().map(|r| r.receiver).collect();
+    receivers.sort_unstable();
+    receivers.dedup();
+    let model = diagnosis.model.to_toml()?;
+    let findings = Findings::new(diagnosis, name, room.responses().len(), receivers.len(), threshold_nats);
+    out.write("diagnosis.json", findings.json()?.as_bytes())?;
+    out.write("report.html", report::html(&findings)?.as_bytes())?;
+    out.write("extended_model.toml", model.as_bytes())?;
+    out.finish()?;
+    print_findings(&findings, &arguments.out);
+    Ok(())
+}
+
+fn print_findings(findings: &Findings, out: &Path) {
+    println!("verdict: {}", findings.verdict);
+    println!("{}", words::headline(findings));
+    for line in words::meaning(findings) {
+        println!("  {line}");
+    }
+    for cause in &findings.causes {
+        println!(
+            "{} (probability {:.3})",
+            words::effect_of(&cause.effect, cause.subject.as_deref()),
+            cause.probability
+        );
+        for p in &cause.parameters {
+            println!(
+                "  {:<28} {:>8} {:<6} 90 %: {}",
+                words::parameter(&p.name),
+                words::number(p.value, p.high - p.low),
+                p.unit,
+                words::interval(p, "to")
+            );
+        }
+        if let Some(gain) = &cause.held_out_gain {
+            println!(
+                "  decay curves at positions not seen: {:.2} dB off before, {:.2} dB after",
+                gain.db_rmse_before, gain.db_rmse_after
+            );
+        }
+    }
+    if !findings.alternatives.is_empty() {
+        println!("one of: {}", findings.alternatives.join(", "));
+    }
+    for measurement in &findings.would_decide {
+        println!("would decide: {measurement}");
+    }
+    if findings.held_out.is_none() {
+        println!("note: too few positions to hold any out; gains are those of the data that were fitted");
+    }
+    for note in &findings.notes {
+        println!("note: {note}");
+    }
+    println!("{:.1} s; look at {}", findings.total_s(), out.join("report.html").display());
+}

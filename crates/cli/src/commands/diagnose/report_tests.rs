@@ -1,0 +1,73 @@
+//! Pages of hand-made findings.
+
+use super::findings::Findings;
+use super::report::html;
+use serde_json::{Value, json};
+
+fn findings(verdict: &str, changes: &Value) -> Findings {
+    let gain =
+        json!({ "nats_per_bin": 0.4, "low": 0.3, "high": 0.5, "db_rmse_before": 2.0, "db_rmse_after": 0.5 });
+    let humidity =
+        json!({ "name": "relative_humidity", "value": 17.0, "low": 15.0, "high": 19.0, "unit": "%" });
+    let cause = json!({ "effect": "air_absorption", "subject": null, "explanation": "It was <dry>.",
+        "probability": 0.99, "nats": 40.0, "parameters": [humidity], "held_out_gain": gain });
+    let score = |id: &str, nats: f64| json!({ "effect": id, "subject": null, "nats": nats, "d_prime": 4.0, "nats_beside_causes": -1.0 });
+    let residual = json!({ "response": null, "band_hz": 4000.0, "time_s": 0.34, "before_db": -4.1,
+        "after_db": 0.2, "expected_sd_db": 0.5 });
+    let decay = json!({ "response": "s-r", "band_hz": 4000.0, "time_s": [0.0, 0.1], "measured_db": [0.0, -9.0],
+        "before_db": [0.0, -7.0], "after_db": [0.0, -9.0], "held_out": true });
+    let mut all = json!({ "room": "rooms/hall", "responses": 3, "receivers": 3, "bands_hz": [2000.0, 4000.0],
+        "threshold_nats": 5.6, "verdict": verdict, "alternatives": [], "would_decide": [], "held_out": null,
+        "lack_of_fit": { "p_value": 1e-4, "p_value_explained": 0.3, "discrepancy_nats": 30.0,
+            "discrepancy_nats_explained": -2.0, "dispersion": [1.0, 1.0] },
+        "causes": [cause], "candidates": [score("air_absorption", 40.0), score("time_zero", -3.0)],
+        "isolability": [{ "effects": ["sound_speed", "sampling_clock"], "cosine": 0.999, "separable": false,
+            "would_decide": "read a thermometer" }],
+        "materials": [["wall", { "stated": [0.1, 0.1], "absorption_before": [0.2, 0.2],
+            "absorption": [0.1, 0.1], "absorption_sd": [0.01, 0.01] }]],
+        "residuals": [residual], "decays": [decay], "common_gain_db": -7.0, "notes": [], "seconds": [["trace", 1.0]] });
+    for (key, value) in changes.as_object().unwrap() {
+        all[key] = value.clone();
+    }
+    serde_json::from_value(all).unwrap()
+}
+
+#[test]
+fn a_named_cause_is_told_with_its_figures() {
+    let page = html(&findings("explained", &json!({}))).unwrap();
+    for part in [
+        "Found: Air drier or damper than stated.",
+        "It was &lt;dry&gt;.",
+        "17.0 %",
+        "15.0 and 19.0",
+        "at 4 kHz, 340 ms after the direct sound: the measurement is 4.1 dB quieter",
+        "7.0 dB below",
+        "2.00 dB off before, 0.50 dB after",
+        "too few microphone positions",
+        "nothing speaks for: Latency left in",
+        "To tell them apart: Read a thermometer.",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+}
+
+#[test]
+fn each_verdict_says_what_it_means() {
+    let page = html(&findings("adequate", &json!({ "causes": [] }))).unwrap();
+    assert!(page.contains("The simulation explains this measurement.") && !page.contains("What was found"));
+    let set = json!({ "alternatives": ["surface_absorption"], "would_decide": ["measure on a damp day"] });
+    let page = html(&findings("ambiguous", &set)).unwrap();
+    assert!(page.contains("which of 2 causes it is") && page.contains("<li>Measure on a damp day.</li>"));
+    let page = html(&findings("unexplained", &json!({ "causes": [] }))).unwrap();
+    assert!(page.contains("none of the known causes explains"));
+    assert!(!page.contains("After: with what was found"));
+}
+
+#[test]
+fn the_json_has_parameters_and_materials_by_name() {
+    let json: Value = serde_json::from_str(&findings("explained", &json!({})).json().unwrap()).unwrap();
+    assert_eq!(json["verdict"], "explained");
+    assert_eq!(json["causes"][0]["parameters"]["relative_humidity"]["value"], 17.0);
+    assert_eq!(json["materials"]["wall"]["absorption_before"][1], 0.2);
+    assert_eq!(json["seconds"]["trace"], 1.0);
+}

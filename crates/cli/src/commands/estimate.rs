@@ -1,0 +1,101 @@
+//! Estimates reverberation time and equalisation from recordings of speech.
+//!
+//! `estimate_speech FILE... [--json F]`
+
+use crate::failure::Failure;
+use clap::Args;
+use sabine::acoustics::{Channel, read_audio, write_atomically};
+use sabine::estimator::{DetailedEstimate, Estimator, LABEL_COUNT, T60_COUNT, label_hz};
+use serde::Serialize;
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Estimates reverberation time and equalisation from recordings of speech.
+#[derive(Args, Debug)]
+pub struct Arguments {
+    /// Recordings, 1 s or longer.
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// Channel to listen to, counted from 0, where there are several.
+    #[arg(long)]
+    channel: Option<usize>,
+    /// Write the numbers here as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Weights; those of the crate by default.
+    #[arg(long)]
+    weights: Option<PathBuf>,
+}
+
+/// One recording in the JSON file; octaves rise from 125 Hz (T60) and from 62.5 Hz (EQ, without 1 kHz).
+#[derive(Serialize)]
+struct Entry {
+    file: PathBuf,
+    t60_s: Vec<f64>,
+    t60_sd_s: Vec<f64>,
+    eq_db: Vec<f64>,
+    eq_sd_db: Vec<f64>,
+    warnings: Vec<String>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Whatever stands in the way, in words for the user.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let estimator = match &arguments.weights {
+        Some(path) => Estimator::from_file(path)?,
+        None => Estimator::pretrained()?,
+    };
+    let mut entries = Vec::new();
+    for file in &arguments.files {
+        let name = |error: &dyn std::fmt::Display| format!("{}: {error}", file.display());
+        let speech = read_audio(file, arguments.channel.map_or(Channel::Mono, Channel::Index))?;
+        let estimate = estimator.estimate_detailed(&speech).map_err(|error| name(&error))?;
+        let entry = entry(file.clone(), &estimate);
+        print(&entry);
+        entries.push(entry);
+    }
+    if let Some(path) = &arguments.json {
+        let text = serde_json::to_vec_pretty(&entries)?;
+        write_atomically(path, |file| file.write_all(&text))?;
+    }
+    Ok(())
+}
+
+fn entry(file: PathBuf, estimate: &DetailedEstimate) -> Entry {
+    let (t60, eq) = (estimate.targets.t60_s(), estimate.targets.eq_db());
+    let levels = || eq.iter().filter(|(hz, _)| *hz != 1000.0);
+    Entry {
+        file,
+        t60_s: t60.values().iter().map(|e| e.value).collect(),
+        t60_sd_s: t60.values().iter().map(|e| e.standard_error).collect(),
+        eq_db: levels().map(|(_, e)| e.value).collect(),
+        eq_sd_db: levels().map(|(_, e)| e.standard_error).collect(),
+        warnings: estimate.warnings.iter().map(ToString::to_string).collect(),
+    }
+}
+
+fn print(entry: &Entry) {
+    println!("{}", entry.file.display());
+    for label in 0..T60_COUNT {
+        println!(
+            "  {:>6} Hz  T60 {:.2} s, standard error {:.2}",
+            label_hz(label),
+            entry.t60_s[label],
+            entry.t60_sd_s[label]
+        );
+    }
+    for label in T60_COUNT..LABEL_COUNT {
+        let eq = label - T60_COUNT;
+        println!(
+            "  {:>6} Hz  EQ {:+.1} dB, standard error {:.1}",
+            label_hz(label),
+            entry.eq_db[eq],
+            entry.eq_sd_db[eq]
+        );
+    }
+    for warning in &entry.warnings {
+        println!("  warning: {warning}");
+    }
+}

@@ -1,0 +1,152 @@
+//! The main job: reverberant speech and a rough room in, sound that belongs in the room out.
+//!
+//! Without arguments it runs on the built-in demo.
+
+pub mod report;
+
+use crate::bar::Bar;
+use crate::demo::Demo;
+use crate::failure::Failure;
+use crate::output::OutputFolder;
+use crate::room::RoomArguments;
+use clap::Args;
+use sabine::acoustics::{Channel, SampleFormat, Signal, encode_wav, read_audio};
+use sabine::diagnose::ExtendedModel;
+use sabine::{MatchConfig, MatchInput, MatchSummary, Recording, RoomMatch, match_room, materials_toml};
+use std::path::{Path, PathBuf};
+
+/// Match a simulated room to a recording of speech, and render dry sound in it.
+#[derive(Args)]
+pub struct Arguments {
+    /// Reverberant recording of speech (WAV), at least one second [default: the built-in demo]
+    #[arg(long, value_name = "F.wav")]
+    speech: Option<PathBuf>,
+    #[command(flatten)]
+    room: RoomArguments,
+    /// extended_model.toml of `diagnose`: the simulation starts from its materials, air, dimensions and places. Loudspeaker,
+    /// noise and recorder of that measurement are left out: the speech has its own. Where it names standing waves, --wave-below
+    /// is theirs
+    #[arg(long, value_name = "F.toml")]
+    model: Option<PathBuf>,
+    /// Source in the room file [default: its first]
+    #[arg(long, value_name = "ID")]
+    source: Option<String>,
+    /// Receiver in the room file [default: its first]
+    #[arg(long, value_name = "ID")]
+    receiver: Option<String>,
+    /// Sound to place in the room (WAV) [default: the built-in demo]
+    #[arg(long, value_name = "F.wav")]
+    dry: Option<PathBuf>,
+    /// Channel of the recordings, from 0; without it they must be mono
+    #[arg(long)]
+    channel: Option<usize>,
+    /// Seed of rays and noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Number of rays to trace [default: 40000]
+    #[arg(long)]
+    rays: Option<usize>,
+    /// Below this frequency the room is a solution of the wave equation, from an omnidirectional source. Its time grows with the
+    /// fourth power of the frequency
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    wave_below: Option<f64>,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/match_room")]
+    out: PathBuf,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Whatever stands in the way, in words for the user.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let mut demo = Demo::default();
+    let speech_path = demo.or(arguments.speech.as_deref(), "speech/recording.wav")?;
+    let dry_path = demo.or(arguments.dry.as_deref(), "speech/dry_guest.wav")?;
+    let (speech_name, dry_name) = (demo.name(&speech_path), demo.name(&dry_path));
+
+    // A folder that cannot be written to should not cost the user a computation first.
+    let mut out = OutputFolder::create(&arguments.out)?;
+    let channel = arguments.channel.map_or(Channel::Mono, Channel::Index);
+    let speech = read_audio(&speech_path, channel)?;
+    let dry = read_audio(&dry_path, channel)?;
+    let (mut room, room_name) = arguments.room.read(&mut demo)?;
+    let mut diffraction = false;
+    let mut wave_below_hz = arguments.wave_below;
+    if let Some(model) = &arguments.model {
+        let extended = ExtendedModel::read(model)?.room(&room)?;
+        wave_below_hz = wave_below_hz.or(extended.wave_below_hz);
+        diffraction = extended.diffraction;
+        room = extended.measured_room(&room)?;
+    }
+    let first = |ids: Vec<&str>| ids.first().map(ToString::to_string).unwrap_or_default();
+    let source =
+        arguments.source.clone().unwrap_or_else(|| first(room.sources().iter().map(|s| &*s.id).collect()));
+    let receiver = arguments
+        .receiver
+        .clone()
+        .unwrap_or_else(|| first(room.receivers().iter().map(|r| &*r.id).collect()));
+    let input = MatchInput {
+        speech: Recording { name: &speech_name, signal: &speech },
+        dry: Recording { name: &dry_name, signal: &dry },
+        room: &room,
+        source: &source,
+        receiver: &receiver,
+    };
+    let mut config = MatchConfig { seed: arguments.seed, wave_below_hz, ..MatchConfig::default() };
+    config.tracer.diffraction |= diffraction;
+    if let Some(rays) = arguments.rays {
+        config.tracer.rays = rays;
+    }
+    let bar = Bar::new();
+    let matched = match_room(&input, &config, &bar)?;
+    bar.finish();
+
+    let summary = MatchSummary::new(&matched);
+    write_results(&mut out, &input, &room_name, &matched, &summary)?;
+    out.finish()?;
+    print_summary(&summary, &arguments.out);
+    Ok(())
+}
+
+fn write_results(
+    out: &mut OutputFolder,
+    input: &MatchInput<'_>,
+    room_name: &str,
+    matched: &RoomMatch,
+    summary: &MatchSummary,
+) -> Result<(), Failure> {
+    let response = Signal::from(matched.response.clone());
+    let filter = Signal::new(matched.eq_filter.taps().to_vec(), matched.eq_filter.sample_rate_hz())?;
+    out.write("matched.wav", &encode_wav(&matched.matched, SampleFormat::Int24)?)?;
+    out.write("impulse_response.wav", &encode_wav(&response, SampleFormat::Float32)?)?;
+    out.write("eq_filter.wav", &encode_wav(&filter, SampleFormat::Float32)?)?;
+    out.write("materials.toml", materials_toml(matched)?.as_bytes())?;
+    out.write("match.json", summary.to_json()?.as_bytes())?;
+    out.write("report.html", report::html(input, room_name, matched, summary)?.as_bytes())?;
+    Ok(())
+}
+
+fn print_summary(summary: &MatchSummary, out: &Path) {
+    println!("octave        {}", row(&summary.bands_hz, |hz| format!("{hz}")));
+    println!("T60 heard     {} s", row(&summary.t60_target_s, |t| format!("{t:.2}")));
+    println!(
+        "T60 reached   {} s",
+        row(&summary.t60_reached_s, |t| t.map_or("-".to_owned(), |t| format!("{t:.2}")))
+    );
+    if let Some(waves) = &summary.waves {
+        println!(
+            "waves below {} Hz: {} voxels; {:+.1} dB against the paths about there, joined with {:+.1} dB",
+            waves.below_hz, waves.voxels, waves.level_difference_db, waves.gain_db
+        );
+    }
+    for warning in &summary.warnings {
+        println!("note: {warning}");
+    }
+    let seconds: f64 = summary.seconds.values().sum();
+    println!("{seconds:.1} s; listen to and look at {}", out.join("report.html").display());
+}
+
+fn row<T>(values: &[T], format: impl Fn(&T) -> String) -> String {
+    values.iter().map(|v| format!("{:>6}", format(v))).collect()
+}

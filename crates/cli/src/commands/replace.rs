@@ -1,0 +1,185 @@
+//! What if this surface were another? Predicts T60, C50 and D50 before and after, and renders both.
+//!
+//! Without arguments it puts acoustic plaster on the ceiling of the built-in demo. The room is traced once: the change is heard on
+//! the same paths.
+
+use crate::bar::Bar;
+use crate::demo::Demo;
+use crate::failure::Failure;
+use crate::output::OutputFolder;
+use crate::room::RoomArguments;
+use clap::Args;
+use sabine::acoustics::{
+    Bands, Material, PerBand, Propagator, Reading, SampleFormat, Signal, encode_wav, library_material,
+    material_library,
+};
+use sabine::optimize::{PredictedChange, RoomPrediction};
+use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Octaves of the prediction: 125 Hz to 8 kHz.
+const OCTAVES: Bands = Bands::T60;
+
+/// Replace a material of a room and predict what changes.
+#[derive(Args)]
+pub struct Arguments {
+    #[command(flatten)]
+    room: RoomArguments,
+    /// Material of the room to replace
+    #[arg(long, default_value = "ceiling")]
+    material: String,
+    /// Name of a surface of the library that takes its place; `list` lists them
+    #[arg(long, default_value = "acoustic_plaster", conflicts_with = "absorption")]
+    with: String,
+    /// Or its absorption at 125 Hz to 8 kHz; scattering stays as it is
+    #[arg(long, value_delimiter = ',', value_name = "A,...")]
+    absorption: Option<Vec<f64>>,
+    /// Source in the room file [default: its first]
+    #[arg(long, value_name = "ID")]
+    source: Option<String>,
+    /// Receiver in the room file [default: its first]
+    #[arg(long, value_name = "ID")]
+    receiver: Option<String>,
+    /// Rays to trace
+    #[arg(long, default_value_t = 40_000)]
+    rays: usize,
+    /// Length of the responses, in seconds; at least the reverberation time
+    #[arg(long, default_value_t = 3.0)]
+    duration_s: f64,
+    /// Seed of rays and noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/replace_material")]
+    out: PathBuf,
+}
+
+/// One quantity, per octave; a value that cannot be read is null.
+#[derive(Serialize)]
+struct Row {
+    quantity: &'static str,
+    before: Vec<Option<f64>>,
+    before_se: Vec<Option<f64>>,
+    after: Vec<Option<f64>>,
+    after_se: Vec<Option<f64>>,
+    difference: Vec<Option<f64>>,
+    difference_se: Vec<Option<f64>>,
+}
+
+#[derive(Serialize)]
+struct Summary {
+    bands_hz: Vec<f64>,
+    material: String,
+    replaced_by: String,
+    rows: Vec<Row>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Whatever stands in the way, in words for the user.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.with == "list" {
+        for surface in material_library() {
+            println!("{:24}{}", surface.name, surface.description);
+        }
+        return Ok(());
+    }
+    let mut out = OutputFolder::create(&arguments.out)?;
+    let (room, _) = arguments.room.read(&mut Demo::default())?;
+    let source = match &arguments.source {
+        Some(id) => room.source(id)?,
+        None => room.sources().first().ok_or("room.toml: sources: there is none")?,
+    };
+    let receiver = match &arguments.receiver {
+        Some(id) => room.receiver(id)?,
+        None => room.receivers().first().ok_or("room.toml: receivers: there is none")?,
+    };
+    let named = room.scene().materials();
+    let Some(replaced) = named.iter().position(|m| m.name == arguments.material) else {
+        let names: Vec<&str> = named.iter().map(|m| m.name.as_str()).collect();
+        return Err(format!("--material {}: the room has {}", arguments.material, names.join(", ")).into());
+    };
+    let before: Vec<Material> = named.iter().map(|m| m.material.resampled(OCTAVES)).collect();
+    let (new, name) = match &arguments.absorption {
+        Some(values) => (
+            before[replaced].with_absorption(PerBand::new(OCTAVES, values.clone())?)?,
+            "the absorption given".to_owned(),
+        ),
+        None => (library_material(&arguments.with)?.material(OCTAVES)?, arguments.with.clone()),
+    };
+    let mut after = before.clone();
+    after[replaced] = new;
+
+    // Traced with the scattering half-way between the two, which samples both kinds of reflection.
+    let mut middle = before.clone();
+    middle[replaced] = between(&before[replaced], &after[replaced])?;
+    let scene = room.scene().with_materials(middle)?;
+    let config = TracerConfig {
+        rays: arguments.rays,
+        duration_s: arguments.duration_s,
+        seed: arguments.seed,
+        ..TracerConfig::default()
+    };
+    let bar = Bar::new();
+    let air = room.air();
+    let paths = PathTracer::new(config)?.trace(&scene, source, receiver, &air, &bar)?;
+    bar.finish();
+    let change = PredictedChange::new(&paths, &before, &after, &air)?;
+    let render = RenderConfig { seed: arguments.seed, ..RenderConfig::default() };
+    let renderer = PressureRenderer::new(render)?;
+    for (file, materials) in [("before.wav", &before), ("after.wav", &after)] {
+        let response = Signal::from(renderer.render(&paths, materials, &air)?);
+        out.write(file, &encode_wav(&response, SampleFormat::Float32)?)?;
+    }
+    let summary = Summary::new(&arguments.material, name, &change);
+    out.write("change.json", serde_json::to_string_pretty(&summary)?.as_bytes())?;
+    out.finish()?;
+    summary.print();
+    println!("listen to before.wav and after.wav in {}", arguments.out.display());
+    Ok(())
+}
+
+/// A material whose scattering lies half-way between those of two.
+fn between(one: &Material, other: &Material) -> Result<Material, Failure> {
+    let scattering = one.scattering().zip_with(other.scattering(), |a, b| 0.5 * (a + b))?;
+    Ok(Material::new(one.absorption().clone(), scattering)?)
+}
+
+impl Summary {
+    fn new(material: &str, replaced_by: String, change: &PredictedChange) -> Self {
+        let row = |quantity, of: fn(&RoomPrediction) -> &PerBand<Reading>| {
+            let column = |prediction: &RoomPrediction| {
+                let read = of(prediction).values().iter().map(|r| r.as_ref().ok());
+                read.map(|r| (r.map(|e| e.value), r.map(|e| e.standard_error))).unzip()
+            };
+            let ((before, before_se), (after, after_se)) = (column(&change.before), column(&change.after));
+            let (difference, difference_se) = column(&change.difference);
+            Row { quantity, before, before_se, after, after_se, difference, difference_se }
+        };
+        Self {
+            bands_hz: OCTAVES.iter_hz().collect(),
+            material: material.to_owned(),
+            replaced_by,
+            rows: vec![row("T60 s", |p| &p.t60_s), row("C50 dB", |p| &p.c50_db), row("D50", |p| &p.d50)],
+        }
+    }
+
+    fn print(&self) {
+        println!("{} replaced by {}", self.material, self.replaced_by);
+        println!("{:16}{}", "octave", self.bands_hz.iter().map(|hz| format!("{hz:>13}")).collect::<String>());
+        for row in &self.rows {
+            let line = |values: &[Option<f64>], errors: &[Option<f64>]| -> String {
+                let cell = |(v, e): (&Option<f64>, &Option<f64>)| match (v, e) {
+                    (Some(v), Some(e)) => format!("{v:>7.2} ±{e:.2}"),
+                    _ => format!("{:>13}", "-"),
+                };
+                values.iter().zip(errors).map(|pair| format!("{:>13}", cell(pair))).collect()
+            };
+            println!("{:16}{}", format!("{} before", row.quantity), line(&row.before, &row.before_se));
+            println!("{:>16}{}", "after", line(&row.after, &row.after_se));
+            println!("{:>16}{}", "difference", line(&row.difference, &row.difference_se));
+        }
+    }
+}

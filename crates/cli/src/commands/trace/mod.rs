@@ -1,0 +1,315 @@
+//! Traces a room: its response as sound, its parameters per octave with what chance leaves in them, and its first reflections
+//! on a plan.
+//!
+//! Without arguments it runs on the built-in demo. See docs/how-to/trace-a-room.md.
+
+mod plan;
+mod waves;
+
+use crate::bar::Bar;
+use crate::demo::Demo;
+use crate::failure::Failure;
+use crate::output::OutputFolder;
+use crate::room::RoomArguments;
+use clap::{Args, ValueEnum};
+use sabine::acoustics::{
+    Conditions, DiffuseRoom, Directivity, MeasuredRoom, NoReading, Orientation, PathParameters, PathSet,
+    PerBand, Propagator, Reading, Receiver, SampleFormat, Signal, Source, encode_wav, write_atomically,
+};
+use sabine::diagnose::ExtendedModel;
+use sabine::propagate::{
+    AmbisonicRenderer, MeshReport, PathTracer, PressureRenderer, RenderConfig, TracerConfig,
+};
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::time::Instant;
+use waves::{WaveRoomBelow, Waves};
+
+/// The first try lasts this many times the longest reverberation time that Eyring's formula expects ...
+const DURATION_FACTOR: f64 = 1.2;
+/// ... within these bounds (s). Rooms that are not diffuse ring longer: where T30 cannot be read, twice as long is tried.
+const DURATION_S: (f64, f64) = (0.3, 20.0);
+
+/// Trace the paths of sound between a source and a receiver of a room.
+#[derive(Args)]
+pub struct Arguments {
+    #[command(flatten)]
+    room: RoomArguments,
+    /// extended_model.toml of `diagnose`: the room, the sources' pattern and impulse_response.wav are as it says; ambisonics,
+    /// plan and parameters are those of the room, without loudspeaker response, noise and recorder
+    #[arg(long, value_name = "F.toml")]
+    model: Option<PathBuf>,
+    /// Source in the room file [default: its first]
+    #[arg(long, value_name = "ID")]
+    source: Option<String>,
+    /// Receiver in the room file [default: its first]
+    #[arg(long, value_name = "ID")]
+    receiver: Option<String>,
+    /// Number of rays
+    #[arg(long, default_value_t = 40_000)]
+    rays: usize,
+    /// Order up to which image sources are found exactly
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    order: usize,
+    /// Length of the response in seconds [default: until T30 can be read]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    duration: Option<f64>,
+    /// How the source radiates, along its orientation in the room file or else towards the receiver
+    #[arg(long, value_enum, default_value = "omni", conflicts_with = "model")]
+    pattern: Pattern,
+    /// Add sound diffracted over edges to receivers in a shadow
+    #[arg(long)]
+    diffraction: bool,
+    /// Below this frequency impulse_response.wav is a solution of the wave equation, from an omnidirectional source. Its time
+    /// grows with the fourth power of the frequency. Parameters and ambisonics are those of the paths [default: as --model says]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, conflicts_with = "pattern")]
+    wave_below: Option<f64>,
+    /// Go on although more than one ray in a thousand escapes through holes of the mesh
+    #[arg(long)]
+    allow_leaks: bool,
+    /// Threads [default: all cores]; the result does not depend on it
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// Seed of rays and noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Sample rate of the responses
+    #[arg(long, value_name = "HZ", default_value_t = 48_000)]
+    rate: u32,
+    /// Order of the ambisonic response (ACN, SN3D), 1 to 3
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    ambisonics: usize,
+    /// Folder for impulse_response.wav, ambisonics.wav, plan.svg and parameters.json
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Write the parameters as JSON
+    #[arg(long, value_name = "F.json")]
+    json: Option<PathBuf>,
+}
+
+/// Patterns of first order.
+#[derive(Clone, Copy, ValueEnum)]
+enum Pattern {
+    Omni,
+    Subcardioid,
+    Cardioid,
+    Supercardioid,
+    Hypercardioid,
+    FigureOfEight,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Whatever stands in the way, in words for the user.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if let Some(threads) = arguments.threads {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
+    }
+    // A folder that cannot be written to should not cost the user a computation first.
+    let out = arguments.out.as_deref().map(OutputFolder::create).transpose()?;
+    let (stated, room_name) = arguments.room.read(&mut Demo::default())?;
+    let model = arguments.model.as_ref();
+    let extended = model.map(|path| ExtendedModel::read(path)?.room(&stated)).transpose()?;
+    let room = extended.as_ref().map_or_else(|| Ok(stated.clone()), |model| model.measured_room(&stated))?;
+    let source = chosen(arguments.source.as_deref(), room.sources(), |id| room.source(id), "source")?;
+    let receiver =
+        chosen(arguments.receiver.as_deref(), room.receivers(), |id| room.receiver(id), "receiver")?;
+    let renderer =
+        RenderConfig { sample_rate_hz: arguments.rate, seed: arguments.seed, ..Default::default() };
+    let (mono, ambisonic) =
+        (PressureRenderer::new(renderer.clone())?, AmbisonicRenderer::new(arguments.ambisonics, renderer)?);
+
+    let materials: Vec<_> = room.scene().materials().iter().map(|named| named.material.clone()).collect();
+    let air = room.air();
+    let pattern = pattern(arguments.pattern)?;
+    let mut conditions = match (&extended, room.sources().iter().position(|s| s.id == source.id)) {
+        (Some(model), Some(index)) => model.conditions(&materials, index),
+        _ => Conditions::new(&materials, &air),
+    };
+    let towards = |from: [f64; 3], to: [f64; 3]| Orientation::towards([0, 1, 2].map(|i| to[i] - from[i]));
+    if let Some(pattern) = &pattern {
+        let axis =
+            source.axis.map_or_else(|| towards(source.position_m, receiver.position_m), Orientation::towards);
+        conditions = conditions.with_source(pattern, axis?);
+    }
+    let facing = receiver.axis.map_or_else(|| Ok(Orientation::default()), Orientation::towards)?;
+
+    let below_hz = arguments.wave_below.or(extended.as_ref().and_then(|model| model.wave_below_hz));
+    let below = below_hz.map(|hz| WaveRoomBelow::new(hz, arguments.rate, &room, source)).transpose()?;
+    let bar = Bar::new();
+    let start = Instant::now();
+    let bends = arguments.diffraction || extended.as_ref().is_some_and(|model| model.diffraction);
+    let (paths, parameters) = trace(arguments, bends, &room, source, receiver, &conditions, &bar)?;
+    let trace_s = start.elapsed().as_secs_f64();
+    bar.finish();
+    let start = Instant::now();
+    let mut response = mono.render_under(&paths, &conditions)?;
+    let render_s = start.elapsed().as_secs_f64();
+    let joined = |below: WaveRoomBelow| below.join(source, receiver, &conditions, &response, &bar);
+    let waves = below.map(joined).transpose()?;
+    bar.finish();
+    if let Some(waves) = &waves {
+        response = waves.joined.response.clone();
+    }
+    let start = Instant::now();
+    if let Some(model) = &extended {
+        response = model.finish(&source.id, &receiver.id, response, arguments.seed)?;
+    }
+    let directional = ambisonic.render(&paths, &conditions, facing)?;
+    let render_s = render_s + start.elapsed().as_secs_f64();
+
+    for warning in MeshReport::inspect(room.scene(), source.position_m)?.warnings() {
+        println!("note: {warning}");
+    }
+    print!("{}", table(&parameters));
+    println!("{} paths; traced in {trace_s:.2} s, rendered in {render_s:.2} s", paths.len());
+    if let Some(waves) = &waves {
+        println!("{}", waves.line());
+    }
+    let mut result = as_json(&parameters);
+    result["waves"] = json!(waves.as_ref().map(Waves::as_json));
+    result["room"] = json!(room_name);
+    result["model"] = json!(model.map(|path| path.display().to_string()));
+    result["source"] = json!(source.id);
+    result["receiver"] = json!(receiver.id);
+    result["contributions"] = json!(paths.len());
+    result["duration_s"] = json!(paths.max_length_m() / air.speed_of_sound_m_s());
+    result["seconds"] = json!({ "trace": trace_s, "render": render_s });
+    let text = serde_json::to_string_pretty(&result)?;
+    if let (Some(mut out), Some(folder)) = (out, &arguments.out) {
+        let response = Signal::from(response);
+        out.write("impulse_response.wav", &encode_wav(&response, SampleFormat::Float32)?)?;
+        out.write("ambisonics.wav", &directional.encode_wav(SampleFormat::Float32)?)?;
+        out.write("plan.svg", plan::svg(&room, source, receiver, &paths, &conditions)?.as_bytes())?;
+        out.write("parameters.json", text.as_bytes())?;
+        out.finish()?;
+        println!("listen to and look at {}", folder.display());
+    }
+    if let Some(path) = &arguments.json {
+        write_atomically(path, |file| writeln!(file, "{text}"))?;
+    }
+    Ok(())
+}
+
+/// What the arguments name, or the first of the room file.
+fn chosen<'r, T>(
+    id: Option<&str>,
+    all: &'r [T],
+    find: impl FnOnce(&str) -> Result<&'r T, sabine::acoustics::Error>,
+    what: &str,
+) -> Result<&'r T, Failure> {
+    match id {
+        Some(id) => Ok(find(id)?),
+        None => all.first().ok_or_else(|| format!("the room file names no {what}").into()),
+    }
+}
+
+fn pattern(pattern: Pattern) -> Result<Option<Directivity>, sabine::acoustics::Error> {
+    let omni_share = match pattern {
+        Pattern::Omni => return Ok(None),
+        Pattern::Subcardioid => Directivity::SUBCARDIOID,
+        Pattern::Cardioid => Directivity::CARDIOID,
+        Pattern::Supercardioid => Directivity::SUPERCARDIOID,
+        Pattern::Hypercardioid => Directivity::HYPERCARDIOID,
+        Pattern::FigureOfEight => Directivity::FIGURE_OF_EIGHT,
+    };
+    Directivity::first_order(omni_share).map(Some)
+}
+
+/// Traces for as long as asked, or until T30 can be read in every octave.
+fn trace(
+    arguments: &Arguments,
+    diffraction: bool,
+    room: &MeasuredRoom,
+    source: &Source,
+    receiver: &Receiver,
+    conditions: &Conditions,
+    bar: &Bar,
+) -> Result<(PathSet, PathParameters), Failure> {
+    let expected = DiffuseRoom::of_scene(room.scene(), &room.air(), room.bands())?;
+    let longest_s = expected.values().iter().map(DiffuseRoom::eyring_t60_s).fold(0.0, f64::max);
+    let mut duration_s =
+        arguments.duration.unwrap_or((DURATION_FACTOR * longest_s).clamp(DURATION_S.0, DURATION_S.1));
+    loop {
+        let config = TracerConfig {
+            rays: arguments.rays,
+            image_order: arguments.order,
+            duration_s,
+            seed: arguments.seed,
+            diffraction,
+            allow_leaks: arguments.allow_leaks,
+            ..TracerConfig::default()
+        };
+        let paths = PathTracer::new(config)?.trace(room.scene(), source, receiver, &room.air(), bar)?;
+        let parameters = PathParameters::read(&paths, conditions)?;
+        let cut =
+            parameters.t30_s.values().iter().any(|t30| matches!(t30, Err(NoReading::DynamicRange { .. })));
+        if !cut || arguments.duration.is_some() || duration_s >= DURATION_S.1 {
+            return Ok((paths, parameters));
+        }
+        duration_s = (2.0 * duration_s).min(DURATION_S.1);
+    }
+}
+
+/// The quantities that are read per band: name, unit, values.
+fn quantities(parameters: &PathParameters) -> [(&'static str, &'static str, &PerBand<Reading>); 8] {
+    [
+        ("edt", "_s", &parameters.edt_s),
+        ("t20", "_s", &parameters.t20_s),
+        ("t30", "_s", &parameters.t30_s),
+        ("c50", "_db", &parameters.c50_db),
+        ("c80", "_db", &parameters.c80_db),
+        ("d50", "", &parameters.d50),
+        ("centre_time", "_s", &parameters.centre_time_s),
+        ("drr", "_db", &parameters.drr_db),
+    ]
+}
+
+/// A table for the terminal, each value with its standard error; a dash stands for what cannot be read.
+fn table(parameters: &PathParameters) -> String {
+    let mut text = format!("{:<14}", "");
+    for hz in parameters.bands().iter_hz() {
+        let label = if hz < 1000.0 { format!("{hz}") } else { format!("{}k", hz / 1000.0) };
+        let _ = write!(text, "{label:>17}");
+    }
+    text.push('\n');
+    let mut reasons = Vec::new();
+    for (name, unit, per_band) in quantities(parameters) {
+        let _ = write!(text, "{:<14}", format!("{name}{unit}"));
+        for (hz, reading) in per_band.iter() {
+            let cell = match reading {
+                Ok(estimate) => format!("{:.3} ± {:.3}", estimate.value, estimate.standard_error),
+                Err(reason) => {
+                    reasons.push(format!("  - {name} at {hz} Hz: {reason}\n"));
+                    "-".to_owned()
+                }
+            };
+            let _ = write!(text, "{cell:>17}");
+        }
+        text.push('\n');
+    }
+    text.extend(reasons);
+    text
+}
+
+fn as_json(parameters: &PathParameters) -> Value {
+    let mut result = json!({ "bands_hz": parameters.bands().iter_hz().collect::<Vec<_>>() });
+    let mut reasons = vec![serde_json::Map::new(); parameters.bands().len()];
+    for (name, unit, per_band) in quantities(parameters) {
+        let pick = |value: fn(&sabine::acoustics::Estimate) -> f64| -> Value {
+            per_band.values().iter().map(|r| r.as_ref().map_or(Value::Null, |e| json!(value(e)))).collect()
+        };
+        result[format!("{name}{unit}")] = pick(|e| e.value);
+        result[format!("{name}_sd{unit}")] = pick(|e| e.standard_error);
+        for (reasons, reading) in reasons.iter_mut().zip(per_band.values()) {
+            if let Err(reason) = reading {
+                reasons.insert(format!("{name}{unit}"), json!(reason.to_string()));
+            }
+        }
+    }
+    result["reasons"] = reasons.into_iter().map(Value::Object).collect();
+    result
+}

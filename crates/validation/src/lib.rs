@@ -1,0 +1,2 @@
+//! The programs behind the tables of `docs/validation`: how often hidden effects are found, how well materials are fitted, whether
+//! memory stays flat. Not published; run them with `cargo run --release -p sabine-validation --bin NAME`.
