@@ -7,8 +7,10 @@ use std::fmt::Write;
 
 /// Size of a chart in SVG units: it scales to its place on the page, and its text stays readable on a phone.
 const SIZE: (u32, u32) = (480, 320);
+/// Height of letters in these units: 11 pixels and more where a chart is as wide as a phone of 390 pixels lets it be.
+const TEXT: u32 = 16;
 /// Size of one of several small charts side by side.
-const SMALL: (u32, u32) = (320, 220);
+const SMALL: (u32, u32) = (320, 244);
 /// Height of a row of the legend.
 const LEGEND_ROW: i32 = 20;
 /// Centres of bands that are told along an axis, at most.
@@ -166,13 +168,13 @@ impl Chart {
 
     /// Left edge and row of each entry of the legend, wrapped at the width of the chart.
     fn legend_places(&self, width: i32) -> Vec<(i32, i32)> {
-        let start = if self.small { 44 } else { 58 };
+        let start = if self.small { 46 } else { 62 };
         let (mut left, mut row) = (start, 0);
         self.series
             .iter()
             .filter(|s| s.in_legend)
             .map(|series| {
-                let needed = 40 + 8 * series.name.chars().count() as i32;
+                let needed = 40 + 9 * series.name.chars().count() as i32;
                 if left > start && left + needed > width {
                     (left, row) = (start, row + 1);
                 }
@@ -200,7 +202,7 @@ impl Chart {
                 let stroke = vec![(left + from, middle), (left + to, middle)];
                 legend.draw(&PathElement::new(stroke, colour.stroke_width(3)))?;
             }
-            legend.draw(&Text::new(series.name.clone(), (left + 24, middle - 8), ink(15)))?;
+            legend.draw(&Text::new(series.name.clone(), (left + 24, middle - 8), ink(TEXT)))?;
         }
 
         let (x0, x1) = self.x_range();
@@ -209,15 +211,15 @@ impl Chart {
             .margin_right(14)
             // plotters places the label by the capitals of one font; in others it rises higher.
             .margin_left(if self.y_label.is_empty() { 0 } else { 6 })
-            .x_label_area_size(if self.x_label.is_empty() { 24 } else { 46 })
-            .y_label_area_size(if self.y_label.is_empty() { 40 } else { 58 })
+            .x_label_area_size(if self.x_label.is_empty() { 26 } else { 50 })
+            .y_label_area_size(if self.y_label.is_empty() { 42 } else { 62 })
             .build_cartesian_2d(x0..x1, y0..y1)?;
         let octaves = matches!(self.x, Scale::Octaves(_));
         let mut mesh = chart.configure_mesh();
         mesh.x_desc(self.x_label.as_str())
             .y_desc(self.y_label.as_str())
-            .axis_desc_style(ink(15))
-            .label_style(ink(14))
+            .axis_desc_style(ink(TEXT))
+            .label_style(ink(TEXT))
             .axis_style(INK)
             .bold_line_style(GRID)
             .light_line_style(TRANSPARENT)
@@ -233,8 +235,8 @@ impl Chart {
                 plot.draw(&PathElement::new(vec![(x, y0), (x, y1)], GRID))?;
                 let (pixel, bottom) = plot.map_coordinate(&(x, y0));
                 let label = if hz < 1000.0 { format!("{hz}") } else { format!("{}k", hz / 1000.0) };
-                let shift = 4 * label.len() as i32;
-                body.draw(&Text::new(label, (pixel - shift, bottom + 5 - legend_height), ink(14)))?;
+                let shift = (TEXT / 4 * label.len() as u32) as i32;
+                body.draw(&Text::new(label, (pixel - shift, bottom + 5 - legend_height), ink(TEXT)))?;
             }
         }
         for series in &self.series {

@@ -85,8 +85,12 @@ pub struct RoomMatch {
     pub decay: PerBand<EnergyDecayCurve>,
     /// Equalisation of the rendered response before the filter, in dB relative to 1 kHz.
     pub eq_simulated_db: PerBand<f64>,
+    /// Equalisation of the rendered response behind the filter, in dB relative to 1 kHz: what is heard in `matched`.
+    pub eq_reached_db: PerBand<f64>,
     /// Pressure response of the simulation with the fitted materials; the equalisation filter is not applied to it.
     pub response: ImpulseResponse,
+    /// The same with the materials of the room file: the simulation before it was matched. Waves are not joined to it.
+    pub response_before: ImpulseResponse,
     /// What joining it to waves at low frequencies found, where that was asked for.
     pub waves: Option<JoinedWaves>,
     /// What the decay slopes cannot give.
@@ -251,6 +255,7 @@ fn match_targets(
             _ => break (fit, response, parameters),
         }
     };
+    let response_before = renderer.render(&paths, &materials_before, &air)?;
     let mut waves = None;
     if let Some(low_end) = low_end {
         let (joined, found) = low_end.join((source, receiver), &fit.materials, &air, &response, observer)?;
@@ -262,13 +267,18 @@ fn match_targets(
     warn_of_misses(targets.t60_s(), &parameters.t30_s, &fit, &mut warnings);
     warn_of_fit(&fit, room, &mut warnings);
     warnings.extend(fit.unreachable.iter().map(|u| Warning::Unreachable(u.clone())));
-    let eq_simulated_db = equalisation(&response, Bands::EQ)?
-        .map(|reading| reading.as_ref().map_or(f64::NAN, |estimate| estimate.value));
+    let levels = |response: &ImpulseResponse| -> Result<PerBand<f64>, Error> {
+        let readings = equalisation(response, Bands::EQ)?;
+        Ok(readings.map(|reading| reading.as_ref().map_or(f64::NAN, |estimate| estimate.value)))
+    };
+    let eq_simulated_db = levels(&response)?;
     let eq_filter = {
         let above = config.above_8_khz_db.map(|gain_db| AboveBand { from_band_hz: 8000.0, gain_db });
         let gains_db = eq_gains(targets.eq_db(), &eq_simulated_db, config.largest_eq_db, &mut warnings)?;
         EqFilter::design(&gains_db, sample_rate_hz, EqFilterConfig { above, ..EqFilterConfig::default() })?
     };
+    let filtered = eq_filter.apply(&Signal::from(response.clone()))?;
+    let eq_reached_db = levels(&ImpulseResponse::from(filtered))?;
     let dry = resample(input.dry.signal, sample_rate_hz)?;
     let wet = sabine_eqfilter::convolve(dry.samples(), response.samples());
     let matched = eq_filter.apply(&Signal::new(wet, sample_rate_hz)?)?;
@@ -284,7 +294,9 @@ fn match_targets(
         fit,
         decay,
         eq_simulated_db,
+        eq_reached_db,
         response,
+        response_before,
         waves,
         eq_filter,
         matched,

@@ -26,6 +26,8 @@ pub struct MatchSummary {
     pub eq_sd_db: Vec<f64>,
     /// Equalisation of the simulation before the filter, in dB relative to 1 kHz.
     pub eq_simulated_db: Vec<Option<f64>>,
+    /// Equalisation behind the filter, in dB relative to 1 kHz; `None` where it cannot be read.
+    pub eq_reached_db: Vec<Option<f64>>,
     /// Absorption of each material at `bands_hz`, as the room file has it and as fitted.
     pub materials: BTreeMap<String, MaterialChange>,
     /// Combinations of materials that the targets do not determine, in words.
@@ -67,7 +69,6 @@ impl MatchSummary {
     pub fn new(matched: &RoomMatch) -> Self {
         let t60 = matched.targets.t60_s();
         let eq: Vec<(f64, &Estimate)> = without_reference(matched.targets.eq_db());
-        let simulated = without_reference(&matched.eq_simulated_db);
         let before_after = matched.materials_before.iter().zip(&matched.fit.materials);
         let materials = matched
             .material_names
@@ -103,7 +104,8 @@ impl MatchSummary {
             eq_bands_hz: eq.iter().map(|(hz, _)| *hz).collect(),
             eq_db: eq.iter().map(|(_, e)| e.value).collect(),
             eq_sd_db: eq.iter().map(|(_, e)| e.standard_error).collect(),
-            eq_simulated_db: simulated.iter().map(|(_, e)| Some(**e).filter(|e| e.is_finite())).collect(),
+            eq_simulated_db: finite(&matched.eq_simulated_db),
+            eq_reached_db: finite(&matched.eq_reached_db),
             materials,
             not_determined: matched.fit.not_determined.iter().map(|u| u.describe(&names)).collect(),
             eq_filter_delay_s: matched.eq_filter.delay_s(),
@@ -122,6 +124,14 @@ impl MatchSummary {
     pub fn to_json(&self) -> Result<String, Error> {
         Ok(serde_json::to_string_pretty(self)?)
     }
+}
+
+/// Levels but the reference's, without those that could not be read.
+fn finite(levels_db: &PerBand<f64>) -> Vec<Option<f64>> {
+    without_reference(levels_db)
+        .into_iter()
+        .map(|(_, level)| Some(*level).filter(|l| l.is_finite()))
+        .collect()
 }
 
 fn without_reference<T>(levels: &PerBand<T>) -> Vec<(f64, &T)> {

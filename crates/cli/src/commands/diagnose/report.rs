@@ -306,8 +306,8 @@ fn decay_chart(curves: &DecayCurves) -> Chart {
     let end_s = points().map(|p| p.0).fold(0.05, f64::max);
     let top_db = points().map(|p| p.1).fold(2.0, f64::max);
     Chart {
-        x_label: String::new(),
-        y_label: String::new(),
+        x_label: "Time (s)".into(),
+        y_label: "Level (dB)".into(),
         x: Scale::Linear(0.0, end_s),
         y: Some((DECAY_FLOOR_DB, top_db)),
         series: all,

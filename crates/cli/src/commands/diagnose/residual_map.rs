@@ -14,8 +14,8 @@ const NOTHING: [u8; 4] = [128, 128, 128, 70];
 /// Columns of the picture.
 const COLUMNS: usize = 160;
 /// Where the picture lies in the drawing.
-const LEFT: f64 = 46.0;
-const WIDTH: f64 = 428.0;
+const LEFT: f64 = 52.0;
+const WIDTH: f64 = 422.0;
 const ROW: f64 = 20.0;
 
 /// The cells of one map and the scale that they share with others.
@@ -38,11 +38,11 @@ impl ResidualMap<'_> {
         let title = escape(title);
         let mut svg = format!(
             "<svg class=\"map\" role=\"img\" aria-label=\"{title}\" viewBox=\"0 0 480 {}\"><image x=\"{LEFT}\" y=\"2\" width=\"{WIDTH}\" height=\"{height}\" preserveAspectRatio=\"none\" style=\"image-rendering:pixelated\" href=\"data:image/png;base64,{png}\"/><rect x=\"{LEFT}\" y=\"2\" width=\"{WIDTH}\" height=\"{height}\" fill=\"none\" stroke=\"currentColor\" stroke-opacity=\".4\"/>",
-            height + 24.0
+            height + 26.0
         );
         for (row, hz) in self.bands_hz.iter().rev().enumerate() {
             let label = if *hz < 1000.0 { format!("{hz}") } else { format!("{}k", hz / 1000.0) };
-            let y = 2.0 + ROW * (row as f64 + 0.5) + 4.5;
+            let y = 2.0 + ROW * (row as f64 + 0.5) + 5.5;
             let _ = write!(svg, "<text x=\"{}\" y=\"{y}\" text-anchor=\"end\">{label}</text>", LEFT - 6.0);
         }
         let step_s =
@@ -58,7 +58,7 @@ impl ResidualMap<'_> {
             let _ = write!(
                 svg,
                 "<text x=\"{x:.1}\" y=\"{}\" text-anchor=\"{anchor}\">{label}{unit}</text>",
-                height + 19.0
+                height + 20.0
             );
             tick += 1;
         }

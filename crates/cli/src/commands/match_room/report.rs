@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use crate::page::{Page, escape};
 use crate::spectrogram::spectrogram_png;
 use sabine::acoustics::{EnergyDecayCurve, Estimate, PerBand, SampleFormat, Signal, encode_wav, resample};
+use sabine::eqfilter::convolve;
 use sabine::{DECAY_STEP_S, MatchInput, MatchSummary, MaterialChange, RoomMatch};
 
 type Result<T> = std::result::Result<T, Failure>;
@@ -37,12 +38,15 @@ pub fn html(
     page.paragraph(&verdict(summary));
     page.warnings(&summary.warnings);
     page.heading("Listen");
+    let before = in_room_before(input, matched)?;
     page.markup("<div class=\"small\"><section>");
     page.player(&player_wav(input.speech.signal)?, "The recording: what the room sounds like");
     page.markup("</section><section>");
     page.player(&player_wav(input.dry.signal)?, "The dry sound");
     page.markup("</section><section>");
-    page.player(&player_wav(&matched.matched)?, "The dry sound, placed in the room");
+    page.player(&player_wav(&before)?, "The dry sound in the simulation before matching");
+    page.markup("</section><section>");
+    page.player(&player_wav(&matched.matched)?, "The dry sound, placed in the matched room");
     page.markup("</section></div><div class=\"grid\"><section>");
     page.heading("Reverberation time: heard and reached");
     page.markup(&t60_chart(matched, summary).svg()?);
@@ -112,6 +116,15 @@ fn verdict(summary: &MatchSummary) -> String {
     )
 }
 
+/// The dry sound in the simulation with the materials of the room file, as loud as its peak allows.
+fn in_room_before(input: &MatchInput<'_>, matched: &RoomMatch) -> Result<Signal> {
+    let rate_hz = matched.response_before.sample_rate_hz();
+    let dry = resample(input.dry.signal, rate_hz)?;
+    let wet = convolve(dry.samples(), matched.response_before.samples());
+    let gain = matched.matched.peak() / wet.iter().fold(f32::MIN_POSITIVE, |peak, s| peak.max(s.abs()));
+    Ok(Signal::new(wet.into_iter().map(|s| s * gain).collect(), rate_hz)?)
+}
+
 fn t60_chart(matched: &RoomMatch, summary: &MatchSummary) -> Chart {
     let bands = &summary.bands_hz;
     let mut heard = Series::new("heard (90 %)", Look::Dots, 0, pairs(bands, &summary.t60_target_s));
@@ -157,6 +170,12 @@ fn eq_chart(matched: &RoomMatch) -> Chart {
         1,
         matched.eq_simulated_db.iter().map(|(hz, &e)| (hz, e)).collect(),
     );
+    let reached = Series::new(
+        "simulation and filter",
+        Look::Dots,
+        3,
+        matched.eq_reached_db.iter().map(|(hz, &e)| (hz, e)).collect(),
+    );
     let gains = dense_hz(&centres).into_iter().map(|hz| (hz, matched.eq_filter.gain_db(hz))).collect();
     let filter = Series::new("filter", Look::Line, 2, gains);
     Chart {
@@ -164,7 +183,7 @@ fn eq_chart(matched: &RoomMatch) -> Chart {
         y_label: "Level re 1 kHz (dB)".into(),
         x: Scale::Octaves(centres),
         y: None,
-        series: vec![heard, simulated, filter],
+        series: vec![heard, simulated, filter, reached],
         small: false,
     }
 }
@@ -204,8 +223,8 @@ fn decay_chart(decay: &PerBand<EnergyDecayCurve>, target_s: &PerBand<Estimate>) 
 
 fn absorption_chart(bands_hz: &[f64], change: &MaterialChange, top: f64) -> Chart {
     Chart {
-        x_label: String::new(),
-        y_label: String::new(),
+        x_label: "Octave (Hz)".into(),
+        y_label: "Absorption".into(),
         x: Scale::Octaves(bands_hz.to_vec()),
         y: Some((0.0, top)),
         series: vec![
@@ -236,6 +255,10 @@ fn eq_table(summary: &MatchSummary) -> Vec<Vec<String>> {
         named("heard", summary.eq_db.iter().map(number)),
         named("standard error", summary.eq_sd_db.iter().map(|e| format!("{e:.1}"))),
         named("simulation", summary.eq_simulated_db.iter().map(|e| e.as_ref().map_or("-".into(), number))),
+        named(
+            "simulation and filter",
+            summary.eq_reached_db.iter().map(|e| e.as_ref().map_or("-".into(), number)),
+        ),
     ]
 }
 
