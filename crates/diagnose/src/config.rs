@@ -1,6 +1,6 @@
 //! Settings of a diagnosis.
 
-use crate::Error;
+use crate::error::Error;
 use sabine_propagate::TracerConfig;
 
 /// Specular paths in a cuboid that are predicted exactly.

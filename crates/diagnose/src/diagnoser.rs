@@ -1,30 +1,36 @@
 //! The whole diagnosis.
 
-use crate::diagnosis::{CandidateScore, Cause, Diagnosis, FittedMaterial, HeldOutGain, LackOfFit, Verdict};
-use crate::effect::{Effect, Evidence, Nuisance};
-use crate::found_parameters::{at_bounds, parameters};
-use crate::held_out::{Folds, decay_curves, predict};
-use crate::isolability::isolability;
-use crate::lack_of_fit;
-use crate::measurement::would_decide;
-use crate::naming::Named;
-use crate::notes::{Circumstances, notes};
-use crate::prediction::compare;
-use crate::residual_map::residual_map;
-use crate::search::{self, Search, State};
-use crate::workbench::Workbench;
-use crate::{DiagnoseConfig, Error, catalogue, extension};
+use crate::config::DiagnoseConfig;
+use crate::effect::{Effect, Nuisance, Observable};
+use crate::effects::catalogue;
+use crate::error::Error;
+use crate::extend::extension;
+use crate::infer::cross_validation::{Folds, decay_curves, predict};
+use crate::infer::isolability::isolability;
+use crate::infer::lack_of_fit;
+use crate::infer::prediction::compare;
+use crate::infer::search;
+use crate::infer::search::{Search, State};
+use crate::infer::selection::Selection;
+use crate::infer::workbench::Workbench;
+use crate::report::diagnosis::{
+    CandidateScore, Cause, Diagnosis, FittedMaterial, HeldOutGain, LackOfFit, Verdict,
+};
+use crate::report::found_parameters::{at_bounds, parameters};
+use crate::report::next_measurement::discriminating_measurement;
+use crate::report::notes::{Circumstances, notes};
+use crate::report::residual_map::residual_map;
 use sabine_acoustics::{MeasuredRoom, Observer, report};
 use std::time::Instant;
 
-/// Evidence by which the unnamed discrepancy must beat all named causes to unseat them, in nats.
-const UNSEAT_NATS: f64 = 5.0;
+/// Observable by which the unnamed discrepancy must beat all named causes to unseat them, in nats.
+const UNNAMED_MARGIN_NATS: f64 = 5.0;
 /// Share of the error of decay curves at positions left out to which a cause must bring it down to count as a help.
-const NEARER: f64 = 0.97;
+const MAX_RMSE_RATIO: f64 = 0.97;
 /// Dispersion from which an unexplained misfit looks like another room.
-const SCATTERED: f64 = 3.0;
+const WARN_DISPERSION: f64 = 3.0;
 /// Dispersion from which nothing is named: measured variance over that expected, causes and smooth discrepancy taken out.
-const HOPELESS: f64 = 100.0;
+const MAX_DISPERSION: f64 = 100.0;
 
 /// Says what is wrong with a simulated room, given what was measured in it.
 ///
@@ -124,7 +130,7 @@ impl Diagnoser {
         let lack_before = lack_of_fit::test(&bench, &[], base.before(), &used)?;
         report(observer, "lack of fit", 1, 2)?;
         let lack = |state: &State| -> Result<Option<lack_of_fit::Lack>, Error> {
-            let cases = search.cases_of(&state.chosen, Evidence::Energy);
+            let cases = search.cases_of(&state.chosen, Observable::Decay);
             let test = || lack_of_fit::test(&bench, &cases, state.before(), &used);
             (!state.chosen.is_empty()).then(test).transpose()
         };
@@ -140,14 +146,14 @@ impl Diagnoser {
             lack_after = lack(&state)?;
         }
         let lack_after = lack_after.as_ref().unwrap_or(&lack_before);
-        let energy_cases = search.cases_of(&state.chosen, Evidence::Energy);
+        let energy_cases = search.cases_of(&state.chosen, Observable::Decay);
         let free_alone = base.energy.log_evidence + lack_before.discrepancy_nats;
         // A name must beat the discrepancy that has none. Causes that do not bear on decays are beyond its reach.
         let beaten = !energy_cases.is_empty()
             && energy_cases.len() == state.chosen.len()
-            && free_alone > state.energy.log_evidence + UNSEAT_NATS;
+            && free_alone > state.energy.log_evidence + UNNAMED_MARGIN_NATS;
         // Where bins scatter a hundred times as far as they may, the baseline itself has not been met: no name can be trusted.
-        let hopeless = bench.dispersion.iter().any(|d| *d > HOPELESS);
+        let hopeless = bench.dispersion.iter().any(|d| *d > MAX_DISPERSION);
         let verdict = if hopeless || beaten {
             Verdict::Unexplained
         } else if state.chosen.is_empty() {
@@ -195,7 +201,7 @@ impl Diagnoser {
         };
         let isolability = isolability(&bench, &search.candidates)?;
         let candidates = self.candidate_scores(&search, &state, &found, observer)?;
-        let cases_now = search.cases_of(&state.chosen, Evidence::Energy);
+        let cases_now = search.cases_of(&state.chosen, Observable::Decay);
         let (residuals, dispersion_now) = residual_map(&bench, &base, &cases_now, &state);
         let held_out = predicted.held_out;
         let decays = if held_out.is_some() {
@@ -217,10 +223,10 @@ impl Diagnoser {
             bench: &bench,
             verdict,
             held_out: held_out.is_some(),
-            settled: base.energy.settled && state.energy.settled && state.arrivals.settled,
+            converged: base.energy.converged && state.energy.converged && state.arrivals.converged,
             misfit_left: lack_after.p_value < self.config.significance,
             hopeless,
-            scattered: baseline_dispersion.iter().any(|d| *d > SCATTERED),
+            scattered: baseline_dispersion.iter().any(|d| *d > WARN_DISPERSION),
             unseated: &unseated,
             unconfirmed: &unconfirmed,
             at_bounds: &at_bounds,
@@ -261,7 +267,7 @@ impl Diagnoser {
         &self,
         search: &Search<'_>,
         state: &State,
-        named: &Named,
+        named: &Selection,
         observer: &dyn Observer,
     ) -> Result<Vec<CandidateScore>, Error> {
         let beside = match &named.last {
@@ -290,7 +296,7 @@ impl Diagnoser {
     }
 }
 
-/// Evidence that a chosen candidate adds to the others.
+/// Observable that a chosen candidate adds to the others.
 fn without(search: &Search<'_>, state: &State, candidate: usize) -> Result<f64, Error> {
     let rest: Vec<usize> = state.chosen.iter().copied().filter(|&c| c != candidate).collect();
     Ok(state.log_evidence() - search.state(&rest, Some(state))?.log_evidence())
@@ -308,11 +314,11 @@ fn least_confirmed(search: &Search<'_>, state: &State, gains: &[HeldOutGain]) ->
         let local = |(nuisance, _): &(Nuisance, f64)| {
             matches!(nuisance, Nuisance::ReceiverPosition(_) | Nuisance::ResponseGain(_))
         };
-        case.exchanged().is_none() && case.inverted().is_none() && !case.widens().iter().any(local)
+        case.exchanged().is_none() && case.inverted().is_none() && !case.relaxes().iter().any(local)
     };
     // A few positions leave a wide interval: a gain in the mean counts where the decays come nearer, too.
     let helps = |gain: &HeldOutGain| {
-        let nearer = gain.db_rmse_after < NEARER * gain.db_rmse_before;
+        let nearer = gain.db_rmse_after < MAX_RMSE_RATIO * gain.db_rmse_before;
         // Likelier bins under decays that lie farther off: the cause stands for something else.
         let farther = gain.db_rmse_after > gain.db_rmse_before;
         (gain.low > 0.0 && !farther) || (gain.nats_per_bin > 0.0 && nearer)
@@ -326,7 +332,7 @@ fn words_that_decide(alternatives: &[String]) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     for (i, a) in alternatives.iter().enumerate() {
         for b in &alternatives[i + 1..] {
-            let word = would_decide(a, b).to_string();
+            let word = discriminating_measurement(a, b).to_string();
             if !words.contains(&word) {
                 words.push(word);
             }

@@ -1,6 +1,12 @@
 //! A named physical cause of a misfit, and the cases in which it can come.
 
-use crate::{ArrivalView, BandView, Dimensions, FoundParameter, Gate, LeadIns, StrayPeaks, Survey};
+use crate::extend::extended_model::Dimensions;
+use crate::likelihood::multilateration::UnassignedPeaks;
+use crate::likelihood::reflection_gates::ReflectionGate;
+use crate::observe::pre_arrival::PreArrival;
+use crate::report::diagnosis::FoundParameter;
+use crate::simulate::views::{ArrivalView, BandView};
+use crate::survey::Survey;
 
 /// A parameter of an effect.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,21 +69,21 @@ pub enum Nuisance {
 
 /// What part of the data an effect bears on. They are fitted separately: no effect needs several at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Evidence {
+pub enum Observable {
     /// Energy over time in octaves.
-    Energy,
+    Decay,
     /// Arrival times of the direct sound and of early reflections.
     Arrivals,
     /// Which response is which, or its sign: both of the above and polarity.
-    Assignment,
-    /// What comes before the direct sound: [`Case::before_direct`] weighs it.
-    LeadIn,
+    Channels,
+    /// What comes before the direct sound: [`Case::pre_arrival`] weighs it.
+    PreArrival,
 }
 
-impl Evidence {
+impl Observable {
     /// Whether a case with this evidence takes part in the fit of decays or of arrivals.
     pub(crate) fn concerns(self, fit: Self) -> bool {
-        self == fit || self == Self::Assignment
+        self == fit || self == Self::Channels
     }
 }
 
@@ -98,7 +104,7 @@ pub enum Stage {
 
 /// What single reflections, or the time before the direct sound, say for a cause.
 #[derive(Clone, Debug, PartialEq)]
-pub struct OwnEvidence {
+pub struct AuxiliaryEvidence {
     /// Logarithm of how much more probable they are with the cause than without, its parameters summed over.
     pub nats: f64,
     /// Its parameters as they and the fit together give them.
@@ -107,7 +113,7 @@ pub struct OwnEvidence {
 
 /// A reflection that the mesh does not have.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MoreArrival {
+pub struct AddedReflection {
     /// Length of its path in metres.
     pub length_m: f64,
     /// Unit vector in which it leaves the source.
@@ -147,8 +153,8 @@ pub trait Case: Send + Sync {
     }
 
     /// The data that it bears on.
-    fn evidence(&self) -> Evidence {
-        Evidence::Energy
+    fn observable(&self) -> Observable {
+        Observable::Decay
     }
 
     /// Its place in the chain.
@@ -178,7 +184,12 @@ pub trait Case: Send + Sync {
     }
 
     /// A reflection that it adds to a response (index).
-    fn more_arrival(&self, _values: &[f64], _survey: &Survey, _response: usize) -> Option<MoreArrival> {
+    fn added_reflection(
+        &self,
+        _values: &[f64],
+        _survey: &Survey,
+        _response: usize,
+    ) -> Option<AddedReflection> {
         None
     }
 
@@ -188,7 +199,7 @@ pub trait Case: Send + Sync {
     }
 
     /// Values to start from, given the peaks that nothing predicted explains.
-    fn starts_among(&self, _strays: &StrayPeaks<'_>) -> Vec<Vec<f64>> {
+    fn starts_among(&self, _strays: &UnassignedPeaks<'_>) -> Vec<Vec<f64>> {
         Vec::new()
     }
 
@@ -197,18 +208,18 @@ pub trait Case: Send + Sync {
         None
     }
 
-    /// Whether single reflections weigh it: then [`Case::among_gates`] says how much.
-    fn weighs_gates(&self) -> bool {
+    /// Whether single reflections weigh it: then [`Case::among_reflections`] says how much.
+    fn weighs_reflections(&self) -> bool {
         false
     }
 
     /// What single reflections say for it, given its parameters (value and standard deviation) from the fit of the decays.
-    fn among_gates(&self, _own: &[(f64, f64)], _gates: &[Gate]) -> Option<OwnEvidence> {
+    fn among_reflections(&self, _own: &[(f64, f64)], _gates: &[ReflectionGate]) -> Option<AuxiliaryEvidence> {
         None
     }
 
     /// What the responses that count (a flag for each) say for it before their direct sounds, its parameters included.
-    fn before_direct(&self, _lead_ins: &LeadIns, _used: &[bool]) -> Option<OwnEvidence> {
+    fn pre_arrival(&self, _responses: &PreArrival, _used: &[bool]) -> Option<AuxiliaryEvidence> {
         None
     }
 
@@ -222,8 +233,8 @@ pub trait Case: Send + Sync {
         None
     }
 
-    /// Priors that it widens, with their new standard deviation.
-    fn widens(&self) -> Vec<(Nuisance, f64)> {
+    /// Priors that it relaxes, with their new standard deviation.
+    fn relaxes(&self) -> Vec<(Nuisance, f64)> {
         Vec::new()
     }
 

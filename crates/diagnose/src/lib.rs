@@ -60,64 +60,35 @@
 //! - I. Dokmanić et al.: Acoustic echoes reveal room shape. PNAS 110, 2013 (images from distances).
 //! - J. B. Allen, D. A. Berkley: Image method for efficiently simulating small-room acoustics. JASA 65, 1979.
 
-mod arrival_model;
-mod bins;
 mod config;
 mod diagnoser;
-mod diagnosis;
-mod discrepancy;
-mod edges;
 mod effect;
 mod effects;
-mod energy_model;
 mod error;
-mod extended_model;
-mod extension;
-mod found_parameters;
-mod gates;
-mod gauss_newton;
-mod held_out;
-mod hit_changes;
-mod hit_groups;
-mod isolability;
-mod kernel;
-mod lack_of_fit;
-mod lead_in;
-mod measured;
-mod measurement;
-mod multilateration;
-mod naming;
-mod notes;
-mod own_evidence;
-mod planes;
-mod polarity;
-mod prediction;
-mod recording_chain;
-mod rendering;
-mod residual_map;
-mod search;
-mod sheets;
+mod extend;
+mod infer;
+mod likelihood;
+mod observe;
+mod report;
+mod simulate;
+mod statistics;
 mod survey;
-mod traced_pair;
-mod traced_room;
-mod views;
-mod workbench;
 
 pub use config::DiagnoseConfig;
 pub use diagnoser::Diagnoser;
-pub use diagnosis::{
+pub use effect::{AddedReflection, AuxiliaryEvidence, Case, Effect, Nuisance, Observable, Parameter, Stage};
+pub use effects::*;
+pub use error::Error;
+pub use extend::extended_model::{CoupledDecay, Dimensions, ExtendedModel, ThinPanel};
+pub use extend::extended_room::ExtendedRoom;
+pub use likelihood::multilateration::{UnassignedPeak, UnassignedPeaks};
+pub use likelihood::reflection_gates::ReflectionGate;
+pub use observe::pre_arrival::PreArrival;
+pub use report::diagnosis::{
     CandidateScore, Cause, DecayCurves, Diagnosis, FittedMaterial, FoundParameter, HeldOut, HeldOutGain,
     Isolability, LackOfFit, ResidualCell, Verdict,
 };
-pub use effect::{Case, Effect, Evidence, MoreArrival, Nuisance, OwnEvidence, Parameter, Stage};
-pub use effects::*;
-pub use error::Error;
-pub use extended_model::{CoupledDecay, Dimensions, ExtendedModel, Sheet};
-pub use gates::Gate;
-pub use lead_in::LeadIns;
-pub use measurement::{Measurement, would_decide};
-pub use multilateration::{StrayPeak, StrayPeaks};
-pub use planes::Plane;
-pub use rendering::ExtendedRoom;
+pub use report::next_measurement::{NextMeasurement, discriminating_measurement};
+pub use simulate::views::{ArrivalView, BandView};
+pub use survey::planes::Plane;
 pub use survey::{Place, Survey, SurveyedResponse};
-pub use views::{ArrivalView, BandView};

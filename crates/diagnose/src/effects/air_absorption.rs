@@ -1,6 +1,8 @@
 //! `air_absorption`: the air was drier or moister than the room file says.
 
-use crate::{BandView, Case, Effect, Parameter, Survey};
+use crate::effect::{Case, Effect, Parameter};
+use crate::simulate::views::BandView;
+use crate::survey::Survey;
 use sabine_acoustics::Air;
 
 /// Relative humidity other than stated; responses with air of their own shift by as much. Attenuation by ISO 9613-1.

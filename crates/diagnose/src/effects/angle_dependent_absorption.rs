@@ -1,6 +1,8 @@
 //! `angle_dependent_absorption`: walls absorb by the angle at which sound meets them.
 
-use crate::{BandView, Case, Effect, Parameter, Survey};
+use crate::effect::{Case, Effect, Parameter};
+use crate::simulate::views::BandView;
+use crate::survey::Survey;
 
 /// All walls react locally by a share: the logarithm of what a wall reflects lies so far between that of its random-incidence absorption,
 /// the same at all angles, and that of the real impedance which has this absorption in the mean over all angles.

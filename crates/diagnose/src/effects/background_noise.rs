@@ -1,7 +1,9 @@
 //! `background_noise`: sound that was there without the source.
 
 use super::add_energy;
-use crate::{BandView, Case, Effect, Parameter, Stage, Survey};
+use crate::effect::{Case, Effect, Parameter, Stage};
+use crate::simulate::views::BandView;
+use crate::survey::Survey;
 
 /// The same energy in every time bin and response, one level for each octave, relative to a typical early bin of that octave.
 ///

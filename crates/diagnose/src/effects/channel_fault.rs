@@ -1,6 +1,7 @@
 //! `channel_fault`: one channel is wrong.
 
-use crate::{Case, Effect, Evidence, Nuisance, Parameter, Survey};
+use crate::effect::{Case, Effect, Nuisance, Observable, Parameter};
+use crate::survey::Survey;
 use sabine_acoustics::Levels;
 
 /// One response has the wrong sign or another gain, or two responses were exchanged.
@@ -51,8 +52,8 @@ impl Case for Polarity {
         Some(format!("polarity of {}", self.name))
     }
 
-    fn evidence(&self) -> Evidence {
-        Evidence::Assignment
+    fn observable(&self) -> Observable {
+        Observable::Channels
     }
 
     fn parameters(&self, _: &Survey) -> Vec<Parameter> {
@@ -78,7 +79,7 @@ impl Case for Gain {
         Vec::new()
     }
 
-    fn widens(&self) -> Vec<(Nuisance, f64)> {
+    fn relaxes(&self) -> Vec<(Nuisance, f64)> {
         vec![(Nuisance::ResponseGain(self.response), OPEN_SD_DB)]
     }
 }
@@ -93,8 +94,8 @@ impl Case for Exchange {
         Some(format!("{} exchanged", self.name))
     }
 
-    fn evidence(&self) -> Evidence {
-        Evidence::Assignment
+    fn observable(&self) -> Observable {
+        Observable::Channels
     }
 
     fn parameters(&self, _: &Survey) -> Vec<Parameter> {

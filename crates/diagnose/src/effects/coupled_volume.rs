@@ -1,8 +1,10 @@
 //! `coupled_volume`: a neighbouring room gives back what it has stored.
 
 use super::add_energy;
-use crate::extended_model::BUILD_UP_S;
-use crate::{BandView, Case, Effect, Parameter, Stage, Survey};
+use crate::effect::{Case, Effect, Parameter, Stage};
+use crate::extend::extended_model::BUILD_UP_S;
+use crate::simulate::views::BandView;
+use crate::survey::Survey;
 
 /// A second decay with one decay time and level, each with a slope over the octaves; its level changes from place to place
 /// as if it came from an opening: a plane over the receiver's position.

@@ -1,7 +1,8 @@
 //! `extra_reflector`: a flat surface that the mesh does not have.
 
-use crate::multilateration::{StrayPeaks, mirrored};
-use crate::{Case, Effect, Evidence, MoreArrival, Parameter, Survey};
+use crate::effect::{AddedReflection, Case, Effect, Observable, Parameter};
+use crate::likelihood::multilateration::{UnassignedPeaks, mirrored};
+use crate::survey::Survey;
 
 /// One plane more: a table, a screen, a cabinet. It is found by where it mirrors the first source (the image of any other source follows).
 /// It reflects for those pairs whose angles are equal at a place within the room; that it does so for all of them is not required,
@@ -45,8 +46,8 @@ fn first_m(survey: &Survey) -> [f64; 3] {
 }
 
 impl Case for ExtraReflector {
-    fn evidence(&self) -> Evidence {
-        Evidence::Arrivals
+    fn observable(&self) -> Observable {
+        Observable::Arrivals
     }
 
     fn parameters(&self, survey: &Survey) -> Vec<Parameter> {
@@ -63,18 +64,18 @@ impl Case for ExtraReflector {
         true
     }
 
-    fn starts_among(&self, strays: &StrayPeaks<'_>) -> Vec<Vec<f64>> {
+    fn starts_among(&self, strays: &UnassignedPeaks<'_>) -> Vec<Vec<f64>> {
         strays.images().into_iter().map(|[x, y, z]| vec![x, y, z, REFLECTANCE_DB.0]).collect()
     }
 
-    fn more_arrival(&self, values: &[f64], survey: &Survey, response: usize) -> Option<MoreArrival> {
+    fn added_reflection(&self, values: &[f64], survey: &Survey, response: usize) -> Option<AddedReflection> {
         let pair = &survey.responses()[response];
         let source = survey.sources()[pair.source].position_m;
         let receiver = survey.receivers()[pair.receiver].position_m;
         let image = [values[0], values[1], values[2]];
         let way = mirrored(first_m(survey), image, source, receiver, survey.box_m())?;
         let direct_m = (0..3).map(|k| (source[k] - receiver[k]).powi(2)).sum::<f64>().sqrt();
-        Some(MoreArrival {
+        Some(AddedReflection {
             length_m: way.length_m,
             departure: way.departure,
             arrival: way.arrival,

@@ -26,7 +26,7 @@ pub use angle_dependent_absorption::AngleDependentAbsorption;
 pub use background_noise::BackgroundNoise;
 pub use channel_fault::ChannelFault;
 pub use coupled_volume::CoupledVolume;
-pub use edge_diffraction::EdgeDiffraction;
+pub use edge_diffraction::MissingDiffraction;
 pub use extra_reflector::ExtraReflector;
 pub use nonlinear_distortion::NonlinearDistortion;
 pub use open_patch::OpenPatch;
@@ -38,11 +38,11 @@ pub use scattering::Scattering;
 pub use sound_speed::SoundSpeed;
 pub use source_directivity::SourceDirectivity;
 pub use surface_absorption::SurfaceAbsorption;
-pub use time_zero::TimeZero;
+pub use time_zero::TimeZeroOffset;
 pub use transducer_response::TransducerResponse;
 pub use truncation::Truncation;
 
-use crate::Effect;
+use crate::effect::Effect;
 
 /// All effects that come with this crate.
 pub fn catalogue() -> Vec<Box<dyn Effect>> {
@@ -59,13 +59,13 @@ pub fn catalogue() -> Vec<Box<dyn Effect>> {
         Box::new(SamplingClock),
         Box::new(RoomDimensions),
         Box::new(PositionError),
-        Box::new(TimeZero),
+        Box::new(TimeZeroOffset),
         Box::new(ChannelFault),
         Box::new(ExtraReflector),
         Box::new(OpenPatch),
         Box::new(AngleDependentAbsorption),
         Box::new(NonlinearDistortion),
-        Box::new(EdgeDiffraction),
+        Box::new(MissingDiffraction),
         Box::new(RoomModes),
     ]
 }

@@ -1,6 +1,11 @@
 //! `open_patch`: a wall has a hole.
 
-use crate::{BandView, Case, Effect, FoundParameter, Gate, OwnEvidence, Parameter, Plane, Survey};
+use crate::effect::{AuxiliaryEvidence, Case, Effect, Parameter};
+use crate::likelihood::reflection_gates::ReflectionGate;
+use crate::report::diagnosis::FoundParameter;
+use crate::simulate::views::BandView;
+use crate::survey::Survey;
+use crate::survey::planes::Plane;
 
 /// A rectangle of one surface swallows all sound: an open door or window, a duct, a curtain before a recess. One case for each flat
 /// surface of the mesh.
@@ -20,7 +25,7 @@ pub struct OpenPatch;
 /// Usual area in square metres: one standard deviation.
 const AREA_SD_M2: f64 = 2.0;
 /// Share of a surface that may be open at most.
-const MOST_SHARE: f64 = 0.7;
+const MAX_SHARE: f64 = 0.7;
 /// Half the blur of an edge in metres.
 const EDGE_M: f64 = 0.15;
 /// Steps of the centre along each side of the surface.
@@ -60,7 +65,7 @@ impl Case for OneWall {
     }
 
     fn parameters(&self, _: &Survey) -> Vec<Parameter> {
-        let most = MOST_SHARE * self.plane.area_m2;
+        let most = MAX_SHARE * self.plane.area_m2;
         vec![Parameter::new("area", "m2", 0.0, AREA_SD_M2, (0.0, most)).typically(1.5f64.min(most))]
     }
 
@@ -74,7 +79,7 @@ impl Case for OneWall {
             return;
         }
         for (bin, l) in ln_energy.iter_mut().enumerate() {
-            *l += view.change_by_hits(bin, self.plane.material, (1.0 - open).ln());
+            *l += view.reflection_reweighting(bin, self.plane.material, (1.0 - open).ln());
         }
     }
 
@@ -82,11 +87,11 @@ impl Case for OneWall {
         Some(self.index)
     }
 
-    fn weighs_gates(&self) -> bool {
+    fn weighs_reflections(&self) -> bool {
         true
     }
 
-    fn among_gates(&self, own: &[(f64, f64)], gates: &[Gate]) -> Option<OwnEvidence> {
+    fn among_reflections(&self, own: &[(f64, f64)], gates: &[ReflectionGate]) -> Option<AuxiliaryEvidence> {
         let here: Vec<([f64; 2], f64, f64)> = gates
             .iter()
             .filter(|g| g.plane == self.index)
@@ -97,7 +102,7 @@ impl Case for OneWall {
         let mut all: Vec<Hypothesis> = Vec::new();
         let mut prior_sum = 0.0;
         for (i, &tried) in AREAS_M2.iter().enumerate() {
-            if tried > MOST_SHARE * self.plane.area_m2 {
+            if tried > MAX_SHARE * self.plane.area_m2 {
                 break;
             }
             let low = if i == 0 { 0.0 } else { AREAS_M2[i - 1] };
@@ -152,7 +157,7 @@ impl Case for OneWall {
             };
             parameters.push(interval(&format!("centre_{axis}"), "m", all.iter().map(along).zip(&weights)));
         }
-        Some(OwnEvidence { nats, parameters })
+        Some(AuxiliaryEvidence { nats, parameters })
     }
 }
 
@@ -222,7 +227,7 @@ fn mixed(present: f64, missing: f64, inside: f64) -> f64 {
     } else if inside >= 1.0 {
         missing
     } else {
-        crate::gates::add(present + (1.0 - inside).ln(), missing + inside.ln())
+        crate::statistics::add(present + (1.0 - inside).ln(), missing + inside.ln())
     }
 }
 
@@ -230,7 +235,7 @@ fn mixed(present: f64, missing: f64, inside: f64) -> f64 {
 mod tests {
     #![allow(clippy::unwrap_used)] // a panic is how a test fails
     use super::*;
-    use crate::planes::planes;
+    use crate::survey::planes::planes;
     use sabine_acoustics::{Bands, Material, Scene};
 
     fn wall() -> OneWall {
@@ -239,10 +244,10 @@ mod tests {
         OneWall { index: 0, plane: planes(&scene).0[0].clone() }
     }
 
-    fn gate(wall: &OneWall, u: f64, v: f64, missing: bool) -> Gate {
+    fn gate(wall: &OneWall, u: f64, v: f64, missing: bool) -> ReflectionGate {
         let [low_u, low_v] = [wall.plane.extent_m[0][0], wall.plane.extent_m[1][0]];
         let (present_nats, missing_nats) = if missing { (-6.0, 0.0) } else { (0.0, -6.0) };
-        Gate {
+        ReflectionGate {
             response: 0,
             place_m: wall.plane.place_m([low_u + u, low_v + v]),
             plane: 0,
@@ -257,12 +262,12 @@ mod tests {
         let own = [(2.0, 1.5)];
         let near = [(1.0, 1.0), (1.4, 1.5), (1.6, 0.9)];
         let far = [(2.8, 3.0), (1.2, 3.6), (2.8, 0.4), (2.9, 2.1)];
-        let hole: Vec<Gate> = near
+        let hole: Vec<ReflectionGate> = near
             .iter()
             .map(|g| gate(&wall, g.0, g.1, true))
             .chain(far.iter().map(|g| gate(&wall, g.0, g.1, false)))
             .collect();
-        let found = wall.among_gates(&own, &hole).unwrap();
+        let found = wall.among_reflections(&own, &hole).unwrap();
         assert!(found.nats > 10.0, "{}", found.nats);
         let centre: Vec<f64> = found.parameters[1..].iter().map(|p| p.value).collect();
         let [u, v] = wall.plane.within([centre[0], centre[1], centre[2]]);
@@ -272,13 +277,14 @@ mod tests {
         );
 
         // As many are missing, but others between them are there.
-        let odd: Vec<Gate> = [(0.4, 0.4, true), (2.8, 3.6, true), (0.5, 3.5, true)]
+        let odd: Vec<ReflectionGate> = [(0.4, 0.4, true), (2.8, 3.6, true), (0.5, 3.5, true)]
             .into_iter()
             .chain([(0.5, 0.9, false), (1.5, 2.0, false), (2.6, 3.2, false), (0.8, 3.2, false)])
             .map(|(u, v, missing)| gate(&wall, u, v, missing))
             .collect();
-        assert!(wall.among_gates(&own, &odd).unwrap().nats < 4.0);
-        let none: Vec<Gate> = near.iter().chain(&far).map(|g| gate(&wall, g.0, g.1, false)).collect();
-        assert!(wall.among_gates(&own, &none).unwrap().nats < 0.0);
+        assert!(wall.among_reflections(&own, &odd).unwrap().nats < 4.0);
+        let none: Vec<ReflectionGate> =
+            near.iter().chain(&far).map(|g| gate(&wall, g.0, g.1, false)).collect();
+        assert!(wall.among_reflections(&own, &none).unwrap().nats < 0.0);
     }
 }

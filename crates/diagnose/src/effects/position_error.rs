@@ -1,6 +1,7 @@
 //! `position_error`: a source or receiver stood elsewhere.
 
-use crate::{Case, Effect, Evidence, Nuisance, Parameter, Survey};
+use crate::effect::{Case, Effect, Nuisance, Observable, Parameter};
+use crate::survey::Survey;
 
 /// One place is not where the room file says: the prior of its position is opened along all axes.
 ///
@@ -42,15 +43,15 @@ impl Case for OnePlace {
         Some(self.id.clone())
     }
 
-    fn evidence(&self) -> Evidence {
-        Evidence::Arrivals
+    fn observable(&self) -> Observable {
+        Observable::Arrivals
     }
 
     fn parameters(&self, _: &Survey) -> Vec<Parameter> {
         Vec::new()
     }
 
-    fn widens(&self) -> Vec<(Nuisance, f64)> {
+    fn relaxes(&self) -> Vec<(Nuisance, f64)> {
         vec![(self.place, OPEN_SD_M)]
     }
 }

@@ -1,6 +1,9 @@
 //! `room_dimensions`: the room is longer, wider or higher than its model.
 
-use crate::{ArrivalView, Case, Dimensions, Effect, Evidence, Parameter, Survey};
+use crate::effect::{Case, Effect, Observable, Parameter};
+use crate::extend::extended_model::Dimensions;
+use crate::simulate::views::ArrivalView;
+use crate::survey::Survey;
 
 /// Scale of the room along each axis, and a shift of it against sources and receivers, which stay where they are.
 ///
@@ -30,8 +33,8 @@ impl Effect for RoomDimensions {
 }
 
 impl Case for RoomDimensions {
-    fn evidence(&self) -> Evidence {
-        Evidence::Arrivals
+    fn observable(&self) -> Observable {
+        Observable::Arrivals
     }
 
     fn parameters(&self, _: &Survey) -> Vec<Parameter> {

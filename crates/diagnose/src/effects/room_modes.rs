@@ -1,6 +1,8 @@
 //! `room_modes`: standing waves in the lowest octaves.
 
-use crate::{BandView, Case, Effect, Parameter, Survey};
+use crate::effect::{Case, Effect, Parameter};
+use crate::simulate::views::BandView;
+use crate::survey::Survey;
 
 /// The frequencies of modes are known to this share: so far off is the solver (0.2 % in the middle of an octave), and so is a room
 /// that is measured to a centimetre. The beats of two modes are lost after as many periods.

@@ -1,6 +1,8 @@
 //! `sampling_clock`: player and recorder do not count seconds alike.
 
-use crate::{ArrivalView, Case, Effect, Evidence, Parameter, Survey};
+use crate::effect::{Case, Effect, Observable, Parameter};
+use crate::simulate::views::ArrivalView;
+use crate::survey::Survey;
 
 /// Deviation of the recorder's clock in parts per million, up to a thousand: all arrival times scale.
 ///
@@ -24,8 +26,8 @@ impl Effect for SamplingClock {
 }
 
 impl Case for SamplingClock {
-    fn evidence(&self) -> Evidence {
-        Evidence::Arrivals
+    fn observable(&self) -> Observable {
+        Observable::Arrivals
     }
 
     fn parameters(&self, _: &Survey) -> Vec<Parameter> {

@@ -1,6 +1,8 @@
 //! `scattering`: the surfaces are rougher (or smoother) than the room file says.
 
-use crate::{BandView, Case, Effect, Parameter, Survey};
+use crate::effect::{Case, Effect, Parameter};
+use crate::simulate::views::BandView;
+use crate::survey::Survey;
 
 /// All surfaces scatter a share more of what they now reflect specularly (or, below zero, less of what they scatter), with one
 /// slope over frequency.

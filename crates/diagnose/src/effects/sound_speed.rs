@@ -1,6 +1,8 @@
 //! `sound_speed`: the room was warmer or colder than the room file says.
 
-use crate::{ArrivalView, Case, Effect, Evidence, Parameter, Survey};
+use crate::effect::{Case, Effect, Observable, Parameter};
+use crate::simulate::views::ArrivalView;
+use crate::survey::Survey;
 use sabine_acoustics::Air;
 
 /// Another temperature: all arrival times scale; once it is named, decays are taken at that temperature too.
@@ -27,8 +29,8 @@ impl Effect for SoundSpeed {
 }
 
 impl Case for SoundSpeed {
-    fn evidence(&self) -> Evidence {
-        Evidence::Arrivals
+    fn observable(&self) -> Observable {
+        Observable::Arrivals
     }
 
     fn parameters(&self, survey: &Survey) -> Vec<Parameter> {

@@ -1,6 +1,8 @@
 //! `source_directivity`: the source does not radiate alike in all directions.
 
-use crate::{BandView, Case, Effect, Parameter, Survey};
+use crate::effect::{Case, Effect, Parameter};
+use crate::simulate::views::BandView;
+use crate::survey::Survey;
 
 /// A pattern of first order, 1 - d + d cos(angle to the axis), d rising by so much an octave; radiated power as without it.
 /// The axis is the room file's; where it states none, azimuth (from x towards y) and elevation are fitted, all directions being as
@@ -14,7 +16,7 @@ use crate::{BandView, Case, Effect, Parameter, Survey};
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SourceDirectivity;
 
-const MOST: f64 = 0.9;
+const MAX_SHARE: f64 = 0.9;
 /// Standard deviations of the angles of a direction that may be any, in degrees: 180 / sqrt 3, and sqrt(pi^2 / 4 - 2) radians.
 const AZIMUTH_SD_DEG: f64 = 103.9;
 const ELEVATION_SD_DEG: f64 = 39.2;
@@ -54,7 +56,7 @@ impl SourceDirectivity {
 impl Case for SourceDirectivity {
     fn parameters(&self, survey: &Survey) -> Vec<Parameter> {
         let mut found = vec![
-            Parameter::new("directed_share_1_khz", "", 0.0, 0.3, (0.0, MOST)).typically(0.3),
+            Parameter::new("directed_share_1_khz", "", 0.0, 0.3, (0.0, MAX_SHARE)).typically(0.3),
             Parameter::new("directed_share_per_octave", "", 0.0, 0.1, (-0.3, 0.3)).typically(0.05),
         ];
         if !Self::axes_are_stated(survey) {
@@ -83,7 +85,7 @@ impl Case for SourceDirectivity {
 
     fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
         let survey = view.survey();
-        let d = (values[0] + values[1] * survey.octaves_from_1khz(view.band())).clamp(0.0, MOST);
+        let d = (values[0] + values[1] * survey.octaves_from_1khz(view.band())).clamp(0.0, MAX_SHARE);
         if d == 0.0 {
             return;
         }

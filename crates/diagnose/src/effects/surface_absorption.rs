@@ -1,6 +1,7 @@
 //! `surface_absorption`: one material is not what its table says.
 
-use crate::{Case, Effect, Nuisance, Parameter, Survey};
+use crate::effect::{Case, Effect, Nuisance, Parameter};
+use crate::survey::Survey;
 
 /// The absorption of one material lies far outside its stated uncertainty: its prior is opened in every octave.
 ///
@@ -42,7 +43,7 @@ impl Case for OneMaterial {
         Vec::new()
     }
 
-    fn widens(&self) -> Vec<(Nuisance, f64)> {
+    fn relaxes(&self) -> Vec<(Nuisance, f64)> {
         vec![(Nuisance::Absorption(self.material), OPEN_SD)]
     }
 }

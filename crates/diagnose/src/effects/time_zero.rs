@@ -1,16 +1,18 @@
 //! `time_zero`: the first sample is not the instant of emission.
 
-use crate::{ArrivalView, Case, Effect, Evidence, Parameter, Survey};
-use sabine_acoustics::TimeZero as Declared;
+use crate::effect::{Case, Effect, Observable, Parameter};
+use crate::simulate::views::ArrivalView;
+use crate::survey::Survey;
+use sabine_acoustics::TimeZero;
 
 /// One latency in all responses, where the room file says that there is none.
 ///
 /// Mark: all arrivals are late or early by the same time. Mimicked by: the group delay of loudspeaker and converters, which
 /// is the same thing to a recording.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct TimeZero;
+pub struct TimeZeroOffset;
 
-impl Effect for TimeZero {
+impl Effect for TimeZeroOffset {
     fn id(&self) -> &'static str {
         "time_zero"
     }
@@ -21,13 +23,13 @@ impl Effect for TimeZero {
 
     fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {
         // An unknown latency is fitted anyway where the room file admits to one.
-        if survey.measurement().time_zero == Declared::Emission { vec![Box::new(*self)] } else { Vec::new() }
+        if survey.measurement().time_zero == TimeZero::Emission { vec![Box::new(*self)] } else { Vec::new() }
     }
 }
 
-impl Case for TimeZero {
-    fn evidence(&self) -> Evidence {
-        Evidence::Arrivals
+impl Case for TimeZeroOffset {
+    fn observable(&self) -> Observable {
+        Observable::Arrivals
     }
 
     fn parameters(&self, _: &Survey) -> Vec<Parameter> {

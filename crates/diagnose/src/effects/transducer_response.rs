@@ -1,6 +1,8 @@
 //! `transducer_response`: loudspeaker and microphone do not treat all octaves alike.
 
-use crate::{BandView, Case, Effect, Parameter, Stage, Survey};
+use crate::effect::{Case, Effect, Parameter, Stage};
+use crate::simulate::views::BandView;
+use crate::survey::Survey;
 use sabine_acoustics::Levels;
 
 /// One gain for each octave, the same in every time bin and at every position. Where levels mean something absolute there is one

@@ -1,6 +1,8 @@
 //! `truncation`: the responses were cut off before they had died away.
 
-use crate::{BandView, Case, Effect, Parameter, Stage, Survey};
+use crate::effect::{Case, Effect, Parameter, Stage};
+use crate::simulate::views::BandView;
+use crate::survey::Survey;
 
 /// The end of all responses in the time of the file, after a raised-cosine fade; nothing follows.
 ///

@@ -4,34 +4,34 @@ use crate::AnyError;
 use crate::trial::{Task, named};
 use rand::seq::IndexedRandom;
 use rand::{SeedableRng, rngs::SmallRng};
-use sabine::diagnose::{Diagnosis, Measurement, Verdict, would_decide};
+use sabine::diagnose::{Diagnosis, NextMeasurement, Verdict, discriminating_measurement};
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
 use std::path::Path;
 
 /// All that can be done in the laboratory.
-const ALL: [Measurement; 16] = [
-    Measurement::ClockOrThermometer,
-    Measurement::OtherHumidity,
-    Measurement::LouderAndLonger,
-    Measurement::DoorsClosed,
-    Measurement::LongerWithSilence,
-    Measurement::TurnedSource,
-    Measurement::Loopback,
-    Measurement::Distances,
-    Measurement::ExchangedChannel,
-    Measurement::Quieter,
-    Measurement::AlongWalls,
-    Measurement::PatchClosed,
-    Measurement::ObjectsRemoved,
-    Measurement::OtherSourcePlace,
-    Measurement::MorePositions,
-    Measurement::MorePositionsAndSource,
+const ALL: [NextMeasurement; 16] = [
+    NextMeasurement::ClockOrThermometer,
+    NextMeasurement::OtherHumidity,
+    NextMeasurement::LouderAndLonger,
+    NextMeasurement::DoorsClosed,
+    NextMeasurement::LongerWithSilence,
+    NextMeasurement::TurnedSource,
+    NextMeasurement::Loopback,
+    NextMeasurement::Distances,
+    NextMeasurement::ExchangedChannel,
+    NextMeasurement::Quieter,
+    NextMeasurement::AlongWalls,
+    NextMeasurement::PatchClosed,
+    NextMeasurement::ObjectsRemoved,
+    NextMeasurement::OtherSourcePlace,
+    NextMeasurement::MorePositions,
+    NextMeasurement::MorePositionsAndSource,
 ];
 
 /// Two measurements, and whether the right name comes out alone after each.
 pub struct FollowUp {
-    pub asked: (Measurement, bool),
-    pub other: (Measurement, bool),
+    pub asked: (NextMeasurement, bool),
+    pub other: (NextMeasurement, bool),
 }
 
 /// What a measurement is in the laboratory.
@@ -42,27 +42,27 @@ enum Extra {
     Without(Vec<&'static str>),
 }
 
-fn extra(measurement: Measurement, lab: &LabConfig, set: &[String]) -> Extra {
+fn extra(measurement: NextMeasurement, lab: &LabConfig, set: &[String]) -> Extra {
     // Twice as many positions, and another source, as far as the laboratory goes.
     let receivers = (2 * lab.receivers).min(40);
     let (more, sources) = (LabConfig { receivers, ..lab.clone() }, (2 * lab.sources).min(8));
     let is_among = |id: &str| set.iter().any(|s| s == id);
     match measurement {
-        Measurement::ClockOrThermometer => Extra::Without(vec!["sampling_clock"]),
-        Measurement::OtherHumidity => Extra::More(LabConfig { sessions: 2, ..more }),
-        Measurement::LouderAndLonger => Extra::Without(vec!["background_noise"]),
-        Measurement::DoorsClosed => Extra::Without(vec!["coupled_volume"]),
-        Measurement::LongerWithSilence if is_among("truncation") => Extra::Without(vec!["truncation"]),
-        Measurement::LongerWithSilence => Extra::Without(vec!["background_noise"]),
-        Measurement::TurnedSource => Extra::More(LabConfig { turned: true, ..lab.clone() }),
-        Measurement::Loopback => Extra::Without(vec!["time_zero"]),
-        Measurement::Distances => Extra::Without(vec!["position_error", "room_dimensions"]),
-        Measurement::ExchangedChannel => Extra::Without(vec!["channel_fault"]),
-        Measurement::Quieter => Extra::Without(vec!["nonlinear_distortion"]),
-        Measurement::PatchClosed => Extra::Without(vec!["open_patch"]),
-        Measurement::ObjectsRemoved => Extra::Without(vec!["extra_reflector"]),
-        Measurement::OtherSourcePlace => Extra::More(LabConfig { sources, ..lab.clone() }),
-        Measurement::MorePositions => Extra::More(more),
+        NextMeasurement::ClockOrThermometer => Extra::Without(vec!["sampling_clock"]),
+        NextMeasurement::OtherHumidity => Extra::More(LabConfig { sessions: 2, ..more }),
+        NextMeasurement::LouderAndLonger => Extra::Without(vec!["background_noise"]),
+        NextMeasurement::DoorsClosed => Extra::Without(vec!["coupled_volume"]),
+        NextMeasurement::LongerWithSilence if is_among("truncation") => Extra::Without(vec!["truncation"]),
+        NextMeasurement::LongerWithSilence => Extra::Without(vec!["background_noise"]),
+        NextMeasurement::TurnedSource => Extra::More(LabConfig { turned: true, ..lab.clone() }),
+        NextMeasurement::Loopback => Extra::Without(vec!["time_zero"]),
+        NextMeasurement::Distances => Extra::Without(vec!["position_error", "room_dimensions"]),
+        NextMeasurement::ExchangedChannel => Extra::Without(vec!["channel_fault"]),
+        NextMeasurement::Quieter => Extra::Without(vec!["nonlinear_distortion"]),
+        NextMeasurement::PatchClosed => Extra::Without(vec!["open_patch"]),
+        NextMeasurement::ObjectsRemoved => Extra::Without(vec!["extra_reflector"]),
+        NextMeasurement::OtherSourcePlace => Extra::More(LabConfig { sources, ..lab.clone() }),
+        NextMeasurement::MorePositions => Extra::More(more),
         _ => Extra::More(LabConfig { sources, ..more }),
     }
 }
@@ -77,11 +77,11 @@ pub fn follow_up(
     folder: &Path,
 ) -> Result<FollowUp, AnyError> {
     let rival = set.iter().find(|s| *s != hidden.id()).ok_or("a set of one")?;
-    let asked = would_decide(hidden.id(), rival);
-    let rest: Vec<Measurement> = ALL.into_iter().filter(|m| *m != asked).collect();
+    let asked = discriminating_measurement(hidden.id(), rival);
+    let rest: Vec<NextMeasurement> = ALL.into_iter().filter(|m| *m != asked).collect();
     let mut random = SmallRng::seed_from_u64(task.seed);
     let other = *rest.choose(&mut random).ok_or("no other measurement")?;
-    let decides = |measurement| -> Result<(Measurement, bool), AnyError> {
+    let decides = |measurement| -> Result<(NextMeasurement, bool), AnyError> {
         let name = concluded(task, extra(measurement, lab, set), lab, hidden, set, folder)?;
         Ok((measurement, name.as_deref() == Some(hidden.id())))
     };

@@ -1,0 +1,140 @@
+//! The room with its named causes at work, as a file from which sound can be rendered.
+
+use sabine_acoustics::Scene;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// What a diagnosis changes in a room: an overlay over the room file. Absent parts leave the room as it is.
+///
+/// As TOML it is the `extended_model.toml` of the example `diagnose`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct ExtendedModel {
+    /// Nominal octave centres of everything given by octave, in Hz.
+    pub centres_hz: Vec<f64>,
+    /// Identifiers of the causes that are at work.
+    pub causes: Vec<String>,
+    /// Absorption by material and octave.
+    #[serde(default)]
+    pub absorption: BTreeMap<String, Vec<f64>>,
+    /// Scattering by material and octave.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub scattering: BTreeMap<String, Vec<f64>>,
+    /// Relative humidity in percent, for attenuation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relative_humidity_percent: Option<f64>,
+    /// Temperature in degrees Celsius, for the speed of sound.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature_c: Option<f64>,
+    /// Gain of loudspeaker and microphone by octave, in dB.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub gain_db: Vec<f64>,
+    /// First-order pattern of the sources: directed share by octave (0: omnidirectional, 0.5: cardioid), radiated power as without.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub directed_share: Vec<f64>,
+    /// Axis of each source.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub axis: BTreeMap<String, [f64; 3]>,
+    /// Noise by octave: energy per second relative to that of the direct sound at 1 m.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub noise_per_s: Vec<f64>,
+    /// The decay of a coupled volume.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coupled: Option<CoupledDecay>,
+    /// Below this frequency in Hz responses are those of the wave equation; [`ExtendedRoom::finish`](crate::ExtendedRoom::finish) takes
+    /// them as they come: whoever renders joins them ([`Crossover`](sabine_propagate::wave::Crossover)).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wave_below_hz: Option<f64>,
+    /// End of the response and length of its fade, in seconds from the first sample.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truncation: Option<[f64; 2]>,
+    /// Deviation of the sampling clock in parts per million.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clock_ppm: Option<f64>,
+    /// Scale of the room along each axis about the middle of its box, and shift in metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dimensions: Option<Dimensions>,
+    /// Where sources and receivers stand that are not where the room file says, by name, in metres.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub position_m: BTreeMap<String, [f64; 3]>,
+    /// Latency of all responses in seconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub latency_s: Option<f64>,
+    /// Responses (SOURCE-RECEIVER) whose sign is turned.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub inverted: Vec<String>,
+    /// Gain of single responses in dB.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub response_gain_db: BTreeMap<String, f64>,
+    /// Responses that were exchanged.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub exchanged: Vec<[String; 2]>,
+    /// Sound bends around the edges of the mesh, as theory has it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub diffraction: bool,
+    /// Flat surfaces that the mesh lacks.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sheets: Vec<ThinPanel>,
+}
+
+/// A flat rectangle that reflects on both sides: a panel, or (just before its wall, absorbing all) a hole.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct ThinPanel {
+    /// Its corners in order, in metres.
+    pub corners_m: [[f64; 3]; 4],
+    /// Absorption, the same in all octaves, 0 to 1; it does not scatter.
+    pub absorption: f64,
+}
+
+/// A coupled volume fills within this time, in seconds.
+pub(crate) const BUILD_UP_S: f64 = 0.02;
+
+/// The second decay of a coupled volume.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct CoupledDecay {
+    /// Energy per second at the beginning, by octave, relative to that of the direct sound at 1 m.
+    pub energy_per_s: Vec<f64>,
+    /// Decay time (60 dB) by octave, in seconds.
+    pub decay_time_s: Vec<f64>,
+    /// Change of level with the receiver's position, in dB/m along each axis, about `centre_m`.
+    pub gradient_db_per_m: [f64; 3],
+    /// Where the level is as stated.
+    pub centre_m: [f64; 3],
+}
+
+/// How the room differs from its mesh.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct Dimensions {
+    /// Factor along each axis.
+    pub scale: [f64; 3],
+    /// Shift along each axis in metres.
+    pub shift_m: [f64; 3],
+}
+
+impl Dimensions {
+    /// Factors along the axes about the middle of the mesh's box, then a shift in metres.
+    pub fn new(scale: [f64; 3], shift_m: [f64; 3]) -> Self {
+        Self { scale, shift_m }
+    }
+
+    /// A scene of this size.
+    pub(crate) fn applied(&self, scene: &Scene) -> Result<Scene, sabine_acoustics::Error> {
+        let corner = |fold: fn(f64, f64) -> f64, from: f64, k: usize| {
+            scene.vertices().iter().map(|v| v[k]).fold(from, fold)
+        };
+        let middle: [f64; 3] = std::array::from_fn(|k| {
+            0.5 * (corner(f64::min, f64::INFINITY, k) + corner(f64::max, f64::NEG_INFINITY, k))
+        });
+        let vertices = scene.vertices().iter().map(|v| {
+            std::array::from_fn(|k| middle[k] + (v[k] - middle[k]) * self.scale[k] + self.shift_m[k])
+        });
+        Scene::new(vertices.collect(), scene.triangles().to_vec(), scene.materials().to_vec())
+    }
+}

@@ -1,0 +1,7 @@
+//! The model with the named causes in it, and its rendering.
+
+pub(crate) mod extended_model;
+pub(crate) mod extended_room;
+pub(crate) mod extension;
+pub(crate) mod panels;
+pub(crate) mod recording_chain;

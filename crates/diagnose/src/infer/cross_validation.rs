@@ -1,0 +1,224 @@
+//! Positions that are left out and predicted.
+
+use crate::effect::{Case, Observable};
+use crate::error::Error;
+use crate::infer::direct_evidence;
+use crate::infer::direct_evidence::Fitted;
+use crate::infer::prediction::{Compared, Errors, compare, decay_db};
+use crate::infer::search::{Search, State};
+use crate::infer::workbench::Workbench;
+use crate::likelihood::decay::WarmStart;
+use crate::likelihood::laplace::LaplaceFit;
+use crate::report::diagnosis::{DecayCurves, HeldOut, HeldOutGain};
+use crate::statistics;
+use rayon::prelude::*;
+use sabine_acoustics::{Observer, report};
+
+/// Groups of receivers that are left out in turn, at most.
+const FOLDS: usize = 4;
+
+/// Receivers that are predicted from others.
+pub(crate) struct Folds {
+    /// Pairs fitted, and pairs predicted.
+    splits: Vec<(Vec<bool>, Vec<usize>)>,
+    receivers: Vec<usize>,
+    /// Whether no fit ever sees them.
+    never_fitted: bool,
+}
+
+impl Folds {
+    /// Receivers that no fit sees.
+    pub fn never_fitted(bench: &Workbench, held: &[usize]) -> Self {
+        let groups = held.iter().map(|&r| vec![r]).collect();
+        Self::new(bench, groups, &|_| bench.fitted.clone(), true)
+    }
+
+    /// Groups of the receivers that are fitted, each left out in turn; none with fewer than two.
+    pub fn in_turn(bench: &Workbench) -> Self {
+        let responses = &bench.survey.responses;
+        let fitted = responses.iter().zip(&bench.fitted).filter(|(_, fitted)| **fitted);
+        let mut receivers: Vec<usize> = fitted.map(|(r, _)| r.receiver).collect();
+        receivers.sort_unstable();
+        receivers.dedup();
+        let count = if receivers.len() < 2 { 0 } else { receivers.len().min(FOLDS) };
+        let groups = (0..count).map(|g| receivers.iter().copied().skip(g).step_by(count).collect()).collect();
+        let rest = |group: &[usize]| {
+            let used = responses.iter().zip(&bench.fitted);
+            used.map(|(r, fitted)| *fitted && !group.contains(&r.receiver)).collect()
+        };
+        Self::new(bench, groups, &rest, false)
+    }
+
+    fn new(
+        bench: &Workbench,
+        groups: Vec<Vec<usize>>,
+        used: &dyn Fn(&[usize]) -> Vec<bool>,
+        never_fitted: bool,
+    ) -> Self {
+        let responses = &bench.survey.responses;
+        let pairs = |group: &[usize]| {
+            (0..responses.len()).filter(|&p| group.contains(&responses[p].receiver)).collect()
+        };
+        let splits = groups.iter().map(|group| (used(group), pairs(group))).collect();
+        Self { splits, receivers: groups.into_iter().flatten().collect(), never_fitted }
+    }
+}
+
+/// Gains of one split: of all causes and of the free discrepancy over the baseline, and of each cause over the others; the bins
+/// compared; and what was predicted in each case.
+struct SplitGain {
+    named: f64,
+    free: f64,
+    each: Vec<f64>,
+    bins: f64,
+    predicted: [Vec<Compared>; 3],
+    without_each: Vec<Vec<Compared>>,
+}
+
+/// What comes of predicting the receivers that were left out: nothing where none could be.
+#[derive(Default)]
+pub(crate) struct Predicted {
+    pub held_out: Option<HeldOut>,
+    /// Of each cause.
+    pub gains: Vec<HeldOutGain>,
+    pub decays: Vec<DecayCurves>,
+}
+
+/// Predicts the receivers that were left out.
+pub(crate) fn predict(
+    search: &Search<'_>,
+    state: &State,
+    folds: &Folds,
+    observer: &dyn Observer,
+) -> Result<Predicted, Error> {
+    let bench = search.bench;
+    if folds.splits.is_empty() {
+        return Ok(Predicted::default());
+    }
+    let free = bench.free_discrepancy();
+    let total = folds.splits.len() as u64;
+    let done = std::sync::atomic::AtomicU64::new(0);
+    let splits: Vec<SplitGain> = folds
+        .splits
+        .par_iter()
+        .map(|(used, pairs)| {
+            let behind = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            report(observer, "held-out positions", behind, total)?;
+            let mut whole = used.clone();
+            pairs.iter().for_each(|&p| whole[p] = true);
+            // The logarithm of the predictive density is what the evidence grows by when the new positions come in.
+            let predictive =
+                |chosen: &[usize], free: Option<&dyn Case>| -> Result<(f64, Vec<Compared>), Error> {
+                    let mut cases = search.cases_of(chosen, Observable::Decay);
+                    cases.extend(free);
+                    let arrivals = search.cases_of(chosen, Observable::Arrivals);
+                    let firsts: &[usize] = if *chosen == *state.chosen { &state.energy_firsts } else { &[] };
+                    let before = WarmStart { values: &state.energy.values, firsts };
+                    let (fitted, firsts) = bench.fit_energy(&cases, used, Some(before))?;
+                    let with = bench.fit_energy(&cases, &whole, Some(before))?.0;
+                    let energy = with.log_evidence - fitted.log_evidence;
+                    let all_times = bench.fit_arrivals(&arrivals, &whole)?.0;
+                    let seen_times = bench.fit_arrivals(&arrivals, used)?.0;
+                    let times = all_times.log_evidence - seen_times.log_evidence;
+                    let single = |energy: &LaplaceFit, arrivals: &LaplaceFit, used: &[bool]| {
+                        let fitted = Fitted { energy, energy_firsts: &firsts, arrivals };
+                        direct_evidence::sum(&direct_evidence::own(search, chosen, fitted, used))
+                    };
+                    let isolated_reflections =
+                        single(&with, &all_times, &whole) - single(&fitted, &seen_times, used);
+                    let all = search.all_cases(chosen);
+                    let signs = bench.polarity(&all, &whole) - bench.polarity(&all, used);
+                    Ok((
+                        energy + times + signs + isolated_reflections,
+                        compare(bench, &cases, &fitted.values, pairs),
+                    ))
+                };
+            let (base, before) = predictive(&[], None)?;
+            let (free, discrepant) = predictive(&[], Some(&free))?;
+            let (named, after) = if state.chosen.is_empty() {
+                (base, before.clone())
+            } else {
+                predictive(&state.chosen, None)?
+            };
+            let mut each = Vec::new();
+            let mut without_each = Vec::new();
+            for &c in &state.chosen {
+                let rest: Vec<usize> = state.chosen.iter().copied().filter(|&o| o != c).collect();
+                let (lacking, predicted) =
+                    if rest.is_empty() { (base, before.clone()) } else { predictive(&rest, None)? };
+                each.push(named - lacking);
+                without_each.push(predicted);
+            }
+            let bins = before.iter().map(|c| c.measured.len() as f64).sum();
+            Ok(SplitGain {
+                named: named - base,
+                free: free - base,
+                each,
+                bins,
+                predicted: [before, after, discrepant],
+                without_each,
+            })
+        })
+        .collect::<Result<_, Error>>()?;
+    let bins: f64 = splits.iter().map(|s| s.bins).sum();
+    let mean = |gain: &dyn Fn(&SplitGain) -> f64| splits.iter().map(gain).sum::<f64>() / bins;
+    let interval = |gain: &dyn Fn(&SplitGain) -> f64| {
+        let gains: Vec<(f64, f64)> = splits.iter().map(|s| (gain(s), s.bins)).collect();
+        statistics::bootstrap(&gains, bench.config.seed)
+    };
+    let errors: Vec<Errors> = (0..3)
+        .map(|k| Errors::of(&splits.iter().flat_map(|s| s.predicted[k].iter().cloned()).collect::<Vec<_>>()))
+        .collect();
+    let three = |value: fn(&Errors) -> f64| [value(&errors[0]), value(&errors[1]), value(&errors[2])];
+    let held_out = HeldOut {
+        receivers: folds.receivers.iter().map(|&r| bench.survey.receivers[r].id.clone()).collect(),
+        never_fitted: folds.never_fitted,
+        db_rmse: three(|e| e.db_rmse),
+        t20_jnd: three(|e| e.t20_jnd),
+        c50_jnd: three(|e| e.c50_jnd),
+        nats_per_bin: [mean(&|s| s.named), mean(&|s| s.free)],
+        nats_interval: [interval(&|s| s.named), interval(&|s| s.free)],
+    };
+    let gains = (0..state.chosen.len())
+        .map(|i| {
+            let [low, high] = interval(&|s| s.each[i]);
+            let before: Vec<Compared> =
+                splits.iter().flat_map(|s| s.without_each[i].iter().cloned()).collect();
+            HeldOutGain {
+                nats_per_bin: mean(&|s| s.each[i]),
+                low,
+                high,
+                db_rmse_before: Errors::of(&before).db_rmse,
+                db_rmse_after: errors[1].db_rmse,
+            }
+        })
+        .collect();
+    let decays =
+        splits.iter().flat_map(|s| decay_curves(bench, &s.predicted[0], &s.predicted[1], true)).collect();
+    Ok(Predicted { held_out: Some(held_out), gains, decays })
+}
+
+/// Curves of what was measured, and predicted before and after.
+pub(crate) fn decay_curves(
+    bench: &Workbench,
+    before: &[Compared],
+    after: &[Compared],
+    held_out: bool,
+) -> Vec<DecayCurves> {
+    before
+        .iter()
+        .zip(after)
+        .map(|(b, a)| {
+            let total = b.measured.iter().sum::<f64>().max(1e-300);
+            DecayCurves {
+                response: bench.survey.responses[b.pair].name.clone(),
+                band_hz: bench.survey.bands.nominal_hz(b.band),
+                time_s: b.times_s.clone(),
+                measured_db: decay_db(&b.measured, total),
+                before_db: decay_db(&b.predicted, total),
+                after_db: decay_db(&a.predicted, total),
+                held_out,
+            }
+        })
+        .collect()
+}

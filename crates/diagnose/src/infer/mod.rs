@@ -1,0 +1,10 @@
+//! Which causes the observations support.
+
+pub(crate) mod cross_validation;
+pub(crate) mod direct_evidence;
+pub(crate) mod isolability;
+pub(crate) mod lack_of_fit;
+pub(crate) mod prediction;
+pub(crate) mod search;
+pub(crate) mod selection;
+pub(crate) mod workbench;

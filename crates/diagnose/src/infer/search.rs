@@ -1,0 +1,314 @@
+//! Which causes the data speak for.
+
+use crate::effect::AuxiliaryEvidence;
+use crate::effect::{Case, Effect, Nuisance, Observable};
+use crate::error::Error;
+use crate::infer::direct_evidence;
+use crate::infer::direct_evidence::Fitted;
+use crate::infer::workbench::Workbench;
+use crate::likelihood::decay::WarmStart;
+use crate::likelihood::laplace::LaplaceFit;
+use rayon::prelude::*;
+use sabine_acoustics::{Observer, report};
+
+/// Causes whose evidence differs by less are not told apart, in nats: odds of 20 to 1.
+pub(crate) const RIVAL_NATS: f64 = 3.0;
+/// Exchanges that are looked at in full: those that help the direct sounds most.
+const MAX_EXCHANGES: usize = 3;
+/// What an exchange must gain in the direct sounds to be looked at, in nats.
+const EXCHANGE_NATS: f64 = 6.0;
+
+/// One case of one effect of the catalogue.
+pub(crate) struct Candidate<'a> {
+    pub effect: usize,
+    pub id: &'static str,
+    pub case: &'a dyn Case,
+}
+
+/// What a candidate would add.
+#[derive(Clone, Debug)]
+pub(crate) struct Score {
+    pub candidate: usize,
+    /// Observable that it adds, in nats.
+    pub nats: f64,
+    /// Its size in units of its standard deviation, everything else left free.
+    pub d_prime: f64,
+}
+
+/// The present state: chosen candidates and the evidence of each part.
+#[derive(Clone)]
+pub(crate) struct State {
+    pub chosen: Vec<usize>,
+    pub energy: LaplaceFit,
+    pub arrivals: LaplaceFit,
+    pub polarity: f64,
+    /// What single reflections say for chosen candidates.
+    pub own: Vec<(usize, AuxiliaryEvidence)>,
+    /// Where the parameters of each chosen case that bears on decays start, and of each that bears on arrivals.
+    pub energy_firsts: Vec<usize>,
+    pub arrival_firsts: Vec<usize>,
+}
+
+impl State {
+    /// The fit of the decays as a start for one with more cases.
+    pub fn before(&self) -> WarmStart<'_> {
+        WarmStart { values: &self.energy.values, firsts: &self.energy_firsts }
+    }
+
+    /// Place of a response's gain among the values of the decays.
+    pub fn energy_gain(&self, search: &Search<'_>, response: usize) -> usize {
+        let survey = &search.bench.survey;
+        let common = usize::from(survey.measurement.levels == sabine_acoustics::Levels::Common);
+        search.bench.priors.len() * survey.bands.len() + common + response
+    }
+
+    pub fn log_evidence(&self) -> f64 {
+        self.energy.log_evidence
+            + self.arrivals.log_evidence
+            + self.polarity
+            + direct_evidence::sum(&self.own)
+    }
+}
+
+pub(crate) struct Search<'a> {
+    pub bench: &'a Workbench,
+    pub candidates: Vec<Candidate<'a>>,
+    /// Number of effects, for the correction for how many were tried.
+    pub effects: usize,
+    pub used: Vec<bool>,
+}
+
+/// The evidence of one effect: its best case, and all cases together.
+#[derive(Clone, Debug)]
+pub(crate) struct EffectScore {
+    pub effect: usize,
+    pub id: &'static str,
+    pub best: usize,
+    /// Log odds against its absence, corrected for the number of cases, in nats.
+    pub nats: f64,
+    /// Size of the best case in units of its standard deviation.
+    pub d_prime: f64,
+}
+
+impl<'a> Search<'a> {
+    pub fn new(
+        bench: &'a Workbench,
+        cases: &'a [(usize, &'static str, Box<dyn Case>)],
+        effects: usize,
+        used: Vec<bool>,
+    ) -> Self {
+        let candidates =
+            cases.iter().map(|(effect, id, case)| Candidate { effect: *effect, id, case: &**case }).collect();
+        Self { bench, candidates, effects, used }
+    }
+
+    pub fn cases_of(&self, chosen: &[usize], part: Observable) -> Vec<&'a dyn Case> {
+        chosen.iter().map(|&c| self.candidates[c].case).filter(|c| c.observable().concerns(part)).collect()
+    }
+
+    pub fn state(&self, chosen: &[usize], near: Option<&State>) -> Result<State, Error> {
+        let before = near.map(|s| WarmStart { values: &s.energy.values, firsts: &[] });
+        let cases = self.cases_of(chosen, Observable::Decay);
+        let (energy, energy_firsts) = self.bench.fit_energy(&cases, &self.used, before)?;
+        let cases = self.cases_of(chosen, Observable::Arrivals);
+        let (arrivals, arrival_firsts) = self.bench.fit_arrivals(&cases, &self.used)?;
+        let polarity = self.bench.polarity(&self.all_cases(chosen), &self.used);
+        let fitted = Fitted { energy: &energy, energy_firsts: &energy_firsts, arrivals: &arrivals };
+        let own = direct_evidence::own(self, chosen, fitted, &self.used);
+        Ok(State { chosen: chosen.to_vec(), energy, arrivals, polarity, own, energy_firsts, arrival_firsts })
+    }
+
+    pub fn all_cases(&self, chosen: &[usize]) -> Vec<&'a dyn Case> {
+        chosen.iter().map(|&c| self.candidates[c].case).collect()
+    }
+
+    /// The state with one candidate more; parts on which it has no bearing are taken over.
+    pub fn with(&self, state: &State, candidate: usize) -> Result<State, Error> {
+        let mut chosen = state.chosen.clone();
+        chosen.push(candidate);
+        let case = self.candidates[candidate].case;
+        let mut next = State { chosen, ..state.clone() };
+        let evidence = case.observable();
+        let turned = case.inverted().is_some();
+        if evidence.concerns(Observable::Decay) && !turned {
+            let cases = self.cases_of(&next.chosen, Observable::Decay);
+            (next.energy, next.energy_firsts) =
+                self.bench.fit_energy(&cases, &self.used, Some(state.before()))?;
+        }
+        if evidence.concerns(Observable::Arrivals) && !turned {
+            let cases = self.cases_of(&next.chosen, Observable::Arrivals);
+            (next.arrivals, next.arrival_firsts) = self.bench.fit_arrivals(&cases, &self.used)?;
+        }
+        if turned {
+            next.polarity = self.bench.polarity(&self.all_cases(&next.chosen), &self.used);
+        }
+        let fitted =
+            Fitted { energy: &next.energy, energy_firsts: &next.energy_firsts, arrivals: &next.arrivals };
+        next.own = direct_evidence::own(self, &next.chosen, fitted, &self.used);
+        Ok(next)
+    }
+
+    /// Candidates worth a full fit: all but the many exchanges that do not even help the direct sounds.
+    fn worthwhile(&self, state: &State) -> Result<Vec<usize>, Error> {
+        let data = self.bench.arrival_data();
+        let by_pair = |chosen: &[usize], values: &[f64]| -> f64 {
+            let cases = self.cases_of(chosen, Observable::Arrivals);
+            crate::likelihood::arrivals::at_fit(&data, &cases, &self.used)
+                .by_pair(values)
+                .iter()
+                .zip(&self.used)
+                .filter(|(_, used)| **used)
+                .map(|(l, _)| l)
+                .sum()
+        };
+        let now = by_pair(&state.chosen, &state.arrivals.values);
+        let mut exchanges: Vec<(f64, usize)> = Vec::new();
+        let mut kept = Vec::new();
+        for (i, candidate) in self.candidates.iter().enumerate() {
+            if state.chosen.contains(&i) {
+                continue;
+            }
+            match candidate.case.exchanged() {
+                None => kept.push(i),
+                Some(_) => {
+                    let mut chosen = state.chosen.clone();
+                    chosen.push(i);
+                    let gain = by_pair(&chosen, &state.arrivals.values) - now;
+                    if gain > EXCHANGE_NATS {
+                        exchanges.push((gain, i));
+                    }
+                }
+            }
+        }
+        exchanges.sort_by(|a, b| b.0.total_cmp(&a.0));
+        kept.extend(exchanges.into_iter().take(MAX_EXCHANGES).map(|(_, i)| i));
+        Ok(kept)
+    }
+
+    /// Observable that every candidate adds.
+    pub fn scores(&self, state: &State, observer: &dyn Observer) -> Result<Vec<Score>, Error> {
+        let worthwhile = self.worthwhile(state)?;
+        let done = std::sync::atomic::AtomicU64::new(0);
+        let total = worthwhile.len() as u64;
+        worthwhile
+            .par_iter()
+            .map(|&candidate| {
+                let next = self.with(state, candidate)?;
+                let behind = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+                report(observer, "candidates", behind, total)?;
+                Ok(Score {
+                    candidate,
+                    nats: next.log_evidence() - state.log_evidence(),
+                    d_prime: self.d_prime(state, &next, candidate),
+                })
+            })
+            .collect()
+    }
+
+    /// Twice the gain in likelihood is noncentral chi-squared: its mean is the squared size of the effect in standard deviations,
+    /// and one for each free parameter (Wilks 1938; Wald 1943). What is known of materials and places beforehand counts as data: without
+    /// the effect they are strained.
+    fn d_prime(&self, state: &State, next: &State, candidate: usize) -> f64 {
+        let likelihood = |s: &State| {
+            s.energy.log_posterior + s.arrivals.log_posterior + s.polarity + direct_evidence::sum(&s.own)
+        };
+        let case = self.candidates[candidate].case;
+        let widened: usize = case
+            .relaxes()
+            .iter()
+            .map(|(nuisance, _)| match nuisance {
+                Nuisance::Absorption(_) => self.bench.survey.bands.len(),
+                Nuisance::SourcePosition(_) | Nuisance::ReceiverPosition(_) => 3,
+                Nuisance::ResponseGain(_) => 1,
+            })
+            .sum();
+        let free = case.parameters(&self.bench.survey).len() + widened;
+        (2.0 * (likelihood(next) - likelihood(state)) - free as f64).max(0.0).sqrt()
+    }
+
+    /// Observable by effect, the strongest first. An effect with many cases pays for their number.
+    pub fn by_effect(&self, scores: &[Score]) -> Vec<EffectScore> {
+        let mut found: Vec<EffectScore> = Vec::new();
+        for effect in 0..self.effects {
+            let own: Vec<&Score> =
+                scores.iter().filter(|s| self.candidates[s.candidate].effect == effect).collect();
+            let count = self.candidates.iter().filter(|c| c.effect == effect).count();
+            let Some(best) = own.iter().max_by(|a, b| a.nats.total_cmp(&b.nats)) else { continue };
+            let sum: f64 = own.iter().map(|s| (s.nats - best.nats).exp()).sum();
+            found.push(EffectScore {
+                effect,
+                id: self.candidates[best.candidate].id,
+                best: best.candidate,
+                nats: best.nats + sum.ln() - (count as f64).ln(),
+                d_prime: best.d_prime,
+            });
+        }
+        found.sort_by(|a, b| b.nats.total_cmp(&a.nats));
+        found
+    }
+
+    /// What must be reached for a name.
+    pub fn threshold(&self) -> f64 {
+        self.bench.config.naming_nats + (self.effects.max(1) as f64).ln()
+    }
+
+    fn price(&self, candidate: usize) -> f64 {
+        let effect = self.candidates[candidate].effect;
+        (self.candidates.iter().filter(|c| c.effect == effect).count() as f64).ln()
+    }
+
+    /// Others that explain the same as well: those near in evidence that add nothing beside the best, as the best adds
+    /// nothing beside them.
+    pub fn rivals(&self, state: &State, ranked: &[EffectScore]) -> Result<Vec<EffectScore>, Error> {
+        let Some(best) = ranked.first() else { return Ok(Vec::new()) };
+        let with_best = self.with(state, best.best)?;
+        let near = ranked[1..]
+            .iter()
+            .filter(|r| best.nats - r.nats < RIVAL_NATS && r.nats > self.threshold() - RIVAL_NATS);
+        let mut rivals = Vec::new();
+        for rival in near {
+            let with_rival = self.with(state, rival.best)?;
+            let both = self.with(&with_best, rival.best)?.log_evidence();
+            let beside_best = both - with_best.log_evidence() - self.price(rival.best);
+            let best_beside = both - with_rival.log_evidence() - self.price(best.best);
+            if beside_best < self.threshold() && best_beside < self.threshold() {
+                rivals.push(rival.clone());
+            }
+        }
+        Ok(rivals)
+    }
+
+    /// Drops chosen candidates that the others have made superfluous.
+    pub fn backward(&self, mut state: State) -> Result<State, Error> {
+        loop {
+            let mut weakest: Option<(f64, State)> = None;
+            if state.chosen.len() < 2 {
+                return Ok(state);
+            }
+            for &candidate in &state.chosen {
+                let rest: Vec<usize> = state.chosen.iter().copied().filter(|&c| c != candidate).collect();
+                let without = self.state(&rest, Some(&state))?;
+                let nats = state.log_evidence() - without.log_evidence() - self.price(candidate);
+                if weakest.as_ref().is_none_or(|w| nats < w.0) {
+                    weakest = Some((nats, without));
+                }
+            }
+            match weakest {
+                Some((nats, without)) if nats < self.threshold() => state = without,
+                _ => return Ok(state),
+            }
+        }
+    }
+}
+
+/// All cases of some effects.
+pub(crate) fn cases(
+    effects: &[Box<dyn Effect>],
+    survey: &crate::Survey,
+) -> Vec<(usize, &'static str, Box<dyn Case>)> {
+    effects
+        .iter()
+        .enumerate()
+        .flat_map(|(i, effect)| effect.cases(survey).into_iter().map(move |case| (i, effect.id(), case)))
+        .collect()
+}

@@ -1,0 +1,137 @@
+//! The search for causes, one name after the other.
+
+use crate::diagnoser::Diagnoser;
+use crate::effect::{Case, Nuisance, Observable};
+use crate::error::Error;
+use crate::infer::search::{EffectScore, Search};
+use crate::infer::workbench::Workbench;
+use crate::report::found_parameters::place_of;
+use sabine_acoustics::Observer;
+
+/// What the search found.
+#[derive(Default)]
+pub(crate) struct Selection {
+    pub chosen: Vec<usize>,
+    probabilities: Vec<(usize, f64)>,
+    /// The last cause and those that explain as much.
+    pub rivals: Vec<&'static str>,
+    /// All effects beside the baseline.
+    pub first: Vec<EffectScore>,
+    /// Causes at the end of the search, and all other effects beside them, where none of these was worth a name.
+    pub last: Option<(Vec<usize>, Vec<EffectScore>)>,
+}
+
+impl Selection {
+    /// Takes a name back, and the set that it stands for.
+    pub fn drop(&mut self, candidate: usize) {
+        if self.chosen.last() == Some(&candidate) {
+            self.rivals.clear();
+        }
+        self.chosen.retain(|&c| c != candidate);
+    }
+
+    pub fn probability(&self, candidate: usize) -> f64 {
+        self.probabilities.iter().find(|p| p.0 == candidate).map_or(0.0, |p| p.1)
+    }
+}
+
+impl Diagnoser {
+    /// Greedy naming, the dispersion estimated anew after each name, and a backward check.
+    pub(crate) fn name(
+        &self,
+        bench: &mut Workbench,
+        cases: &[(usize, &'static str, Box<dyn Case>)],
+        used: &[bool],
+        observer: &dyn Observer,
+    ) -> Result<Selection, Error> {
+        let mut named = Selection::default();
+        while named.chosen.len() < self.config.most_causes {
+            let (ranked, rivals, threshold) = {
+                let search = Search::new(bench, cases, self.effects.len(), used.to_vec());
+                let base = search.state(&[], None)?;
+                let state = search.state(&named.chosen, Some(&base))?;
+                let ranked: Vec<EffectScore> = search
+                    .by_effect(&search.scores(&state, observer)?)
+                    .into_iter()
+                    .filter(|s| {
+                        named.chosen.iter().all(|&c| {
+                            search.candidates[c].effect != s.effect
+                                || search.candidates[c].case.subject().is_some()
+                        })
+                    })
+                    .collect();
+                let threshold = search.threshold();
+                let named_now = ranked.first().is_some_and(|best| best.nats >= threshold);
+                let rivals = if named_now { search.rivals(&state, &ranked)? } else { Vec::new() };
+                (ranked, rivals, threshold)
+            };
+            if named.first.is_empty() {
+                named.first.clone_from(&ranked);
+            }
+            let Some(best) = ranked.first().filter(|b| b.nats >= threshold) else {
+                named.last = Some((named.chosen.clone(), ranked));
+                break;
+            };
+            let strongest = best.nats.max(0.0);
+            let sum: f64 = ranked.iter().map(|r| (r.nats - strongest).exp()).sum::<f64>()
+                + (threshold - self.config.naming_nats - strongest).exp();
+            named.probabilities.push((best.best, (best.nats - strongest).exp() / sum));
+            named.chosen.push(best.best);
+            if !rivals.is_empty() {
+                named.rivals = std::iter::once(best.id).chain(rivals.iter().map(|r| r.id)).collect();
+                break;
+            }
+            let (moved, warmer_k, resized, absorption) = {
+                let search = Search::new(bench, cases, self.effects.len(), used.to_vec());
+                let state = search.state(&named.chosen, None)?;
+                let offset = |first: usize| std::array::from_fn(|k| state.arrivals.values[first + k]);
+                let moved: Vec<(Nuisance, [f64; 3])> = cases[best.best]
+                    .2
+                    .relaxes()
+                    .into_iter()
+                    .filter_map(|(place, _)| match place {
+                        Nuisance::SourcePosition(i) => Some((place, offset(3 * i))),
+                        Nuisance::ReceiverPosition(i) => {
+                            Some((place, offset(3 * (bench.survey.sources.len() + i))))
+                        }
+                        _ => None,
+                    })
+                    .collect();
+                let (maximum, first) = place_of(&search, &state, best.best);
+                let case = &cases[best.best].2;
+                let own = maximum.values.get(first..first + case.parameters(&bench.survey).len());
+                let warmer_k = own.map_or(0.0, |values| case.warmer_by_k(values, &bench.survey));
+                let resized = own.and_then(|values| case.resized(values));
+                (moved, warmer_k, resized, state.energy.values)
+            };
+            // With the cause at work the materials are others: what is compared, and with which spread, follows them.
+            if cases[best.best].2.observable().concerns(Observable::Decay) {
+                bench.expand_about(&absorption)?;
+            }
+            if warmer_k != 0.0 {
+                bench.warm(warmer_k)?;
+            }
+            if let Some(dimensions) = resized {
+                bench.resize(&dimensions)?;
+            }
+            for (place, offset_m) in moved {
+                bench.move_place(place, offset_m)?;
+            }
+            let chosen: Vec<&dyn Case> = named
+                .chosen
+                .iter()
+                .map(|&c| &*cases[c].2)
+                .filter(|c| c.observable().concerns(Observable::Decay))
+                .collect();
+            bench.calibrate_dispersion(&chosen, used)?;
+        }
+        let search = Search::new(bench, cases, self.effects.len(), used.to_vec());
+        let state = search.backward(search.state(&named.chosen, None)?)?;
+        if named.chosen.last() != state.chosen.last() {
+            // The set stands for a cause that has turned out to be superfluous.
+            named.rivals.clear();
+        }
+        named.chosen = state.chosen;
+        Ok(named)
+    }
+}

@@ -1,0 +1,338 @@
+//! How probable measured arrival times are under places, latency and effects.
+//!
+//! The direct sound comes when it should, give or take; every later peak belongs to one of the predicted specular reflections or to none
+//! (a mixture of normal distributions about the predicted times and an even background).
+
+mod unassigned_peaks;
+
+use crate::effect::{Case, Nuisance};
+use crate::error::Error;
+use crate::likelihood::decay::ModelTerm;
+use crate::likelihood::laplace::{LaplaceFit, Model, Prior, Slopes, maximise};
+use crate::observe::observed_response::{Measured, PEAK_FLOOR_DB, PEAKS_S};
+use crate::simulate::traced_pair::Arrival;
+use crate::simulate::views::ArrivalView;
+use crate::survey::Survey;
+use sabine_acoustics::TimeZero;
+
+/// How well the time of a direct sound can be read at [`READ_HZ`]: a third of a sample. Slower recordings are read worse.
+const DIRECT_SD_S: f64 = 2.5e-5;
+/// The same of a reflection, whose neighbours pull at its peak.
+const REFLECTION_SD_S: f64 = 5e-5;
+/// Sample rate from which times are read as well as that.
+const READ_HZ: f64 = 16e3;
+/// Share of peaks that belong to no predicted reflection.
+const STRAY_SHARE: f64 = 0.4;
+/// Share of all peaks' worth that one peak has in which a surface that the mesh lacks is seen: two of three responses show it.
+const SEEN_SHARE: f64 = 0.65;
+/// Height of such a peak about what reflectance and distance give: its neighbours, and colour, in dB.
+const HEIGHT_SD_DB: f64 = 2.5;
+/// Share of direct sounds whose time was misread.
+const MISREAD_SHARE: f64 = 0.02;
+/// Times at which the fit starts to look for partners of a peak, and how it narrows.
+const WIDTHS_S: [f64; 3] = [4e-4, 1.2e-4, 0.0];
+/// Standard deviations from which a normal density counts as nothing: 5e-32 of its top.
+const FAR_SD: f64 = 12.0;
+/// Of the starts that an effect offers, those that are followed.
+const MAX_STARTS: usize = 3;
+/// Latency of a recording whose time zero means nothing.
+const FREE_LATENCY_S: f64 = 1.0;
+/// Time zero where the file says that it is the emission: half a sample or so.
+const EMISSION_SD_S: f64 = 1e-5;
+
+pub(crate) struct ArrivalData<'a> {
+    pub survey: &'a Survey,
+    pub measured: &'a [Measured],
+    /// Predicted arrivals of each pair, the shortest first; empty where the direct line is blocked.
+    pub arrivals: &'a [Vec<Arrival>],
+    pub speed_m_s: &'a [f64],
+    pub position_sd_m: f64,
+}
+
+pub(crate) struct ArrivalModel<'a> {
+    data: &'a ArrivalData<'a>,
+    pub effects: Vec<ModelTerm<'a>>,
+    priors: Vec<Prior>,
+    used: &'a [bool],
+    assignment: Vec<usize>,
+    first_receiver: usize,
+    first_latency: usize,
+    /// Reflections count with this much more than their own width; `None`: only the direct sound counts, and is never misread.
+    width_s: Option<f64>,
+}
+
+fn normal(residual: f64, sd: f64) -> f64 {
+    let z = residual / sd;
+    // Most peaks are far from most reflections; beside the even background their density is less than the last bit.
+    if z.abs() > FAR_SD { 0.0 } else { (-0.5 * z * z).exp() / (sd * std::f64::consts::TAU.sqrt()) }
+}
+
+impl<'a> ArrivalModel<'a> {
+    pub fn new(data: &'a ArrivalData<'a>, cases: &[&'a dyn Case], used: &'a [bool]) -> Self {
+        let survey = data.survey;
+        let place = Prior::normal(0.0, data.position_sd_m);
+        let mut priors = vec![place; 3 * survey.sources.len()];
+        let first_receiver = priors.len();
+        priors.extend(vec![place; 3 * survey.receivers.len()]);
+        let first_latency = priors.len();
+        match survey.measurement.time_zero {
+            TimeZero::PerResponse => {
+                priors.extend(survey.responses.iter().map(|_| Prior::normal(0.0, FREE_LATENCY_S)));
+            }
+            TimeZero::Common => priors.push(Prior::normal(0.0, FREE_LATENCY_S)),
+            _ => priors.push(Prior::normal(0.0, EMISSION_SD_S)),
+        }
+        let mut assignment: Vec<usize> = (0..survey.responses.len()).collect();
+        let mut effects = Vec::new();
+        for (order, &case) in cases.iter().enumerate() {
+            for (nuisance, sd) in case.relaxes() {
+                let first = match nuisance {
+                    Nuisance::SourcePosition(i) => 3 * i,
+                    Nuisance::ReceiverPosition(i) => first_receiver + 3 * i,
+                    Nuisance::Absorption(_) | Nuisance::ResponseGain(_) => continue,
+                };
+                priors[first..first + 3].iter_mut().for_each(|p| p.sd = p.sd.max(sd));
+            }
+            if let Some((a, b)) = case.exchanged() {
+                assignment.swap(a, b);
+            }
+            let parameters = case.parameters(survey);
+            let first = priors.len();
+            priors.extend(parameters.iter().map(|p| Prior {
+                mean: p.neutral,
+                sd: p.prior_sd,
+                low: p.bounds.0,
+                high: p.bounds.1,
+            }));
+            effects.push(ModelTerm { case, parameters, first, order });
+        }
+        Self { data, effects, priors, used, assignment, first_receiver, first_latency, width_s: None }
+    }
+
+    pub fn source_index(&self, source: usize) -> usize {
+        3 * source
+    }
+
+    pub fn receiver_index(&self, receiver: usize) -> usize {
+        self.first_receiver + 3 * receiver
+    }
+
+    fn latency_index(&self, response: usize) -> usize {
+        match self.data.survey.measurement.time_zero {
+            TimeZero::PerResponse => self.first_latency + response,
+            _ => self.first_latency,
+        }
+    }
+
+    fn effect_delay_s(&self, values: &[f64], view: &ArrivalView<'_>) -> f64 {
+        self.effects
+            .iter()
+            .map(|p| p.case.delay_s(&values[p.first..p.first + p.parameters.len()], view))
+            .sum()
+    }
+
+    /// Time of an arrival in the file, and its change with each parameter that matters.
+    fn time(&self, values: &[f64], pair: usize, arrival: &Arrival, slopes: bool) -> (f64, Vec<(usize, f64)>) {
+        let response = &self.data.survey.responses[pair];
+        let speed = self.data.speed_m_s[pair];
+        let view = ArrivalView {
+            survey: self.data.survey,
+            pair,
+            length_m: arrival.length_m,
+            speed_m_s: speed,
+            departure: arrival.departure,
+            arrival: arrival.arrival,
+        };
+        let (source, receiver) = (self.source_index(response.source), self.receiver_index(response.receiver));
+        let latency = self.latency_index(self.assignment[pair]);
+        let mut time_s = arrival.length_m / speed + values[latency] + self.effect_delay_s(values, &view);
+        let mut found = Vec::new();
+        for k in 0..3 {
+            let (s, r) = (-arrival.departure[k] / speed, -arrival.arrival[k] / speed);
+            time_s += s * values[source + k] + r * values[receiver + k];
+            if slopes {
+                found.push((source + k, s));
+                found.push((receiver + k, r));
+            }
+        }
+        if slopes {
+            found.push((latency, 1.0));
+            for placed in &self.effects {
+                let mut own = values[placed.first..placed.first + placed.parameters.len()].to_vec();
+                for i in 0..own.len() {
+                    let (index, value) = (placed.first + i, own[i]);
+                    let step = 1e-4 * self.priors[index].sd;
+                    let mut at = |moved: f64| {
+                        own[i] = moved;
+                        placed.case.delay_s(&own, &view)
+                    };
+                    let (later, earlier) = (at(value + step), at(value - step));
+                    own[i] = value;
+                    found.push((index, (later - earlier) / (2.0 * step)));
+                }
+            }
+        }
+        (time_s, found)
+    }
+
+    fn pair_likelihood(&self, values: &[f64], pair: usize, mut slopes: Option<&mut Slopes>) -> f64 {
+        let Some((direct, later)) = self.data.arrivals[pair].split_first() else { return 0.0 };
+        let measured = &self.data.measured[self.assignment[pair]];
+        let direct_sd_s = DIRECT_SD_S * measured.slowness();
+        let sloping = slopes.is_some();
+        let mut push = |found: &[(usize, f64)], residual: f64, sd: f64, share: f64| {
+            let Some(slopes) = slopes.as_deref_mut() else { return };
+            let weight = share / (sd * sd);
+            for &(a, x) in found {
+                slopes.gradient[a] += weight * residual * x;
+                for &(b, y) in found {
+                    slopes.information[(a, b)] += weight * x * y;
+                }
+            }
+        };
+        let (time_s, found) = self.time(values, pair, direct, sloping);
+        let residual = measured.direct_s - time_s;
+        let Some(width_s) = self.width_s else {
+            push(&found, residual, direct_sd_s, 1.0);
+            return -0.5 * (residual / direct_sd_s).powi(2);
+        };
+        let sd = direct_sd_s.hypot(width_s);
+        let (right, wrong) = ((1.0 - MISREAD_SHARE) * normal(residual, sd), MISREAD_SHARE / PEAKS_S);
+        push(&found, residual, sd, right / (right + wrong));
+        let mut value = (right + wrong).ln();
+
+        let sd = (REFLECTION_SD_S * measured.slowness()).hypot(width_s);
+        let amplitude: f64 = later.iter().map(|a| a.energy.sqrt()).sum();
+        if amplitude <= 0.0 {
+            return value;
+        }
+        let times: Vec<(f64, Vec<(usize, f64)>)> =
+            later.iter().map(|a| self.time(values, pair, a, sloping)).collect();
+        let more = self.added(values, pair);
+        let each = SEEN_SHARE / measured.peaks_s.len().max(1) as f64;
+        let rest = 1.0 - each * more.len() as f64;
+        for (peak, height_db) in measured.peaks_s.iter().zip(&measured.peaks_db) {
+            let densities: Vec<f64> = later
+                .iter()
+                .zip(&times)
+                .map(|(a, (t, _))| {
+                    rest * (1.0 - STRAY_SHARE) * a.energy.sqrt() / amplitude * normal(peak - t, sd)
+                })
+                .collect();
+            // Heights of other peaks say nothing: anything down to the floor is as probable.
+            let added: Vec<f64> = more
+                .iter()
+                .map(|m| {
+                    each * normal(peak - m.time_s, sd)
+                        * normal(height_db - m.level_db, HEIGHT_SD_DB)
+                        * PEAK_FLOOR_DB
+                })
+                .collect();
+            let stray = rest * STRAY_SHARE / PEAKS_S;
+            let total = densities.iter().sum::<f64>() + added.iter().sum::<f64>() + stray;
+            value += total.ln();
+            for (density, (t, found)) in densities.iter().zip(&times) {
+                let share = density / total;
+                if share > 1e-3 {
+                    push(found, peak - t, sd, share);
+                }
+            }
+            for (density, m) in added.iter().zip(&more) {
+                let share = density / total;
+                if share > 1e-3 {
+                    push(&m.slopes, peak - m.time_s, sd, share);
+                    push(&m.level_slopes, height_db - m.level_db, HEIGHT_SD_DB, share);
+                }
+            }
+        }
+        value
+    }
+
+    pub fn by_pair(&self, values: &[f64]) -> Vec<f64> {
+        (0..self.assignment.len()).map(|pair| self.pair_likelihood(values, pair, None)).collect()
+    }
+}
+
+impl Model for ArrivalModel<'_> {
+    fn priors(&self) -> &[Prior] {
+        &self.priors
+    }
+
+    fn log_likelihood(&self, values: &[f64], mut slopes: Option<&mut Slopes>) -> f64 {
+        (0..self.assignment.len())
+            .filter(|&pair| self.used[pair])
+            .map(|pair| self.pair_likelihood(values, pair, slopes.as_deref_mut()))
+            .sum()
+    }
+}
+
+/// Fits from the direct sounds on, reflections joining with ever less tolerance.
+pub(crate) fn fit(
+    data: &ArrivalData<'_>,
+    cases: &[&dyn Case],
+    used: &[bool],
+) -> Result<(LaplaceFit, Vec<usize>), Error> {
+    if let Some(place) = cases.iter().rposition(|c| c.seeks()) {
+        return unassigned_peaks::fit(data, cases, used, place);
+    }
+    let mut model = ArrivalModel::new(data, cases, used);
+    let start: Vec<f64> = model.priors.iter().map(|p| p.mean).collect();
+    let mut best: Option<LaplaceFit> = None;
+    // From where the direct sounds point, and from where everything should be: a single response far off must not carry the
+    // others away.
+    let direct = maximise(&model, &start, "arrival times")?.values;
+    let mut firsts = offered(&mut model, &start);
+    firsts.extend([direct, start]);
+    for first in firsts {
+        let mut x = first;
+        let mut found = None;
+        for width_s in WIDTHS_S {
+            model.width_s = Some(width_s);
+            let top = maximise(&model, &x, "arrival times")?;
+            x = top.values.clone();
+            found = Some(top);
+        }
+        if let Some(found) = found.filter(|f| best.as_ref().is_none_or(|b| f.log_evidence > b.log_evidence)) {
+            best = Some(found);
+        }
+    }
+    let places = model.effects.iter().map(|p| p.first).collect();
+    best.map(|b| (b, places)).ok_or(Error::Singular { what: "arrival times" })
+}
+
+/// The most promising of the values that the effects offer to start from: reflections that lie several of their distances off find no
+/// partners from the neutral values.
+fn offered(model: &mut ArrivalModel<'_>, neutral: &[f64]) -> Vec<Vec<f64>> {
+    model.width_s = Some(WIDTHS_S[0]);
+    let mut starts: Vec<Vec<f64>> = Vec::new();
+    for placed in &model.effects {
+        let options = placed.case.starts(model.data.survey);
+        let at = placed.first..placed.first + placed.parameters.len();
+        starts.extend(options.into_iter().filter(|o| o[..] != neutral[at.clone()]).map(|option| {
+            let mut x = neutral.to_vec();
+            x[at.clone()].copy_from_slice(&option);
+            x
+        }));
+    }
+    let mut ranked: Vec<(f64, Vec<f64>)> =
+        starts.into_iter().map(|x| (model.log_likelihood(&x, None), x)).collect();
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    model.width_s = None;
+    ranked.into_iter().take(MAX_STARTS).map(|(_, x)| x).collect()
+}
+
+impl Measured {
+    /// By how much worse times are read than at [`READ_HZ`] or above.
+    fn slowness(&self) -> f64 {
+        (READ_HZ / f64::from(self.sample_rate_hz)).max(1.0)
+    }
+}
+
+/// A model that is ready to be looked at with fitted values.
+pub(crate) fn at_fit<'a>(
+    data: &'a ArrivalData<'a>,
+    cases: &[&'a dyn Case],
+    used: &'a [bool],
+) -> ArrivalModel<'a> {
+    ArrivalModel { width_s: Some(0.0), ..ArrivalModel::new(data, cases, used) }
+}

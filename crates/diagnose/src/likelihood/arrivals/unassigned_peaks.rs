@@ -1,0 +1,181 @@
+//! Reflections that the mesh does not have: what effects add, where peaks point, and the fit from there.
+
+use super::{ArrivalData, ArrivalModel, PEAKS_S, REFLECTION_SD_S, STRAY_SHARE, WIDTHS_S, at_fit, normal};
+use crate::effect::{Case, Nuisance};
+use crate::error::Error;
+use crate::likelihood::decay::ModelTerm;
+use crate::likelihood::laplace::{LaplaceFit, maximise};
+use crate::likelihood::multilateration::{UnassignedPeak, UnassignedPeaks};
+use crate::simulate::traced_pair::{Arrival, IsolatedReflection};
+use crate::simulate::views::ArrivalView;
+
+/// Images nearer to each other than this are one, in metres.
+const SAME_M: f64 = 0.3;
+
+fn apart_m(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// A reflection that an effect adds, and how its time and its height change with parameters.
+pub(super) struct AddedArrival {
+    pub time_s: f64,
+    pub slopes: Vec<(usize, f64)>,
+    pub level_db: f64,
+    pub level_slopes: Vec<(usize, f64)>,
+}
+
+impl<'a> ArrivalModel<'a> {
+    /// Reflections that effects add to a pair.
+    pub(super) fn added(&self, values: &[f64], pair: usize) -> Vec<AddedArrival> {
+        let one = |placed: &ModelTerm<'_>| {
+            let survey = self.data.survey;
+            let range = placed.first..placed.first + placed.parameters.len();
+            let added = placed.case.added_reflection(&values[range.clone()], survey, pair)?;
+            // What comes from where a predicted reflection comes from is that one: a wall must not be found a second time.
+            let image = |direction: [f64; 3], length_m: f64| direction.map(|d| d * length_m);
+            let own = image(added.arrival, added.length_m);
+            if self.data.arrivals[pair].iter().any(|a| apart_m(own, image(a.arrival, a.length_m)) < SAME_M) {
+                return None;
+            }
+            let arrival = Arrival {
+                length_m: added.length_m,
+                departure: added.departure,
+                arrival: added.arrival,
+                energy: 0.0,
+            };
+            let (time_s, mut slopes) = self.time(values, pair, &arrival, true);
+            let mut level_slopes = Vec::new();
+            for index in range.clone() {
+                let step = 1e-4 * self.priors[index].sd;
+                let at = |offset: f64| {
+                    let mut moved = values[range.clone()].to_vec();
+                    moved[index - range.start] += offset;
+                    placed.case.added_reflection(&moved, survey, pair)
+                };
+                if let (Some(up), Some(down)) = (at(step), at(-step)) {
+                    slopes.push((
+                        index,
+                        (up.length_m - down.length_m) / (2.0 * step) / self.data.speed_m_s[pair],
+                    ));
+                    level_slopes.push((index, (up.level_db - down.level_db) / (2.0 * step)));
+                }
+            }
+            Some(AddedArrival { time_s, slopes, level_db: added.level_db, level_slopes })
+        };
+        self.effects.iter().filter_map(one).collect()
+    }
+
+    /// When reflections that effects add come, in seconds of the file.
+    pub fn added_s(&self, values: &[f64], pair: usize) -> Vec<f64> {
+        self.added(values, pair).iter().map(|m| m.time_s).collect()
+    }
+
+    /// Peaks with the length of their way and the probability that nothing predicted explains them.
+    fn strays(&self, values: &[f64]) -> UnassignedPeaks<'a> {
+        let peaks = (0..self.assignment.len())
+            .map(|pair| {
+                let Some((direct, later)) = self.data.arrivals[pair].split_first() else { return Vec::new() };
+                if !self.used[pair] {
+                    return Vec::new();
+                }
+                let amplitude: f64 = later.iter().map(|a| a.energy.sqrt()).sum();
+                let times: Vec<f64> = later.iter().map(|a| self.time(values, pair, a, false).0).collect();
+                let direct_s = self.time(values, pair, direct, false).0;
+                let measured = &self.data.measured[self.assignment[pair]];
+                let one = |peak: &f64| {
+                    let explained: f64 = later
+                        .iter()
+                        .zip(&times)
+                        .map(|(a, t)| a.energy.sqrt() / amplitude * normal(peak - t, REFLECTION_SD_S))
+                        .sum();
+                    let stray = STRAY_SHARE / PEAKS_S;
+                    UnassignedPeak {
+                        length_m: direct.length_m + (peak - direct_s) * self.data.speed_m_s[pair],
+                        stray: stray / (stray + (1.0 - STRAY_SHARE) * explained),
+                    }
+                };
+                measured.peaks_s.iter().map(one).collect()
+            })
+            .collect();
+        UnassignedPeaks { survey: self.data.survey, peaks }
+    }
+
+    /// How much later than its way says a path comes under fitted values, in seconds, latency left out. Places and temperatures
+    /// that were found are in the ways already: what is fitted for them does not count again.
+    pub fn later_s(&self, values: &[f64], pair: usize, single: &IsolatedReflection) -> f64 {
+        let response = &self.data.survey.responses[pair];
+        let speed_m_s = self.data.speed_m_s[pair];
+        let view = ArrivalView {
+            survey: self.data.survey,
+            pair,
+            length_m: single.length_m,
+            speed_m_s,
+            departure: single.departure,
+            arrival: single.arrival,
+        };
+        let moved: Vec<Nuisance> =
+            self.effects.iter().flat_map(|p| p.case.relaxes()).map(|(nuisance, _)| nuisance).collect();
+        let mut later_s = 0.0;
+        for placed in &self.effects {
+            let own = &values[placed.first..placed.first + placed.parameters.len()];
+            if placed.case.warmer_by_k(own, self.data.survey) == 0.0 {
+                later_s += placed.case.delay_s(own, &view);
+            }
+        }
+        for (place, first, direction) in [
+            (Nuisance::SourcePosition(response.source), self.source_index(response.source), single.departure),
+            (
+                Nuisance::ReceiverPosition(response.receiver),
+                self.receiver_index(response.receiver),
+                single.arrival,
+            ),
+        ] {
+            if !moved.contains(&place) {
+                later_s -= (0..3).map(|k| direction[k] * values[first + k]).sum::<f64>() / speed_m_s;
+            }
+        }
+        later_s
+    }
+}
+
+/// Fits without the case at `place`, then with it from wherever the peaks that are left point; the best end counts.
+pub(super) fn fit(
+    data: &ArrivalData<'_>,
+    cases: &[&dyn Case],
+    used: &[bool],
+    place: usize,
+) -> Result<(LaplaceFit, Vec<usize>), Error> {
+    let mut others = cases.to_vec();
+    let sought = others.remove(place);
+    let (known, known_firsts) = super::fit(data, &others, used)?;
+    let starts = sought.starts_among(&at_fit(data, &others, used).strays(&known.values));
+    let mut model = ArrivalModel::new(data, cases, used);
+    let mut origin: Vec<f64> = model.priors.iter().map(|p| p.mean).collect();
+    let nuisances = known_firsts.first().copied().unwrap_or(known.values.len());
+    origin[..nuisances].copy_from_slice(&known.values[..nuisances]);
+    for (i, placed) in model.effects.iter().enumerate().filter(|(i, _)| *i != place) {
+        let first = known_firsts[if i < place { i } else { i - 1 }];
+        let count = placed.parameters.len();
+        origin[placed.first..placed.first + count].copy_from_slice(&known.values[first..first + count]);
+    }
+    let own = model.effects[place].first;
+    let mut best: Option<LaplaceFit> = None;
+    // Where nothing points anywhere, the case is fitted where it does no harm.
+    let nowhere = vec![origin[own..own + model.effects[place].parameters.len()].to_vec()];
+    for start in if starts.is_empty() { &nowhere } else { &starts } {
+        let mut x = origin.clone();
+        x[own..own + start.len()].copy_from_slice(start);
+        let mut found = None;
+        for width_s in &WIDTHS_S[1..] {
+            model.width_s = Some(*width_s);
+            let top = maximise(&model, &x, "arrival times")?;
+            x = top.values.clone();
+            found = Some(top);
+        }
+        if let Some(found) = found.filter(|f| best.as_ref().is_none_or(|b| f.log_evidence > b.log_evidence)) {
+            best = Some(found);
+        }
+    }
+    let firsts = model.effects.iter().map(|p| p.first).collect();
+    best.map(|b| (b, firsts)).ok_or(Error::Singular { what: "arrival times" })
+}

@@ -1,0 +1,463 @@
+//! How probable measured energies are under materials, gains and effects.
+//!
+//! In each time bin the measured energy E is Gamma distributed about the predicted M with shape 1 / (relative variance), as
+//! the energy of band-limited noise is (Kuttruff, Room Acoustics, 6th ed., 3.5), and the prediction's own Monte-Carlo error makes it wider.
+
+mod fit;
+mod variance;
+
+pub(crate) use fit::{WarmStart, fit};
+
+use crate::effect::{Case, Nuisance, Parameter, Stage};
+use crate::likelihood::laplace::{Model, Prior, Slopes};
+use crate::observe::observed_response::Measured;
+use crate::simulate::reflection_reweighting::HitChanges;
+use crate::simulate::traced_pair::BandState;
+use crate::simulate::views::BandView;
+use crate::statistics::{HUBER_LOG_RATIO, log_density, median};
+use crate::survey::Survey;
+use rayon::prelude::*;
+use sabine_acoustics::Levels;
+
+/// Logarithm of energy in one decibel.
+const LN_PER_DB: f64 = std::f64::consts::LN_10 / 10.0;
+/// Energy below the reference by so much counts as this much, measured or predicted: digital silence has no logarithm.
+const SILENCE: f64 = 1e-9;
+/// Gain of a whole recording whose level means nothing, in dB.
+const FREE_GAIN_DB: f64 = 40.0;
+/// Step of differences, in prior standard deviations (or logarithms of energy).
+const STEP: f64 = 1e-4;
+/// Bins in which unknown gains are first read.
+const EARLY_BINS: usize = 8;
+/// Pairs whose likelihood one thread sums.
+const PAIRS_AT_ONCE: usize = 3;
+/// Bounds of absorption.
+pub(crate) const ABSORPTION: (f64, f64) = (0.002, 0.98);
+
+/// What all energy models of one diagnosis share.
+pub(crate) struct EnergyData<'a> {
+    pub survey: &'a Survey,
+    pub measured: &'a [Measured],
+    /// Predictions, `[pair][band]`, expanded about `absorption`.
+    pub states: &'a [Vec<BandState>],
+    /// Bins to compare, `[pair][band]`.
+    pub ends: &'a [Vec<usize>],
+    pub direct_s: &'a [f64],
+    /// Energy to which added sound refers, by band.
+    pub reference: &'a [f64],
+    /// Absorption of the expansion, `[material][band]`.
+    pub absorption: &'a [Vec<f64>],
+    /// What is known of it.
+    pub priors: &'a [Vec<Prior>],
+    pub gain_sd_db: f64,
+    /// Factor by which variances exceed what is expected, by band.
+    pub dispersion: &'a [f64],
+}
+
+/// An effect in a model, and where its parameters stand.
+pub(crate) struct ModelTerm<'a> {
+    pub case: &'a dyn Case,
+    pub parameters: Vec<Parameter>,
+    pub first: usize,
+    /// Number of the case, as the caller counts.
+    pub order: usize,
+}
+
+pub(crate) struct EnergyModel<'a> {
+    data: &'a EnergyData<'a>,
+    pub effects: Vec<ModelTerm<'a>>,
+    priors: Vec<Prior>,
+    /// Pairs that count.
+    used: &'a [bool],
+    /// Which response holds which pair.
+    assignment: Vec<usize>,
+    common_gain: Option<usize>,
+    first_gain: usize,
+}
+
+/// One compared bin.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BinResidual {
+    pub pair: usize,
+    pub band: usize,
+    pub bin: usize,
+    /// Logarithm of measured over predicted energy.
+    pub ln_ratio: f64,
+    pub ln_predicted: f64,
+    /// Expected relative variance, dispersion left out.
+    pub variance: f64,
+}
+
+impl<'a> EnergyModel<'a> {
+    pub fn new(data: &'a EnergyData<'a>, cases: &[&'a dyn Case], used: &'a [bool]) -> Self {
+        let survey = data.survey;
+        let bands = survey.bands.len();
+        let mut priors: Vec<Prior> = Vec::new();
+        for material in data.priors {
+            priors.extend_from_slice(&material[..bands]);
+        }
+        let levels = survey.measurement.levels;
+        let common_gain = (levels == Levels::Common).then(|| {
+            priors.push(Prior::normal(0.0, FREE_GAIN_DB));
+            priors.len() - 1
+        });
+        let first_gain = priors.len();
+        let sd = if levels == Levels::PerResponse { FREE_GAIN_DB } else { data.gain_sd_db };
+        priors.extend(survey.responses.iter().map(|_| Prior::normal(0.0, sd)));
+        let mut ordered: Vec<(usize, &dyn Case)> = cases.iter().copied().enumerate().collect();
+        ordered.sort_by_key(|(_, c)| c.stage());
+        let mut assignment: Vec<usize> = (0..survey.responses.len()).collect();
+        let mut effects = Vec::new();
+        for (order, case) in ordered {
+            for (nuisance, sd) in case.relaxes() {
+                match nuisance {
+                    Nuisance::Absorption(material) => {
+                        priors[material * bands..(material + 1) * bands]
+                            .iter_mut()
+                            .for_each(|p| p.sd = p.sd.max(sd));
+                    }
+                    Nuisance::ResponseGain(response) => {
+                        let prior = &mut priors[first_gain + response];
+                        prior.sd = prior.sd.max(sd);
+                    }
+                    Nuisance::SourcePosition(_) | Nuisance::ReceiverPosition(_) => {}
+                }
+            }
+            if let Some((a, b)) = case.exchanged() {
+                assignment.swap(a, b);
+            }
+            let parameters = case.parameters(survey);
+            let first = priors.len();
+            priors.extend(parameters.iter().map(|p| Prior {
+                mean: p.neutral,
+                sd: p.prior_sd,
+                low: p.bounds.0,
+                high: p.bounds.1,
+            }));
+            effects.push(ModelTerm { case, parameters, first, order });
+        }
+        Self { data, effects, priors, used, assignment, common_gain, first_gain }
+    }
+
+    /// Values to start from: those of another fit as far as they go, and the effect's.
+    pub fn start(&self, before: Option<&[f64]>) -> Vec<f64> {
+        let mut x: Vec<f64> = self.priors.iter().map(|p| p.mean).collect();
+        if let Some(before) = before {
+            let n = self.nuisances().min(before.len());
+            x[..n].copy_from_slice(&before[..n]);
+        }
+        x
+    }
+
+    /// Unknown gains begin where early energies meet: from tens of decibels off, steps would be many.
+    fn start_gains(&self, values: &mut [f64]) {
+        let off_db = |pair: usize| {
+            let ratios: Vec<f64> = (0..self.data.survey.bands.len())
+                .filter_map(|band| {
+                    let energies = self.compared(pair, band)?;
+                    let count = energies.len().min(EARLY_BINS);
+                    let measured: f64 = energies[..count].iter().sum();
+                    let predicted: f64 =
+                        self.data.states[pair][band].ln_energy[..count].iter().map(|l| l.exp()).sum();
+                    (measured > 0.0 && predicted > 0.0).then(|| (measured / predicted).ln() / LN_PER_DB)
+                })
+                .collect();
+            median(ratios)
+        };
+        let pairs: Vec<usize> = (0..self.assignment.len()).filter(|&p| self.used[p]).collect();
+        if let Some(index) = self.common_gain {
+            values[index] = median(pairs.iter().map(|&p| off_db(p)).collect());
+        } else if self.data.survey.measurement.levels == Levels::PerResponse {
+            for pair in pairs {
+                values[self.first_gain + self.assignment[pair]] = off_db(pair);
+            }
+        }
+    }
+
+    /// Parameters before those of the effects.
+    pub fn nuisances(&self) -> usize {
+        self.first_gain + self.data.survey.responses.len()
+    }
+
+    pub fn gain_index(&self, response: usize) -> usize {
+        self.first_gain + response
+    }
+
+    /// Where the parameters of the case with this number start.
+    pub fn first_of(&self, order: usize) -> usize {
+        self.effects.iter().find(|p| p.order == order).map_or(self.priors.len(), |p| p.first)
+    }
+
+    /// From the octave's own energy to what its filter passes: effects up to the microphone act on the octave and on what
+    /// leaks in from its neighbours, each as it is; the rest on their sum.
+    fn apply(&self, values: &[f64], view: &BandView<'_>, gain_db: f64, ln_energy: &mut [f64]) {
+        let effects = |early: bool, view: &BandView<'_>, ln_energy: &mut [f64]| {
+            for placed in self.effects.iter().filter(|p| (p.case.stage() <= Stage::Transducer) == early) {
+                let own = &values[placed.first..placed.first + placed.parameters.len()];
+                placed.case.energy(own, view, ln_energy);
+            }
+        };
+        effects(true, view, ln_energy);
+        let mut sums: Vec<f64> = ln_energy.iter().map(|l| view.state.own_share * l.exp()).collect();
+        for (band, share, leak) in &view.state.leaks {
+            let mut leak: Vec<f64> = leak[..sums.len()].iter().map(|l| l + gain_db * LN_PER_DB).collect();
+            let reference = self.data.reference[*band];
+            effects(true, &BandView { band: *band, reference, ..*view }, &mut leak);
+            sums.iter_mut().zip(&leak).for_each(|(s, l)| *s += share * l.exp());
+        }
+        ln_energy.iter_mut().zip(&sums).for_each(|(l, s)| *l = s.max(1e-300).ln());
+        effects(false, view, ln_energy);
+        let silence = (SILENCE * view.reference).ln();
+        ln_energy.iter_mut().for_each(|l| *l = l.max(silence));
+    }
+
+    fn gain_db(&self, values: &[f64], pair: usize) -> f64 {
+        values[self.first_gain + self.assignment[pair]] + self.common_gain.map_or(0.0, |index| values[index])
+    }
+
+    /// Logarithm of the energy of the paths in one band at these materials and gains, before any effect, and, where wanted, its change
+    /// with the absorption of each material, `[bin * materials + material]`.
+    fn paths(
+        &self,
+        values: &[f64],
+        (pair, band): (usize, usize),
+        count: usize,
+        sloping: bool,
+    ) -> (Vec<f64>, Vec<f64>) {
+        let bands = self.data.survey.bands.len();
+        let m = self.data.absorption.len();
+        let state = &self.data.states[pair][band];
+        let shift: Vec<f64> = (0..m)
+            .map(|k| ((1.0 - values[k * bands + band]) / (1.0 - self.data.absorption[k][band])).ln())
+            .collect();
+        let moved = shift.iter().any(|s| *s != 0.0);
+        let gain = self.gain_db(values, pair) * LN_PER_DB;
+        let mut ln_energy = Vec::with_capacity(count);
+        let mut slopes = Vec::with_capacity(if sloping { count * m } else { 0 });
+        let mut mean_hits = vec![0.0; m];
+        for bin in 0..count {
+            let mut energy = 0.0;
+            mean_hits.fill(0.0);
+            for group in state.groups[bin]..state.groups[bin + 1] {
+                let hits = &state.group_hits[group * m..(group + 1) * m];
+                let mut e = state.group_energy[group];
+                if moved {
+                    e *= hits.iter().zip(&shift).map(|(n, s)| n * s).sum::<f64>().exp();
+                }
+                energy += e;
+                if sloping {
+                    mean_hits.iter_mut().zip(hits).for_each(|(sum, n)| *sum += e * n);
+                }
+            }
+            ln_energy.push(energy.ln() + gain);
+            if sloping {
+                slopes.extend((0..m).map(|k| -mean_hits[k] / (energy * (1.0 - values[k * bands + band]))));
+            }
+        }
+        (ln_energy, slopes)
+    }
+
+    fn view<'v>(
+        &'v self,
+        (pair, band): (usize, usize),
+        gain_db: f64,
+        hit_changes: &'v HitChanges,
+    ) -> BandView<'v> {
+        BandView {
+            survey: self.data.survey,
+            pair,
+            response: self.assignment[pair],
+            band,
+            state: &self.data.states[pair][band],
+            direct_s: self.data.direct_s[pair],
+            reference: self.data.reference[band],
+            gain: (gain_db * LN_PER_DB).exp(),
+            hit_changes,
+        }
+    }
+
+    /// Bins that are compared, and their measured energies.
+    pub fn compared(&self, pair: usize, band: usize) -> Option<&[f64]> {
+        let energies = self.data.measured[self.assignment[pair]].energies[band].as_deref()?;
+        let count = self.data.ends[pair][band].min(energies.len());
+        (count > 0).then(|| &energies[..count])
+    }
+
+    /// Logarithm of the predicted energy in the bins of a pair and band, as many as are compared.
+    pub fn predicted(&self, values: &[f64], pair: usize, band: usize, count: usize) -> Vec<f64> {
+        let (mut ln_energy, _) = self.paths(values, (pair, band), count, false);
+        let gain_db = self.gain_db(values, pair);
+        let changes = HitChanges::default();
+        self.apply(values, &self.view((pair, band), gain_db, &changes), gain_db, &mut ln_energy);
+        ln_energy
+    }
+
+    /// All compared bins of the given pairs.
+    pub fn residuals(&self, values: &[f64], pairs: impl Iterator<Item = usize>) -> Vec<BinResidual> {
+        let mut found = Vec::new();
+        for pair in pairs {
+            for band in 0..self.data.survey.bands.len() {
+                let Some(energies) = self.compared(pair, band) else { continue };
+                let predicted = self.predicted(values, pair, band, energies.len());
+                let silence = SILENCE * self.data.reference[band];
+                let variances = self.variances(values, pair, band, energies.len());
+                for (bin, (&e, &ln_predicted)) in energies.iter().zip(&predicted).enumerate() {
+                    found.push(BinResidual {
+                        pair,
+                        band,
+                        bin,
+                        ln_ratio: e.max(silence).ln() - ln_predicted,
+                        ln_predicted,
+                        variance: variances[bin],
+                    });
+                }
+            }
+        }
+        found
+    }
+
+    /// Log-likelihood of one pair and band.
+    fn band_likelihood(&self, values: &[f64], pair: usize, band: usize, slopes: Option<&mut Slopes>) -> f64 {
+        let Some(energies) = self.compared(pair, band) else { return 0.0 };
+        let count = energies.len();
+        let bands = self.data.survey.bands.len();
+        let m = self.data.absorption.len();
+        let gain_db = self.gain_db(values, pair);
+        let changes = HitChanges::default();
+        let view = self.view((pair, band), gain_db, &changes);
+        let (paths, path_slopes) = self.paths(values, (pair, band), count, slopes.is_some());
+        let mut predicted = paths.clone();
+        self.apply(values, &view, gain_db, &mut predicted);
+        let silence = SILENCE * self.data.reference[band];
+        let dispersion = self.data.dispersion[band];
+        let variances = self.variances(values, pair, band, count);
+        let shape = |bin: usize| 1.0 / (variances[bin] * dispersion);
+        let ln_ratio: Vec<f64> =
+            energies.iter().zip(&predicted).map(|(e, p)| e.max(silence).ln() - p).collect();
+        let one = |(bin, &z): (usize, &f64)| shape(bin) * log_density(z);
+        let likelihood: f64 = ln_ratio.iter().enumerate().map(one).sum();
+        let value = likelihood + self.tops((pair, band), &variances);
+        let Some(slopes) = slopes else { return value };
+
+        // Columns that matter in this band, and the change of the predicted logarithm with each.
+        let mut columns: Vec<usize> = (0..m).map(|k| k * bands + band).collect();
+        let through = self.through(values, &view, gain_db, &paths);
+        let mut rows: Vec<Vec<f64>> =
+            (0..m).map(|k| (0..count).map(|bin| path_slopes[bin * m + k] * through[bin]).collect()).collect();
+        // What bends around edges has the same gain.
+        let gained = if view.state.diffracted.is_empty() {
+            through
+        } else {
+            self.with_gain(values, &view, gain_db, &paths)
+        };
+        let gain: Vec<f64> = gained.iter().map(|t| t * LN_PER_DB).collect();
+        if let Some(index) = self.common_gain {
+            columns.push(index);
+            rows.push(gain.clone());
+        }
+        columns.push(self.first_gain + self.assignment[pair]);
+        rows.push(gain);
+        for placed in &self.effects {
+            for (i, p) in placed.parameters.iter().enumerate() {
+                if p.band.is_none_or(|own| own == band) {
+                    columns.push(placed.first + i);
+                    rows.push(self.difference(values, placed.first + i, &view, gain_db, &paths));
+                }
+            }
+        }
+        for bin in 0..count {
+            let weight = shape(bin);
+            let pull = weight * (ln_ratio[bin].min(HUBER_LOG_RATIO).exp() - 1.0);
+            for (i, &a) in columns.iter().enumerate() {
+                let slope = rows[i][bin];
+                if slope == 0.0 {
+                    continue;
+                }
+                slopes.gradient[a] += pull * slope;
+                for (j, &b) in columns[..=i].iter().enumerate() {
+                    let product = weight * slope * rows[j][bin];
+                    slopes.information[(a, b)] += product;
+                    if a != b {
+                        slopes.information[(b, a)] += product;
+                    }
+                }
+            }
+        }
+        self.add_variance_slopes(values, (pair, band), &variances, &ln_ratio, slopes);
+        value
+    }
+
+    /// How much of a change of the paths' energy comes through the effects.
+    fn through(&self, values: &[f64], view: &BandView<'_>, gain_db: f64, paths: &[f64]) -> Vec<f64> {
+        let at = |offset: f64| {
+            let mut moved: Vec<f64> = paths.iter().map(|p| p + offset).collect();
+            self.apply(values, view, gain_db, &mut moved);
+            moved
+        };
+        at(STEP).iter().zip(at(-STEP)).map(|(up, down)| (up - down) / (2.0 * STEP)).collect()
+    }
+
+    /// The same of a change of the gain, with which goes what does not come along the paths.
+    fn with_gain(&self, values: &[f64], view: &BandView<'_>, gain_db: f64, paths: &[f64]) -> Vec<f64> {
+        let at = |offset: f64| {
+            let mut moved: Vec<f64> = paths.iter().map(|p| p + offset).collect();
+            let view = BandView { gain: view.gain * offset.exp(), ..*view };
+            self.apply(values, &view, gain_db + offset / LN_PER_DB, &mut moved);
+            moved
+        };
+        at(STEP).iter().zip(at(-STEP)).map(|(up, down)| (up - down) / (2.0 * STEP)).collect()
+    }
+
+    /// Change of the predicted logarithm with a parameter of an effect.
+    fn difference(
+        &self,
+        values: &[f64],
+        index: usize,
+        view: &BandView<'_>,
+        gain_db: f64,
+        paths: &[f64],
+    ) -> Vec<f64> {
+        let prior = self.priors[index];
+        let step = STEP * prior.sd;
+        let at = |offset: f64| {
+            let mut moved = values.to_vec();
+            moved[index] = (moved[index] + offset).clamp(prior.low, prior.high);
+            let mut ln_energy = paths.to_vec();
+            self.apply(&moved, view, gain_db, &mut ln_energy);
+            (moved[index], ln_energy)
+        };
+        let ((high, up), (low, down)) = (at(step), at(-step));
+        if high <= low {
+            return vec![0.0; paths.len()];
+        }
+        up.iter().zip(down).map(|(u, d)| (u - d) / (high - low)).collect()
+    }
+}
+
+impl Model for EnergyModel<'_> {
+    fn priors(&self) -> &[Prior] {
+        &self.priors
+    }
+
+    fn log_likelihood(&self, values: &[f64], slopes: Option<&mut Slopes>) -> f64 {
+        let pairs: Vec<usize> = (0..self.assignment.len()).filter(|&p| self.used[p]).collect();
+        let bands = 0..self.data.survey.bands.len();
+        let (sloping, n) = (slopes.is_some(), self.priors.len());
+        // Parts of a fixed size, added up in order: the sum is the same on any number of threads.
+        let parts: Vec<(f64, Option<Slopes>)> = pairs
+            .par_chunks(PAIRS_AT_ONCE)
+            .map(|pairs| {
+                let mut own = sloping.then(|| Slopes::zero(n));
+                let mut sum = 0.0;
+                for (&pair, band) in pairs.iter().flat_map(|p| bands.clone().map(move |b| (p, b))) {
+                    sum += self.band_likelihood(values, pair, band, own.as_mut());
+                }
+                (sum, own)
+            })
+            .collect();
+        if let Some(slopes) = slopes {
+            parts.iter().flat_map(|p| &p.1).for_each(|own| slopes.add(own));
+        }
+        parts.iter().map(|p| p.0).sum()
+    }
+}

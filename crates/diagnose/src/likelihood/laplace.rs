@@ -1,0 +1,221 @@
+//! The most probable parameters of a model, how sure they are, and how probable the model makes the data.
+
+use crate::error::Error;
+use nalgebra::{DMatrix, DVector};
+
+/// What is known of a parameter beforehand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Prior {
+    pub mean: f64,
+    pub sd: f64,
+    pub low: f64,
+    pub high: f64,
+}
+
+impl Prior {
+    pub fn normal(mean: f64, sd: f64) -> Self {
+        Self { mean, sd, low: f64::NEG_INFINITY, high: f64::INFINITY }
+    }
+}
+
+/// Derivatives of a log-likelihood: its gradient, and the expected curvature (Fisher information).
+pub(crate) struct Slopes {
+    pub gradient: DVector<f64>,
+    pub information: DMatrix<f64>,
+}
+
+impl Slopes {
+    /// Of `n` parameters, none so far.
+    pub fn zero(n: usize) -> Self {
+        Self { gradient: DVector::zeros(n), information: DMatrix::zeros(n, n) }
+    }
+
+    pub fn add(&mut self, other: &Self) {
+        self.gradient += &other.gradient;
+        self.information += &other.information;
+    }
+}
+
+/// A log-likelihood of parameters with priors.
+pub(crate) trait Model {
+    fn priors(&self) -> &[Prior];
+    /// Log-likelihood, its slopes added where wanted.
+    fn log_likelihood(&self, values: &[f64], slopes: Option<&mut Slopes>) -> f64;
+}
+
+/// Where a model is most probable.
+#[derive(Clone, Debug)]
+pub(crate) struct LaplaceFit {
+    pub values: Vec<f64>,
+    pub log_likelihood: f64,
+    /// The same with the priors' penalties, constants left out.
+    pub log_posterior: f64,
+    pub covariance: DMatrix<f64>,
+    /// Logarithm of the probability of the data, the parameters integrated out (Laplace: MacKay 2003, chapter 27).
+    pub log_evidence: f64,
+    /// Whether the search came to rest; else it took what it had.
+    pub converged: bool,
+}
+
+impl LaplaceFit {
+    pub fn sd(&self, i: usize) -> f64 {
+        self.covariance[(i, i)].max(0.0).sqrt()
+    }
+}
+
+const MAX_STEPS: usize = 40;
+/// A step shorter than this many prior standard deviations ends the search ...
+const TOLERANCE: f64 = 0.02;
+/// ... if it gains less than this, in nats.
+const GAIN_NATS: f64 = 0.02;
+
+/// Levenberg-Marquardt on the log-posterior within bounds.
+pub(crate) fn maximise(model: &dyn Model, start: &[f64], what: &'static str) -> Result<LaplaceFit, Error> {
+    let priors = model.priors();
+    let n = priors.len();
+    let penalty =
+        |x: &[f64]| -> f64 { x.iter().zip(priors).map(|(x, p)| -0.5 * ((x - p.mean) / p.sd).powi(2)).sum() };
+    let mut x: Vec<f64> = start.iter().zip(priors).map(|(x, p)| x.clamp(p.low, p.high)).collect();
+    let [mut slopes, mut tried_slopes] = [(); 2].map(|()| Slopes::zero(n));
+    let mut damping = 1e-3;
+    let mut converged = false;
+    let mut likelihood = fill(model, &x, &mut slopes);
+    for _ in 0..MAX_STEPS {
+        let value = likelihood + penalty(&x);
+        let gradient = &slopes.gradient
+            + DVector::from_iterator(n, x.iter().zip(priors).map(|(x, p)| (p.mean - x) / (p.sd * p.sd)));
+        let held: Vec<bool> = (0..n)
+            .map(|i| {
+                (x[i] <= priors[i].low && gradient[i] < 0.0) || (x[i] >= priors[i].high && gradient[i] > 0.0)
+            })
+            .collect();
+        let mut accepted = None;
+        while damping < 1e8 {
+            let mut h = slopes.information.clone();
+            let mut g = gradient.clone();
+            for i in 0..n {
+                let own = h[(i, i)] + priors[i].sd.powi(-2);
+                h[(i, i)] = own * (1.0 + damping);
+                if held[i] {
+                    h.row_mut(i).fill(0.0);
+                    h.column_mut(i).fill(0.0);
+                    h[(i, i)] = 1.0;
+                    g[i] = 0.0;
+                }
+            }
+            let step = h.cholesky().ok_or(Error::Singular { what })?.solve(&g);
+            let tried: Vec<f64> =
+                (0..n).map(|i| (x[i] + step[i]).clamp(priors[i].low, priors[i].high)).collect();
+            // Most steps are taken: their slopes are wanted next.
+            let found = fill(model, &tried, &mut tried_slopes);
+            let gain = found + penalty(&tried) - value;
+            let length = (0..n).map(|i| ((tried[i] - x[i]) / priors[i].sd).abs()).fold(0.0, f64::max);
+            if gain.is_finite() && gain >= -1e-9 {
+                accepted = Some((tried, found, length, gain));
+                damping = (damping * 0.2).max(1e-9);
+                break;
+            }
+            if length < 1e-9 {
+                break;
+            }
+            damping = damping.max(1e-4) * 10.0;
+        }
+        let Some((next, found, length, gain)) = accepted else {
+            // No step gains anything: this is the top as far as numbers can tell.
+            converged = true;
+            break;
+        };
+        (x, likelihood) = (next, found);
+        std::mem::swap(&mut slopes, &mut tried_slopes);
+        if length < TOLERANCE && gain < GAIN_NATS {
+            converged = true;
+            break;
+        }
+    }
+    let mut h = slopes.information;
+    for i in 0..n {
+        h[(i, i)] += priors[i].sd.powi(-2);
+    }
+    let factor = h.cholesky().ok_or(Error::Singular { what })?;
+    let half_log_determinant: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
+    let log_sd: f64 = priors.iter().map(|p| p.sd.ln()).sum();
+    let log_posterior = likelihood + penalty(&x);
+    Ok(LaplaceFit {
+        values: x,
+        log_likelihood: likelihood,
+        log_posterior,
+        covariance: factor.inverse(),
+        log_evidence: log_posterior - half_log_determinant - log_sd,
+        converged,
+    })
+}
+
+fn fill(model: &dyn Model, x: &[f64], slopes: &mut Slopes) -> f64 {
+    slopes.gradient.fill(0.0);
+    slopes.information.fill(0.0);
+    model.log_likelihood(x, Some(slopes))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)] // a panic is how a test fails
+    use super::*;
+
+    /// Measurements of a line, with known error: everything has a closed form.
+    struct Line {
+        priors: Vec<Prior>,
+        data: Vec<(f64, f64)>,
+        sd: f64,
+    }
+
+    impl Model for Line {
+        fn priors(&self) -> &[Prior] {
+            &self.priors
+        }
+
+        fn log_likelihood(&self, x: &[f64], slopes: Option<&mut Slopes>) -> f64 {
+            let mut value = 0.0;
+            let mut own = Slopes::zero(2);
+            for (t, y) in &self.data {
+                let row = DVector::from_vec(vec![1.0, *t]);
+                let residual = (y - x[0] - x[1] * t) / self.sd;
+                value -= 0.5 * residual * residual + self.sd.ln() + 0.5 * std::f64::consts::TAU.ln();
+                own.gradient += &row * (residual / self.sd);
+                own.information += &row * row.transpose() / (self.sd * self.sd);
+            }
+            if let Some(slopes) = slopes {
+                slopes.gradient += own.gradient;
+                slopes.information += own.information;
+            }
+            value
+        }
+    }
+
+    #[test]
+    fn evidence_of_a_linear_model_is_that_of_the_joint_normal() {
+        let data = vec![(0.0, 0.4), (1.0, 1.9), (2.0, 2.2), (3.0, 4.1)];
+        let priors = vec![Prior::normal(0.5, 2.0), Prior::normal(0.0, 3.0)];
+        let line = Line { priors, data: data.clone(), sd: 0.7 };
+        let found = maximise(&line, &[0.0, 0.0], "a line").unwrap();
+        // y ~ N(A mean, A P A' + s2 I).
+        let a = DMatrix::from_fn(4, 2, |i, j| if j == 0 { 1.0 } else { data[i].0 });
+        let p = DMatrix::from_diagonal(&DVector::from_vec(vec![4.0, 9.0]));
+        let c = &a * &p * a.transpose() + DMatrix::identity(4, 4) * 0.49;
+        let r = DVector::from_fn(4, |i, _| data[i].1 - 0.5);
+        let quadratic = (r.transpose() * c.clone().try_inverse().unwrap() * &r)[(0, 0)];
+        let expected = -0.5 * (quadratic + c.determinant().ln() + 4.0 * std::f64::consts::TAU.ln());
+        assert!((found.log_evidence - expected).abs() < 1e-9, "{} {expected}", found.log_evidence);
+        assert!(found.converged);
+    }
+
+    #[test]
+    fn bounds_hold() {
+        let mut priors = vec![Prior::normal(0.0, 10.0), Prior::normal(0.0, 10.0)];
+        priors[1].high = 0.5;
+        let line = Line { priors, data: vec![(0.0, 0.0), (1.0, 2.0), (2.0, 4.0)], sd: 0.1 };
+        let found = maximise(&line, &[0.0, 0.0], "a line").unwrap();
+        assert_eq!(found.values[1], 0.5);
+        // The best level under that slope: the mean of y - t / 2.
+        assert!((found.values[0] - 1.5).abs() < 1e-3);
+    }
+}

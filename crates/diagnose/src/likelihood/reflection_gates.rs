@@ -1,0 +1,217 @@
+//! IsolatedReflection early reflections: their energy in a short gate about the instant at which they should come.
+//!
+//! What a gate holds is predicted from all exact paths that reach into it, each spread as the octave's filter spreads a pulse; its scatter is that
+//! of pulses with random signs, as for the time bins. Both are relative to the direct sound, gated in the same way.
+
+use crate::effect::{Case, Stage};
+use crate::infer::workbench::Workbench;
+use crate::observe::band_pulse::BandPulse;
+use crate::observe::early_energy::is_fast;
+use crate::simulate::reflection_reweighting::HitChanges;
+use crate::simulate::traced_pair::{BandState, IsolatedReflection};
+use crate::simulate::views::BandView;
+use crate::statistics::{add, ln_gamma_density};
+
+/// Half of a gate, in units of one over the bandwidth.
+const HALF_BANDWIDTH_TIMES: f64 = 0.7;
+/// Paths are known this well in time: a centimetre of way, in seconds.
+const TIME_SD_S: f64 = 3e-5;
+/// What a single reflection may be off by for other reasons, as a share of its energy: materials, edges of the gate.
+const MODEL_SD: f64 = 0.25;
+/// A gate in which the reflection has less than this share of the energy cannot tell whether it is there.
+const MIN_SHARE: f64 = 0.5;
+/// Share of reflections that are missing, or are of any strength, for reasons of their own.
+const ODD_SHARE: f64 = 0.02;
+/// Range of the logarithm of energy in which odd ones lie evenly.
+const ODD_RANGE: f64 = 9.0;
+/// What is left of a reflection that is missing, as a share of its energy: 13 dB.
+const LEFT: f64 = 0.05;
+
+/// One first-order reflection of one response.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ReflectionGate {
+    /// Index of its response.
+    pub response: usize,
+    /// Where it is reflected, in metres.
+    pub place_m: [f64; 3],
+    /// Index of its surface among [`Survey::planes`](crate::Survey::planes).
+    pub plane: usize,
+    /// How probable (logarithm, in nats) what was measured is if the surface is as the model says, odd reflections allowed for.
+    pub present_nats: f64,
+    /// The same if the reflection is missing.
+    pub missing_nats: f64,
+}
+
+/// Where the straight lines of departure and arrival meet: the reflection's place.
+fn meeting(source: [f64; 3], receiver: [f64; 3], single: &IsolatedReflection) -> [f64; 3] {
+    // With s + x d = r + (L - x) a in the mean over both lines.
+    let (d, a) = (single.departure, single.arrival);
+    let sum: [f64; 3] = std::array::from_fn(|k| d[k] + a[k]);
+    let rest: [f64; 3] = std::array::from_fn(|k| receiver[k] - source[k] + single.length_m * a[k]);
+    let (up, down) = (0..3).fold((0.0, 0.0), |(u, w), k| (u + sum[k] * rest[k], w + sum[k] * sum[k]));
+    let x = up / down.max(1e-12);
+    std::array::from_fn(|k| 0.5 * (source[k] + x * d[k] + receiver[k] + (single.length_m - x) * a[k]))
+}
+
+/// Gates of all first-order reflections of the pairs that count, under fitted absorption and the causes at work. `shift_s` is how much later
+/// than predicted the direct sound and each single of a pair come by the fit of the arrival times.
+pub(crate) fn gates(
+    bench: &Workbench,
+    cases: &[&dyn Case],
+    values: &[Vec<f64>],
+    absorption: &[f64],
+    shift_s: &[Vec<f64>],
+) -> Vec<ReflectionGate> {
+    let survey = &bench.survey;
+    let bands = survey.bands.len();
+    let assignment = bench.assignment(cases);
+    let mut found = Vec::new();
+    for (pair, (isolated_reflections, states)) in bench.isolated_reflections.iter().enumerate() {
+        if isolated_reflections.first().is_none_or(|s| s.order > 0)
+            || shift_s[pair].len() != isolated_reflections.len()
+        {
+            continue;
+        }
+        let measured = &bench.measured[assignment[pair]];
+        let response = &survey.responses[pair];
+        let source = survey.sources[response.source].position_m;
+        let receiver = survey.receivers[response.receiver].position_m;
+        // Energies relative to the direct sound, by band and single.
+        let energies: Vec<Vec<f64>> = (0..bands)
+            .map(|band| {
+                if !is_fast(survey.bands, band) {
+                    return Vec::new();
+                }
+                let state = &states[band];
+                let hit_changes = HitChanges::default();
+                let view = BandView {
+                    survey,
+                    pair,
+                    response: assignment[pair],
+                    band,
+                    state,
+                    direct_s: bench.direct_s[pair],
+                    reference: bench.reference[band],
+                    gain: 1.0,
+                    hit_changes: &hit_changes,
+                };
+                let mut ln = fitted(state, bench, absorption, band);
+                for (case, own) in cases.iter().zip(values).filter(|(c, _)| c.stage() == Stage::Room) {
+                    case.energy(own, &view, &mut ln);
+                }
+                let direct = ln[0];
+                ln.iter().map(|l| (l - direct).exp()).collect()
+            })
+            .collect();
+        let direct_s = measured.direct_s;
+        // Times in the file, the direct sound where it was found.
+        let times: Vec<f64> = isolated_reflections
+            .iter()
+            .zip(&shift_s[pair])
+            .map(|(s, shift)| direct_s + s.after_direct_s + shift - shift_s[pair][0])
+            .collect();
+        for (own, single) in isolated_reflections.iter().enumerate().filter(|(_, s)| s.order == 1) {
+            let place_m = meeting(source, receiver, single);
+            let normal: [f64; 3] = std::array::from_fn(|k| single.departure[k] + single.arrival[k]);
+            let size = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
+            let plane = survey.planes.iter().position(|p| {
+                let along: f64 = (0..3).map(|k| normal[k] * p.axes[0][k]).sum::<f64>() / size.max(1e-9);
+                let [u, v] = p.within(place_m);
+                p.distance_m(place_m) < 0.03
+                    && along.abs() > 0.999
+                    && (p.extent_m[0][0]..=p.extent_m[0][1]).contains(&u)
+                    && (p.extent_m[1][0]..=p.extent_m[1][1]).contains(&v)
+            });
+            let Some(plane) = plane else { continue };
+            let (mut there, mut gone, mut told) = (0.0, 0.0, 0usize);
+            for (band, energies) in energies.iter().enumerate().filter(|(_, e)| !e.is_empty()) {
+                let kernel = &bench.kernels[band];
+                let half_s = HALF_BANDWIDTH_TIMES / kernel.bandwidth_hz;
+                let at_direct = measured.early.gate(band, direct_s, half_s);
+                let at_own = measured.early.gate(band, times[own], half_s);
+                let (Some(reference), Some(energy)) = (at_direct.filter(|e| *e > 0.0), at_own) else {
+                    continue;
+                };
+                let Some([present, missing]) = expected(kernel, energies, &times, own, half_s) else {
+                    continue;
+                };
+                let of_direct = kernel.before(half_s) - kernel.before(-half_s);
+                let ratio = energy / reference * of_direct;
+                there += ln_gamma_density(ratio, present);
+                gone += ln_gamma_density(ratio, missing);
+                told += 1;
+            }
+            if told > 0 {
+                let even = -(told as f64) * ODD_RANGE.ln();
+                let odd = add(gone, even) + (0.5 * ODD_SHARE).ln();
+                found.push(ReflectionGate {
+                    response: pair,
+                    place_m,
+                    plane,
+                    present_nats: add(there + (1.0 - ODD_SHARE).ln(), odd),
+                    missing_nats: add(gone + (1.0 - ODD_SHARE).ln(), even + ODD_SHARE.ln()),
+                });
+            }
+        }
+    }
+    found
+}
+
+/// Logarithms of the isolated reflections' energies at fitted absorption.
+fn fitted(state: &BandState, bench: &Workbench, absorption: &[f64], band: usize) -> Vec<f64> {
+    let (materials, bands) = (bench.absorption.len(), bench.survey.bands.len());
+    let change: Vec<f64> = (0..materials)
+        .map(|m| ((1.0 - absorption[m * bands + band]) / (1.0 - bench.absorption[m][band])).ln())
+        .collect();
+    let one = |(i, l): (usize, &f64)| {
+        let hits = &state.group_hits[i * materials..(i + 1) * materials];
+        l + hits.iter().zip(&change).map(|(n, c)| n * c).sum::<f64>()
+    };
+    state.ln_energy.iter().enumerate().map(one).collect()
+}
+
+/// Mean and variance of the energy in the gate of a single, with it and without; none where it would hardly be missed.
+fn expected(
+    kernel: &BandPulse,
+    energies: &[f64],
+    times: &[f64],
+    own: usize,
+    half_s: f64,
+) -> Option<[(f64, f64); 2]> {
+    let share = |time_s: f64| {
+        let from = times[own] - time_s;
+        kernel.before(from + half_s) - kernel.before(from - half_s)
+    };
+    let mut reach: Vec<(f64, f64, bool)> = Vec::new();
+    let mut timing_variance = [0.0; 2];
+    for (i, (&energy, &time_s)) in energies.iter().zip(times).enumerate() {
+        if (time_s - times[own]).abs() > half_s + kernel.reach_s() {
+            continue;
+        }
+        let inside = share(time_s) * energy;
+        if inside > 1e-6 * energies[own] {
+            reach.push((time_s, inside, i == own));
+            let moved = 0.5 * (share(time_s + TIME_SD_S) - share(time_s - TIME_SD_S)) * energy;
+            timing_variance[0] += moved * moved;
+            timing_variance[1] += if i == own { 0.0 } else { moved * moved };
+        }
+    }
+    let within = reach.iter().find(|r| r.2).map_or(0.0, |r| r.1);
+    let all: f64 = reach.iter().map(|r| r.1).sum();
+    if within < MIN_SHARE * all {
+        return None;
+    }
+    Some([1.0, LEFT].map(|left| {
+        let scaled: Vec<(f64, f64)> =
+            reach.iter().map(|r| (r.0, if r.2 { r.1 * left } else { r.1 })).collect();
+        let mean: f64 = scaled.iter().map(|r| r.1).sum();
+        let mut variance = timing_variance[usize::from(left < 1.0)] + (MODEL_SD * mean).powi(2);
+        for (i, &(time_s, energy)) in scaled.iter().enumerate() {
+            for &(other_s, more) in &scaled[i + 1..] {
+                variance += 4.0 * energy * more * kernel.correlation_sq(other_s - time_s);
+            }
+        }
+        (mean, (variance / (mean * mean)).min(2.0))
+    }))
+}

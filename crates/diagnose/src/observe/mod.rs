@@ -1,0 +1,7 @@
+//! What is read from the measured responses.
+
+pub(crate) mod band_pulse;
+pub(crate) mod early_energy;
+pub(crate) mod observed_response;
+pub(crate) mod pre_arrival;
+pub(crate) mod time_bins;

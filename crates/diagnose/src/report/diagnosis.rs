@@ -1,0 +1,247 @@
+//! What a diagnosis says.
+
+use crate::extend::extended_model::ExtendedModel;
+use sabine_acoustics::{Bands, PerBand};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// The answer in one word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Verdict {
+    /// The simulation explains the measurement within its expected spread.
+    Adequate,
+    /// One or more causes are named.
+    Explained,
+    /// Several causes explain the misfit alike; see [`Diagnosis::alternatives`] and [`Diagnosis::would_decide`].
+    Ambiguous,
+    /// Something is wrong that no effect of the catalogue explains.
+    Unexplained,
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Adequate => "adequate",
+            Self::Explained => "explained",
+            Self::Ambiguous => "ambiguous",
+            Self::Unexplained => "unexplained",
+        })
+    }
+}
+
+/// Whether chance explains what is left.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct LackOfFit {
+    /// Probability of a misfit at least as large by chance, under the baseline, from simulated measurements.
+    pub p_value: f64,
+    /// The same once the named causes are at work.
+    pub p_value_explained: f64,
+    /// Observable for a smooth unnamed discrepancy beside the baseline, in nats.
+    pub discrepancy_nats: f64,
+    /// The same beside the named causes.
+    pub discrepancy_nats_explained: f64,
+    /// Variance of the compared bins over that expected, by octave, under the named causes (1: chance alone).
+    pub dispersion: Vec<f64>,
+}
+
+/// A parameter of a named cause.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct FoundParameter {
+    /// Name.
+    pub name: String,
+    /// Most probable value.
+    pub value: f64,
+    /// Ends of the 90 % interval.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// What is gained at positions that the fit has not seen.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct HeldOutGain {
+    /// Mean gain of the logarithm of the predictive density, per compared bin.
+    pub nats_per_bin: f64,
+    /// Ends of the 90 % interval of the mean over positions (bootstrap), per compared bin.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Root mean square error of the decay curves at held-out positions without the cause, in dB.
+    pub db_rmse_before: f64,
+    /// The same with it.
+    pub db_rmse_after: f64,
+}
+
+/// A named cause.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Cause {
+    /// Identifier in the catalogue.
+    pub effect: String,
+    /// What it concerns (a receiver, a material ...), where the effect has several cases.
+    pub subject: Option<String>,
+    /// One sentence for people.
+    pub explanation: String,
+    /// Posterior probability against its absence and all other effects, when it was named.
+    pub probability: f64,
+    /// Observable for it beside the other causes, in nats, before correction for the number tried.
+    pub nats: f64,
+    /// Its parameters.
+    pub parameters: Vec<FoundParameter>,
+    /// What it gains; `None` where no position could be held out.
+    pub held_out_gain: Option<HeldOutGain>,
+}
+
+/// How much speaks for one effect of the catalogue.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct CandidateScore {
+    /// Identifier.
+    pub effect: String,
+    /// Its best case.
+    pub subject: Option<String>,
+    /// Observable beside the baseline, corrected for the number of its cases, in nats.
+    pub nats: f64,
+    /// Size found beside the baseline in units of its standard deviation, materials and everything else left free (d').
+    pub d_prime: f64,
+    /// The same beside all named causes; `None` for those.
+    pub nats_beside_causes: Option<f64>,
+}
+
+/// Whether these positions can tell two effects apart, known before the residuals are looked at.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Isolability {
+    /// Identifiers of the two.
+    pub effects: [String; 2],
+    /// Cosine of the angle between their signatures once what is refitted has been projected out: 1 for twins, 0 for strangers.
+    pub cosine: f64,
+    /// Whether they can be told apart (cosine below 0.95).
+    pub separable: bool,
+    /// The measurement that would tell them apart.
+    pub would_decide: String,
+}
+
+/// A material after the fit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct FittedMaterial {
+    /// Absorption that the room file states (or the stand-in for an unknown one).
+    pub stated: Vec<f64>,
+    /// Fitted under the baseline.
+    pub absorption_before: Vec<f64>,
+    /// Fitted beside the named causes.
+    pub absorption: Vec<f64>,
+    /// Its standard deviation.
+    pub absorption_sd: Vec<f64>,
+}
+
+/// Prediction of positions that were not fitted: baseline, named causes, and the free discrepancy side by side.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct HeldOut {
+    /// Receivers, each predicted from the others.
+    pub receivers: Vec<String>,
+    /// True if they were named by the user and never fitted; else each was left out in turn.
+    pub never_fitted: bool,
+    /// Root mean square error of decay curves in dB: baseline refitted, named causes, free discrepancy.
+    pub db_rmse: [f64; 3],
+    /// Mean error of T20 in just-noticeable differences (5 %), likewise.
+    pub t20_jnd: [f64; 3],
+    /// Mean error of C50 in just-noticeable differences (1 dB), likewise.
+    pub c50_jnd: [f64; 3],
+    /// Gain of the logarithm of the predictive density over the baseline, per compared bin: named causes, free discrepancy.
+    pub nats_per_bin: [f64; 2],
+    /// 90 % intervals of these (bootstrap over positions).
+    pub nats_interval: [[f64; 2]; 2],
+}
+
+/// Mean residual of one octave at one time, for a map of where it is wrong.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct ResidualCell {
+    /// Response, by name; `None` for the mean over all.
+    pub response: Option<String>,
+    /// Nominal octave centre.
+    pub band_hz: f64,
+    /// Middle of the bin, in seconds after the direct sound.
+    pub time_s: f64,
+    /// Measured over predicted energy in dB, under the baseline.
+    pub before_db: f64,
+    /// The same under the named causes.
+    pub after_db: f64,
+    /// Expected spread in dB.
+    pub expected_sd_db: f64,
+}
+
+/// Decay curves of one octave of one response.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct DecayCurves {
+    /// Response, by name.
+    pub response: String,
+    /// Nominal octave centre.
+    pub band_hz: f64,
+    /// Seconds after the direct sound, at the beginnings of the bins.
+    pub time_s: Vec<f64>,
+    /// Measured energy that is still to come, in dB re its total.
+    pub measured_db: Vec<f64>,
+    /// The same as predicted before; the level is relative to the measured total.
+    pub before_db: Vec<f64>,
+    /// The same as predicted after.
+    pub after_db: Vec<f64>,
+    /// Whether this response was predicted from others alone.
+    pub held_out: bool,
+}
+
+/// What is wrong, why, and what mending it gains.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Diagnosis {
+    /// The answer in one word.
+    pub verdict: Verdict,
+    /// Whether chance explains the misfit.
+    pub lack_of_fit: LackOfFit,
+    /// Selection causes, in the order in which they were found. For [`Verdict::Ambiguous`] the last one stands for the set.
+    pub causes: Vec<Cause>,
+    /// Effects that explain as much as the last cause: the set of which one is at work.
+    pub alternatives: Vec<String>,
+    /// Measurements that would decide, in plain words.
+    pub would_decide: Vec<String>,
+    /// Every effect of the catalogue, the strongest first.
+    pub candidates: Vec<CandidateScore>,
+    /// Which effects these positions can tell apart.
+    pub isolability: Vec<Isolability>,
+    /// Materials, by name, in the order of the scene.
+    pub materials: Vec<(String, FittedMaterial)>,
+    /// Prediction of positions not seen; `None` with fewer than two receivers.
+    pub held_out: Option<HeldOut>,
+    /// Octaves of everything by band.
+    pub bands: Bands,
+    /// Where it is wrong.
+    pub residuals: Vec<ResidualCell>,
+    /// Decay curves at held-out positions, or at all where none could be held out.
+    pub decays: Vec<DecayCurves>,
+    /// Gain of the recording over the simulation, in dB, where the room file leaves it open.
+    pub common_gain_db: Option<f64>,
+    /// What must be said besides.
+    pub notes: Vec<String>,
+    /// The model with the named causes at work.
+    pub model: ExtendedModel,
+    /// Seconds spent, by stage; `waves` are part of other stages.
+    pub seconds: Vec<(String, f64)>,
+}
+
+impl FittedMaterial {
+    /// The fitted absorption in its bands.
+    pub fn per_band(&self, bands: Bands) -> PerBand<f64> {
+        PerBand::from_fn(bands, |b| self.absorption[b])
+    }
+}

@@ -1,0 +1,104 @@
+//! What was found of a cause, with its intervals.
+
+use crate::effect::{Nuisance, Observable};
+use crate::infer::direct_evidence::merged;
+use crate::infer::search::{Search, State};
+use crate::likelihood::laplace::LaplaceFit;
+use crate::report::diagnosis::FoundParameter;
+
+/// Half the width of a 90 % interval in standard deviations.
+const HALF_90: f64 = 1.645;
+/// The data speak of a parameter if they leave less than this share of what was known of it beforehand.
+const TOLD_SHARE: f64 = 0.8;
+
+/// Fitted parameters of a chosen candidate, what it frees among what every fit leaves open included.
+pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -> Vec<FoundParameter> {
+    let bench = search.bench;
+    let case = search.candidates[candidate].case;
+    let mut found = Vec::new();
+    let mut push = |name: String, value: f64, sd: f64, bounds: (f64, f64), unit: &str| {
+        found.push(FoundParameter {
+            name,
+            value,
+            low: (value - HALF_90 * sd).max(bounds.0),
+            high: (value + HALF_90 * sd).min(bounds.1),
+            unit: unit.to_owned(),
+        });
+    };
+    let own = state.own.iter().find(|(c, _)| *c == candidate);
+    if case.observable() == Observable::PreArrival {
+        return own.map(|(_, own)| own.parameters.clone()).unwrap_or_default();
+    }
+    let (maximum, first) = place_of(search, state, candidate);
+    for (i, p) in case.parameters(&bench.survey).into_iter().enumerate() {
+        push(p.name, maximum.values[first + i], maximum.sd(first + i), p.bounds, p.unit);
+    }
+    let bands = bench.survey.bands;
+    let open = (f64::NEG_INFINITY, f64::INFINITY);
+    for (nuisance, _) in case.relaxes() {
+        match nuisance {
+            Nuisance::Absorption(m) => {
+                for b in 0..bands.len() {
+                    let i = m * bands.len() + b;
+                    let name = format!("absorption_{}_hz", bands.nominal_hz(b));
+                    push(name, state.energy.values[i], state.energy.sd(i), (0.0, 1.0), "");
+                }
+            }
+            Nuisance::SourcePosition(_) | Nuisance::ReceiverPosition(_) => {
+                let first = match nuisance {
+                    Nuisance::SourcePosition(i) => 3 * i,
+                    Nuisance::ReceiverPosition(i) => 3 * (bench.survey.sources.len() + i),
+                    _ => continue,
+                };
+                for (k, axis) in ["x", "y", "z"].iter().enumerate() {
+                    let (value, sd) = (state.arrivals.values[first + k], state.arrivals.sd(first + k));
+                    push(format!("offset_{axis}"), value, sd, open, "m");
+                }
+            }
+            Nuisance::ResponseGain(r) => {
+                let i = state.energy_gain(search, r);
+                push("gain".into(), state.energy.values[i], state.energy.sd(i), open, "dB");
+            }
+        }
+    }
+    match own {
+        Some((_, own)) => merged(found, &own.parameters),
+        None => found,
+    }
+}
+
+/// Fitted parameters of a chosen candidate that stand at the end of their range though the data speak of them, each with its value.
+pub(crate) fn at_bounds(search: &Search<'_>, state: &State, candidate: usize) -> Vec<String> {
+    let case = search.candidates[candidate].case;
+    if case.observable() == Observable::PreArrival {
+        return Vec::new();
+    }
+    let (maximum, first) = place_of(search, state, candidate);
+    let told = case.parameters(&search.bench.survey).into_iter().enumerate().filter(|(i, p)| {
+        let value = maximum.values[first + i];
+        let at_end = (value <= p.bounds.0 || value >= p.bounds.1) && value != p.neutral;
+        at_end && maximum.sd(first + i) < TOLD_SHARE * p.prior_sd
+    });
+    told.map(|(i, p)| format!("{} = {:.3}", p.name, maximum.values[first + i])).collect()
+}
+
+/// The fit that holds the parameters of a candidate, and where they start.
+pub(crate) fn place_of<'s>(
+    search: &Search<'_>,
+    state: &'s State,
+    candidate: usize,
+) -> (&'s LaplaceFit, usize) {
+    let part = search.candidates[candidate].case.observable();
+    let same = |e: Observable| e == part || e == Observable::Channels;
+    let order = state
+        .chosen
+        .iter()
+        .filter(|&&c| same(search.candidates[c].case.observable()))
+        .position(|&c| c == candidate)
+        .unwrap_or(0);
+    if part == Observable::Arrivals {
+        (&state.arrivals, state.arrival_firsts[order])
+    } else {
+        (&state.energy, state.energy_firsts.get(order).copied().unwrap_or(0))
+    }
+}

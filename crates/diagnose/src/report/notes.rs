@@ -1,0 +1,76 @@
+//! What must be said beside the verdict.
+
+use crate::infer::workbench::Workbench;
+use crate::report::diagnosis::Verdict;
+
+/// What the words depend on.
+pub(crate) struct Circumstances<'a> {
+    pub bench: &'a Workbench,
+    pub verdict: Verdict,
+    /// Whether positions could be held out.
+    pub held_out: bool,
+    /// Whether all fits came to rest.
+    pub converged: bool,
+    /// Whether chance does not explain what the causes leave.
+    pub misfit_left: bool,
+    pub hopeless: bool,
+    /// Whether bins scatter far more than they should.
+    pub scattered: bool,
+    /// Causes that a discrepancy without a name beats.
+    pub unseated: &'a [&'a str],
+    /// Causes that do not help at positions left out.
+    pub unconfirmed: &'a [&'a str],
+    /// Selection causes, and their parameters that stand at the end of their range.
+    pub at_bounds: &'a [(&'a str, Vec<String>)],
+}
+
+pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
+    let mut notes = about.bench.notes.clone();
+    if about.bench.survey.air_assumed {
+        notes.push("The room file states no climate: 20 degrees and 50 % humidity were assumed.".into());
+    }
+    if about.bench.survey.responses.len() == 1 {
+        notes.push(
+            "One response only: what is the same at every position cannot be told from what is not.".into(),
+        );
+    }
+    if !about.held_out {
+        notes.push("Too few receivers to hold any out: no gain at new positions can be given.".into());
+    }
+    if about.hopeless {
+        notes.push(
+                "The simulation could not be fitted to these responses at all: stated materials, places or mesh may be far off. No \
+                 cause is named."
+                    .into(),
+            );
+    } else if !about.unseated.is_empty() {
+        notes.push(format!(
+                "{} would help, but a smooth discrepancy without a name explains more: the cause is not in the catalogue.",
+                about.unseated.join(" and ")
+            ));
+    }
+    if !about.converged {
+        notes.push("A fit had not come to rest after its last step: take its figures with caution.".into());
+    }
+    if about.verdict == Verdict::Explained && about.misfit_left {
+        notes.push("A significant misfit is left that none of the named causes explains.".into());
+    }
+    for (effect, parameters) in about.at_bounds {
+        notes.push(format!(
+            "{effect}: the end of the range that is allowed is reached by {}. More than this effect may be at work.",
+            parameters.join(" and ")
+        ));
+    }
+    if about.bench.arrivals.iter().any(Vec::is_empty) {
+        notes.push("Where the direct line is blocked, arrival times are not compared.".into());
+    }
+    if about.scattered && about.verdict == Verdict::Unexplained {
+        notes.push("The responses scatter far more than this room would: are they of another room?".into());
+    }
+    for id in about.unconfirmed {
+        notes.push(format!(
+            "{id} fits the positions that it was fitted to, but does not help to predict those left out: it is not named."
+        ));
+    }
+    notes
+}

@@ -1,0 +1,8 @@
+//! What the simulated room predicts.
+
+pub(crate) mod edges;
+pub(crate) mod hit_groups;
+pub(crate) mod reflection_reweighting;
+pub(crate) mod traced_pair;
+pub(crate) mod traced_room;
+pub(crate) mod views;

@@ -1,0 +1,476 @@
+//! Traced paths between one source and one receiver, and the energies that they predict.
+
+mod diffracted;
+mod isolated_reflections;
+mod local_reaction;
+mod scattering;
+
+pub(crate) use diffracted::DiffractedEnergy;
+pub(crate) use isolated_reflections::IsolatedReflection;
+use local_reaction::LOCAL_GRID;
+pub(crate) use scattering::scattering_more;
+
+use crate::observe::band_pulse::BandPulse;
+use crate::observe::time_bins::Bins;
+use crate::simulate::hit_groups;
+use rayon::prelude::*;
+use sabine_acoustics::{Air, Conditions, Error, Material, PathSet};
+use std::collections::BTreeMap;
+
+/// Width of the cells in which sampled paths are gathered, in seconds.
+pub(crate) const CELL_S: f64 = 1e-3;
+/// Extra scattering at which energies are tabulated.
+pub(crate) const SCATTERING_GRID: [f64; 8] = [-1.0, -0.5, 0.0, 0.1, 0.25, 0.45, 0.7, 0.95];
+/// Place of none in the grid.
+const NO_EXTRA: usize = 2;
+/// What the model itself may be off by, as a share of a bin's energy: a single early pulse is never predicted better.
+const MODEL_SD: f64 = 0.07;
+/// Within so long after the direct sound, in units of one over the bandwidth, single reflections add to it or take from it ...
+const COHERENT_BANDWIDTH_TIMES: f64 = 2.5;
+/// ... with a sign that does not change from place to place as that of later ones does: more than by chance, as a share of the energy.
+const COHERENT_SD: f64 = 0.35;
+/// A single reflection comes so much earlier or later than predicted (a centimetre of way): near the end of a bin, part of its
+/// energy falls into the next.
+const TIME_SD_S: f64 = 4e-5;
+/// Exact paths keep their very time for so long after the direct sound, in seconds; later ones are gathered in cells.
+const ISOLATED_S: f64 = 0.04;
+/// Cell of paths that are in none.
+const ISOLATED: u16 = u16::MAX;
+/// A neighbour from which a filter takes less than this share is left out.
+const MIN_LEAK: f64 = 1e-7;
+/// Energy of a bin without paths, as a share of the strongest: it counts as nothing.
+const NOTHING: f64 = 1e-12;
+
+/// A path that was found exactly.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Arrival {
+    pub length_m: f64,
+    pub departure: [f64; 3],
+    pub arrival: [f64; 3],
+    /// Energy in the mean over the bands.
+    pub energy: f64,
+}
+
+/// Paths of one pair with what does not change from fit to fit.
+pub(crate) struct TracedPair {
+    paths: PathSet,
+    /// Paths around edges, where the direct line is blocked; not part of the prediction as traced.
+    diffracted: Option<PathSet>,
+    pub air: Air,
+    pub speed_m_s: f64,
+    /// Time of flight of the direct sound, or of the shortest path where that is blocked, those around edges included.
+    pub direct_s: f64,
+    /// Hits of each path on each material.
+    hits: Vec<f32>,
+    departures: Vec<[f32; 3]>,
+    /// Time after the direct sound.
+    times_s: Vec<f32>,
+    /// Cell of time that each path falls into; [`ISOLATED`] for early exact ones.
+    cells: Vec<u16>,
+    /// Those: they keep their very times.
+    isolated: Vec<u32>,
+    /// Group of like hits that each path belongs to, within its slice of time.
+    groups: Vec<u8>,
+}
+
+/// Predicted energy of one band in time bins, at the materials of the expansion, and how it changes.
+#[derive(Clone, Debug)]
+pub(crate) struct BandState {
+    pub bins: Bins,
+    pub ln_energy: Vec<f64>,
+    /// Share of the octave's own energy that its filter takes.
+    pub own_share: f64,
+    /// What it lets in of neighbouring octaves: their index, share, and the logarithm of their energy in these bins.
+    pub leaks: Vec<(usize, f64, Vec<f64>)>,
+    /// Groups of paths with like hits: those of bin k are `groups[k]..groups[k + 1]`.
+    pub groups: Vec<usize>,
+    /// Energy of each group.
+    pub group_energy: Vec<f64>,
+    /// Its mean number of hits, `[group * materials + material]`.
+    pub group_hits: Vec<f64>,
+    /// Energy-weighted mean time after the direct sound.
+    pub time_s: Vec<f64>,
+    pub departure: Vec<[f64; 3]>,
+    pub departure_products: Vec<[f64; 6]>,
+    /// Expected variance of a measured bin about the prediction, as a share of its energy squared.
+    pub variance: Vec<f64>,
+    /// The tracer's own part of it.
+    monte_carlo: Vec<f64>,
+    /// What bends around edges.
+    pub diffracted: DiffractedEnergy,
+    /// Logarithm of the change of energy, `[grid][bin]`; empty until tabulated.
+    scattering: Vec<Vec<f64>>,
+    /// By how much the tracer's own relative variance is more there: what scatters is found by chance.
+    scattering_variance: Vec<Vec<f64>>,
+    /// The same for walls that react locally by a share.
+    local_reaction: Vec<Vec<f64>>,
+    /// Logarithm of a wave solution's energy over that of the paths, both as the filter passes them; empty where there is none.
+    pub waves: Vec<f64>,
+}
+
+impl BandState {
+    pub fn scattering_change(&self, bin: usize, extra: f64) -> f64 {
+        between(&SCATTERING_GRID, &self.scattering, bin, extra)
+    }
+
+    pub fn scattering_variance(&self, bin: usize, extra: f64) -> f64 {
+        between(&SCATTERING_GRID, &self.scattering_variance, bin, extra)
+    }
+
+    pub fn local_reaction_change(&self, bin: usize, share: f64) -> f64 {
+        between(&LOCAL_GRID, &self.local_reaction, bin, share)
+    }
+}
+
+/// What a table, `[grid][bin]`, says between the places of its grid; nothing as long as it is empty.
+fn between(grid: &[f64], table: &[Vec<f64>], bin: usize, x: f64) -> f64 {
+    if table.is_empty() {
+        return 0.0;
+    }
+    let x = x.clamp(grid[0], grid[grid.len() - 1]);
+    let upper = grid.iter().position(|&g| g >= x).unwrap_or(1).max(1);
+    let (low, high) = (grid[upper - 1], grid[upper]);
+    let share = (x - low) / (high - low);
+    table[upper - 1][bin] * (1.0 - share) + table[upper][bin] * share
+}
+
+impl TracedPair {
+    /// `stated` are the materials as far as they are known: they say which paths matter.
+    pub fn new(
+        paths: PathSet,
+        diffracted: Option<PathSet>,
+        air: Air,
+        stated: &[Material],
+    ) -> Result<Self, Error> {
+        let speed_m_s = air.speed_of_sound_m_s();
+        let around = diffracted.as_ref().map_or(&[][..], |diffracted| diffracted.lengths_m());
+        let shortest = paths.lengths_m().iter().chain(around).copied().fold(f32::INFINITY, f32::min);
+        let direct = (0..paths.len()).find(|&i| paths.is_direct(i)).map(|i| paths.lengths_m()[i]);
+        let direct_s = f64::from(direct.unwrap_or(shortest)) / speed_m_s;
+        let materials = paths.materials();
+        let counts = paths.hit_counts();
+        let mut hits = Vec::with_capacity(paths.len() * materials);
+        for i in 0..paths.len() {
+            let row = |chain: u32| &counts[chain as usize * materials..][..materials];
+            let (out, back) = (row(paths.chains()[i]), row(paths.tails()[i]));
+            hits.extend(out.iter().zip(back).map(|(a, b)| f32::from(a + b)));
+        }
+        let departures = (0..paths.len()).map(|i| paths.departure(i).map(|x| x as f32)).collect();
+        let times_s: Vec<f32> =
+            paths.lengths_m().iter().map(|l| (f64::from(*l) / speed_m_s - direct_s) as f32).collect();
+        let energies = paths.energies(stated, &air)?;
+        let weights: Vec<f32> = (0..paths.len()).map(|i| energies.iter().map(|e| e[i]).sum()).collect();
+        let groups = hit_groups::group(&times_s, &weights, &hits, materials);
+        let (cells, isolated) = in_cells(&paths, &times_s);
+        Ok(Self {
+            paths,
+            diffracted,
+            air,
+            speed_m_s,
+            direct_s,
+            hits,
+            departures,
+            times_s,
+            cells,
+            isolated,
+            groups,
+        })
+    }
+
+    /// The same paths in other air.
+    pub fn set_air(&mut self, air: Air) {
+        let slower = self.speed_m_s / air.speed_of_sound_m_s();
+        self.air = air;
+        self.speed_m_s = air.speed_of_sound_m_s();
+        self.direct_s *= slower;
+        self.times_s.iter_mut().for_each(|t| *t *= slower as f32);
+        (self.cells, self.isolated) = in_cells(&self.paths, &self.times_s);
+    }
+
+    /// The exact paths, the shortest first.
+    pub fn arrivals(&self, materials: &[Material], within_s: f64) -> Result<Vec<Arrival>, Error> {
+        let energies = self.paths.energies(materials, &self.air)?;
+        let mut found: Vec<Arrival> = (0..self.paths.len())
+            .filter(|&i| self.paths.is_exact(i) && f64::from(self.times_s[i]) <= within_s)
+            .map(|i| Arrival {
+                length_m: f64::from(self.paths.lengths_m()[i]),
+                departure: self.paths.departure(i),
+                arrival: self.paths.arrival(i),
+                energy: energies.iter().map(|e| f64::from(e[i])).sum::<f64>() / energies.len() as f64,
+            })
+            .collect();
+        found.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
+        Ok(found)
+    }
+
+    pub fn has_direct(&self) -> bool {
+        (0..self.paths.len()).any(|i| self.paths.is_direct(i))
+    }
+
+    /// Predicted energies in all bands for `duration_s` after the direct sound.
+    pub fn expand(
+        &self,
+        materials: &[Material],
+        kernels: &[BandPulse],
+        duration_s: f64,
+        scattering: bool,
+    ) -> Result<Vec<BandState>, Error> {
+        let bands = materials[0].bands();
+        let energies = self.paths.energies_under(&Conditions::new(materials, &self.air))?;
+        let mut states: Vec<BandState> = energies
+            .par_iter()
+            .enumerate()
+            .map(|(band, e)| self.band(band, e, Bins::new(bands, band), &kernels[band], duration_s))
+            .collect();
+        for (band, state) in states.iter_mut().enumerate() {
+            for (b, &share) in kernels[band].shares.iter().enumerate() {
+                if b != band && share > MIN_LEAK {
+                    let sums = self.sums(&energies[b], state.bins, &kernels[band], duration_s);
+                    let floor = NOTHING * sums.iter().copied().fold(0.0, f64::max).max(1e-30);
+                    state.leaks.push((b, share, sums.iter().map(|e| e.max(floor).ln()).collect()));
+                }
+            }
+        }
+        let diffracted = self.diffracted_energies(materials, kernels, duration_s)?;
+        states.iter_mut().zip(diffracted).for_each(|(state, diffracted)| state.diffracted = diffracted);
+        if scattering {
+            self.tabulate_scattering(materials, kernels, duration_s, &mut states)?;
+            let local = self.local_reaction(materials, &energies, &states, kernels, duration_s);
+            states.iter_mut().zip(local).for_each(|(state, local)| state.local_reaction = local);
+        }
+        Ok(states)
+    }
+
+    /// The bins that a path's energy falls into, with its share of each.
+    fn shares(time_s: f64, bins: Bins, kernel: &BandPulse, count: usize, mut give: impl FnMut(usize, f64)) {
+        let reach = kernel.reach_s().min(2.0 * bins.width_s);
+        let first = bins.count(time_s - reach).min(count);
+        let mut before = kernel.before(bins.edge_s(first) - time_s);
+        for bin in first..count {
+            let edge = bins.edge_s(bin + 1) - time_s;
+            let after = if edge >= reach { 1.0 } else { kernel.before(edge) };
+            if after > before {
+                give(bin, after - before);
+            }
+            before = after;
+            if edge >= reach {
+                break;
+            }
+        }
+    }
+
+    /// Energy of each bin, without anything else.
+    fn sums(&self, energies: &[f32], bins: Bins, kernel: &BandPulse, duration_s: f64) -> Vec<f64> {
+        let count = bins.count(duration_s);
+        let cells = (duration_s / CELL_S).ceil() as usize + 1;
+        let mut cell = vec![0.0f64; cells];
+        let mut sums = vec![0.0; count];
+        for (&c, &e) in self.cells.iter().zip(energies) {
+            if let Some(c) = cell.get_mut(usize::from(c)) {
+                *c += f64::from(e);
+            }
+        }
+        for &i in &self.isolated {
+            let (time_s, e) = (f64::from(self.times_s[i as usize]), f64::from(energies[i as usize]));
+            Self::shares(time_s, bins, kernel, count, |bin, share| sums[bin] += share * e);
+        }
+        for (c, e) in cell.into_iter().enumerate().filter(|(_, e)| *e > 0.0) {
+            let time_s = (c as f64 + 0.5) * CELL_S;
+            Self::shares(time_s, bins, kernel, count, |bin, share| sums[bin] += share * e);
+        }
+        sums
+    }
+
+    fn band(
+        &self,
+        band: usize,
+        energies: &[f32],
+        bins: Bins,
+        kernel: &BandPulse,
+        duration_s: f64,
+    ) -> BandState {
+        let m = self.paths.materials();
+        // Of a bin: energy, time, departure, its products. Of a group: energy, hits.
+        const COLUMNS: usize = 11;
+        let width = 1 + m;
+        let count = bins.count(duration_s);
+        let cells = (duration_s / CELL_S).ceil() as usize + 1;
+        let mut gathered = vec![0.0f64; cells * COLUMNS];
+        let mut grouped = vec![0.0f64; cells * hit_groups::MAX_GROUPS * width];
+        let mut sums = vec![0.0f64; count * COLUMNS];
+        // Groups of each bin, by slice of time and number.
+        let mut rows: Vec<BTreeMap<(usize, u8), Vec<f64>>> = vec![BTreeMap::new(); count];
+        // For the spread: energy in cells, exact paths included, and squares of the exact ones in each bin.
+        let mut all_cells = vec![0.0f64; cells];
+        let mut squares = vec![0.0f64; count];
+        let mut exact_cells = vec![0.0f64; cells];
+        let mut timing_variance = vec![0.0f64; count];
+        // Early exact paths by their very times: two that come together add or cancel as a whole.
+        let mut isolated_reflections: Vec<Vec<(f64, f64)>> = vec![Vec::new(); count];
+        let mut isolated_row = vec![0.0f64; width];
+        for (i, &e) in energies.iter().enumerate() {
+            let time_s = f64::from(self.times_s[i]);
+            let cell = (time_s.max(0.0) / CELL_S) as usize;
+            if cell >= cells || e == 0.0 {
+                continue;
+            }
+            let e = f64::from(e);
+            let exact = self.paths.is_exact(i);
+            let [x, y, z] = self.departures[i].map(f64::from);
+            let row = [1.0, time_s, x, y, z, x * x, y * y, z * z, x * y, x * z, y * z].map(|v| v * e);
+            let hits = &self.hits[i * m..(i + 1) * m];
+            let group = self.groups[i];
+            if exact && time_s < ISOLATED_S {
+                isolated_row[0] = e;
+                isolated_row[1..].iter_mut().zip(hits).for_each(|(a, n)| *a = e * f64::from(*n));
+                let slice = hit_groups::slice(self.times_s[i]);
+                let mut moved: BTreeMap<usize, f64> = BTreeMap::new();
+                for (shift_s, sign) in [(TIME_SD_S, 0.5), (-TIME_SD_S, -0.5)] {
+                    Self::shares(time_s + shift_s, bins, kernel, count, |bin, share| {
+                        *moved.entry(bin).or_default() += sign * share;
+                    });
+                }
+                moved.into_iter().for_each(|(bin, change)| timing_variance[bin] += (change * e).powi(2));
+                Self::shares(time_s, bins, kernel, count, |bin, share| {
+                    isolated_reflections[bin].push((time_s, share * e));
+                    add(&mut sums[bin * COLUMNS..(bin + 1) * COLUMNS], &row, share);
+                    let own = rows[bin].entry((slice, group)).or_insert_with(|| vec![0.0; width]);
+                    add(own, &isolated_row, share);
+                });
+                continue;
+            }
+            all_cells[cell] += e;
+            if exact {
+                exact_cells[cell] += e * e;
+            }
+            add(&mut gathered[cell * COLUMNS..(cell + 1) * COLUMNS], &row, 1.0);
+            let own = &mut grouped[(cell * hit_groups::MAX_GROUPS + usize::from(group)) * width..][..width];
+            own[0] += e;
+            own[1..].iter_mut().zip(hits).for_each(|(a, n)| *a += e * f64::from(*n));
+        }
+        // Energy of each cell in each bin, for the spread.
+        let mut weighted: Vec<Vec<(usize, f64)>> = vec![Vec::new(); count];
+        for cell in 0..cells {
+            if all_cells[cell] == 0.0 {
+                continue;
+            }
+            let time_s = (cell as f64 + 0.5) * CELL_S;
+            let slice = hit_groups::slice(time_s as f32);
+            Self::shares(time_s, bins, kernel, count, |bin, share| {
+                weighted[bin].push((cell, share * all_cells[cell]));
+                squares[bin] += share * share * exact_cells[cell];
+                if gathered[cell * COLUMNS] == 0.0 {
+                    return;
+                }
+                let own = &gathered[cell * COLUMNS..(cell + 1) * COLUMNS];
+                add(&mut sums[bin * COLUMNS..(bin + 1) * COLUMNS], own, share);
+                for group in 0..hit_groups::MAX_GROUPS {
+                    let own = &grouped[(cell * hit_groups::MAX_GROUPS + group) * width..][..width];
+                    if own[0] > 0.0 {
+                        let row = rows[bin].entry((slice, group as u8)).or_insert_with(|| vec![0.0; width]);
+                        add(row, own, share);
+                    }
+                }
+            });
+        }
+        let (_, monte_carlo_variance) = self.sums_and_variance(energies, bins, kernel, duration_s);
+        let floor = NOTHING * (0..count).map(|k| sums[k * COLUMNS]).fold(0.0, f64::max).max(1e-30);
+        let mut state = BandState {
+            bins,
+            ln_energy: Vec::with_capacity(count),
+            own_share: kernel.shares[band],
+            leaks: Vec::new(),
+            groups: vec![0],
+            group_energy: Vec::new(),
+            group_hits: Vec::new(),
+            time_s: Vec::with_capacity(count),
+            departure: Vec::with_capacity(count),
+            departure_products: Vec::with_capacity(count),
+            variance: Vec::with_capacity(count),
+            monte_carlo: Vec::with_capacity(count),
+            diffracted: DiffractedEnergy::default(),
+            scattering: Vec::new(),
+            scattering_variance: Vec::new(),
+            local_reaction: Vec::new(),
+            waves: Vec::new(),
+        };
+        for bin in 0..count {
+            let s = &sums[bin * COLUMNS..(bin + 1) * COLUMNS];
+            let e = s[0].max(floor);
+            state.ln_energy.push(e.ln());
+            state.time_s.push(if s[0] > floor { s[1] / e } else { bins.centre_s(bin) });
+            state.departure.push(std::array::from_fn(|k| s[2 + k] / e));
+            state.departure_products.push(std::array::from_fn(|k| s[5 + k] / e));
+            for row in rows[bin].values().filter(|r| r[0] > 0.0) {
+                state.group_energy.push(row[0]);
+                state.group_hits.extend(row[1..].iter().map(|h| h / row[0]));
+            }
+            if s[0] <= floor {
+                state.group_energy.push(floor);
+                state.group_hits.extend(std::iter::repeat_n(0.0, m));
+            }
+            state.groups.push(state.group_energy.len());
+            let interference = interference(&weighted[bin], kernel)
+                - 2.0 * kernel.cell_correlation[0] * squares[bin]
+                + pairwise_interference(&isolated_reflections[bin], kernel)
+                + timing_variance[bin];
+            let monte_carlo = monte_carlo_variance[bin];
+            state.monte_carlo.push(monte_carlo / (e * e));
+            let coherent = bins.centre_s(bin) < COHERENT_BANDWIDTH_TIMES / kernel.bandwidth_hz;
+            let model_sd = if coherent { COHERENT_SD } else { MODEL_SD };
+            let variance = (interference.max(0.0) + monte_carlo) / (e * e) + model_sd * model_sd;
+            // Nothing scatters more than the square of one Gaussian sample.
+            state.variance.push(variance.min(2.0));
+        }
+        state
+    }
+}
+
+/// Cell of each path, and the paths that are in none.
+fn in_cells(paths: &PathSet, times_s: &[f32]) -> (Vec<u16>, Vec<u32>) {
+    let mut isolated = Vec::new();
+    let cells = times_s
+        .iter()
+        .enumerate()
+        .map(|(i, &t)| {
+            let time_s = f64::from(t);
+            if time_s < ISOLATED_S && paths.is_exact(i) {
+                isolated.push(i as u32);
+                return ISOLATED;
+            }
+            ((time_s.max(0.0) / CELL_S) as usize).min(usize::from(ISOLATED) - 1) as u16
+        })
+        .collect();
+    (cells, isolated)
+}
+
+/// Variance of the energy of single pulses of random sign: four times the sum over pairs of w_i w_j r_ij^2.
+fn pairwise_interference(isolated_reflections: &[(f64, f64)], kernel: &BandPulse) -> f64 {
+    let mut sum = 0.0;
+    for (i, &(time_s, energy)) in isolated_reflections.iter().enumerate() {
+        for &(other_s, more) in &isolated_reflections[i + 1..] {
+            sum += energy * more * kernel.correlation_sq(other_s - time_s);
+        }
+    }
+    4.0 * sum
+}
+
+fn add(target: &mut [f64], more: &[f64], share: f64) {
+    target.iter_mut().zip(more).for_each(|(t, x)| *t += share * x);
+}
+
+/// Variance of the energy in a bin if all pulses had random signs: twice the sum of w_i w_j r_ij^2 over all i and j, two paths of
+/// one cell being as alike as two times in it are on the average, a path and itself no more.
+fn interference(cells: &[(usize, f64)], kernel: &BandPulse) -> f64 {
+    let mut sum = 0.0;
+    for (i, &(cell, energy)) in cells.iter().enumerate() {
+        sum += energy * energy * kernel.cell_correlation[0];
+        for &(other, more) in &cells[i + 1..] {
+            match kernel.cell_correlation.get(other - cell) {
+                Some(cell_correlation) => sum += 2.0 * energy * more * cell_correlation,
+                None => break,
+            }
+        }
+    }
+    2.0 * sum
+}

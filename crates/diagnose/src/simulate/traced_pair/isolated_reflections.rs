@@ -1,0 +1,86 @@
+//! Early paths one by one.
+
+use super::{BandState, DiffractedEnergy, SCATTERING_GRID, TracedPair};
+use crate::observe::time_bins::Bins;
+use sabine_acoustics::{Conditions, Error, Material};
+
+/// An early path that was found exactly.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct IsolatedReflection {
+    pub length_m: f64,
+    pub after_direct_s: f64,
+    pub departure: [f64; 3],
+    pub arrival: [f64; 3],
+    /// Reflections.
+    pub order: usize,
+}
+
+impl TracedPair {
+    /// The early exact paths, the shortest first, each as a bin of its own in the state of each band.
+    pub fn isolated_reflections(
+        &self,
+        materials: &[Material],
+        within_s: f64,
+    ) -> Result<(Vec<IsolatedReflection>, Vec<BandState>), Error> {
+        let m = self.paths.materials();
+        let mut chosen: Vec<usize> = (0..self.paths.len())
+            .filter(|&i| self.paths.is_exact(i) && f64::from(self.times_s[i]) <= within_s)
+            .collect();
+        chosen.sort_by(|&a, &b| self.paths.lengths_m()[a].total_cmp(&self.paths.lengths_m()[b]));
+        let order = |i: usize| self.hits[i * m..(i + 1) * m].iter().sum::<f32>().round() as usize;
+        let isolated_reflections: Vec<IsolatedReflection> = chosen
+            .iter()
+            .map(|&i| IsolatedReflection {
+                length_m: f64::from(self.paths.lengths_m()[i]),
+                after_direct_s: f64::from(self.times_s[i]),
+                departure: self.paths.departure(i),
+                arrival: self.paths.arrival(i),
+                order: order(i),
+            })
+            .collect();
+        let energies = self.paths.energies_under(&Conditions::new(materials, &self.air))?;
+        let bands = materials[0].bands();
+        let states = energies
+            .iter()
+            .enumerate()
+            .map(|(band, energies)| BandState {
+                bins: Bins::new(bands, band),
+                ln_energy: chosen.iter().map(|&i| f64::from(energies[i]).max(1e-30).ln()).collect(),
+                own_share: 1.0,
+                leaks: Vec::new(),
+                waves: Vec::new(),
+                groups: (0..=chosen.len()).collect(),
+                group_energy: chosen.iter().map(|&i| f64::from(energies[i]).max(1e-30)).collect(),
+                group_hits: chosen
+                    .iter()
+                    .flat_map(|&i| self.hits[i * m..(i + 1) * m].iter().map(|h| f64::from(*h)))
+                    .collect(),
+                time_s: isolated_reflections.iter().map(|s| s.after_direct_s).collect(),
+                departure: isolated_reflections.iter().map(|s| s.departure).collect(),
+                departure_products: isolated_reflections
+                    .iter()
+                    .map(|s| {
+                        let [x, y, z] = s.departure;
+                        [x * x, y * y, z * z, x * y, x * z, y * z]
+                    })
+                    .collect(),
+                variance: vec![0.0; isolated_reflections.len()],
+                monte_carlo: Vec::new(),
+                scattering_variance: Vec::new(),
+                diffracted: DiffractedEnergy::default(),
+                // A share more of each reflection is scattered, and lost to the mirror; what was scattered never comes back as one.
+                local_reaction: Vec::new(),
+                scattering: SCATTERING_GRID
+                    .iter()
+                    .map(|extra| {
+                        isolated_reflections
+                            .iter()
+                            .map(|s| s.order as f64 * (1.0 - extra.max(0.0)).ln())
+                            .collect()
+                    })
+                    .collect(),
+            })
+            .collect();
+        Ok((isolated_reflections, states))
+    }
+}

@@ -1,0 +1,97 @@
+//! The measured room traced: one set of paths for each response, good for any material.
+
+use crate::config::DiagnoseConfig;
+use crate::error::Error;
+use crate::observe::observed_response::Measured;
+use crate::simulate::edges::Edges;
+use crate::simulate::traced_pair::{TracedPair, scattering_more};
+use crate::survey::Survey;
+use rayon::prelude::*;
+use sabine_acoustics::{Material, MeasuredRoom, Observer, PerBand, Scene, report};
+use sabine_propagate::{PathTracer, PreparedScene};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Extra scattering of the bands of the traced scene, in turn: its paths then serve any scattering.
+const TRACED_SCATTERING: [f64; 4] = [0.0, 0.12, 0.4, 0.85];
+/// Share of the stated absorption at which images are chosen.
+const CAUTION: f64 = 0.7;
+/// Longest time that is traced after the direct sound, in seconds.
+const MAX_TRACED_S: f64 = 2.5;
+/// Shortest.
+const MIN_TRACED_S: f64 = 0.2;
+/// Decay beyond the compared range that is still traced, in dB.
+const MARGIN_DB: f64 = 12.0;
+
+/// How long paths must be followed after the direct sound: until the slowest measured decay is through.
+pub(crate) fn traced_s(survey: &Survey, measured: &[Measured], range_db: f64) -> f64 {
+    let mut longest = MIN_TRACED_S;
+    for m in measured {
+        for (band, energies) in m.energies.iter().enumerate() {
+            let Some(energies) = energies else { continue };
+            let bins = crate::observe::time_bins::Bins::new(survey.bands, band);
+            let total: f64 = energies.iter().sum();
+            let floor = total * 10f64.powf(-(range_db + MARGIN_DB) / 10.0);
+            let mut left = total;
+            let end = energies.iter().position(|e| {
+                left -= e;
+                left < floor
+            });
+            longest = longest.max(bins.edge_s(end.unwrap_or(energies.len())));
+        }
+    }
+    longest.min(MAX_TRACED_S)
+}
+
+/// The scene with scattering spread over the bands, and its tracer.
+pub(crate) fn prepare(
+    room: &MeasuredRoom,
+    survey: &Survey,
+    materials: &[Material],
+    config: &DiagnoseConfig,
+    traced_s: f64,
+) -> Result<(Scene, PathTracer, PreparedScene), Error> {
+    let bands = survey.bands;
+    let spread: Vec<Material> = materials
+        .iter()
+        .map(|m| {
+            let columns: Vec<Material> =
+                TRACED_SCATTERING.iter().map(|&extra| scattering_more(m, extra)).collect::<Result<_, _>>()?;
+            let scattering = PerBand::from_fn(bands, |b| columns[b % columns.len()].scattering().values()[b]);
+            // Absorption only says which images of a cuboid matter: less than stated, for it may be fitted so.
+            let absorption = PerBand::from_fn(bands, |b| CAUTION * m.absorption().values()[b]);
+            Material::new(absorption, scattering)
+        })
+        .collect::<Result<_, sabine_acoustics::Error>>()?;
+    let scene: Scene = room.scene().with_materials(spread)?;
+    // The pairs differ in length by metres: the longest direct path sets the duration.
+    let slowest = survey.responses.iter().map(|r| r.air.speed_of_sound_m_s()).fold(f64::INFINITY, f64::min);
+    let diagonal: f64 = (0..3).map(|k| (survey.box_m[1][k] - survey.box_m[0][k]).powi(2)).sum::<f64>().sqrt();
+    let tracer = PathTracer::new(config.tracer(traced_s + diagonal / slowest + 0.05))?;
+    let prepared = tracer.prepare(&scene)?;
+    if !config.allow_leaks {
+        prepared.check_leaks(&scene, room.sources()[survey.responses[0].source].position_m)?;
+    }
+    Ok((scene, tracer, prepared))
+}
+
+pub(crate) fn trace(
+    room: &MeasuredRoom,
+    survey: &Survey,
+    materials: &[Material],
+    (tracer, prepared, edges): (&PathTracer, &PreparedScene, Option<&Edges>),
+    observer: &dyn Observer,
+) -> Result<Vec<TracedPair>, Error> {
+    let (done, total) = (AtomicU64::new(0), survey.responses.len() as u64);
+    survey
+        .responses
+        .par_iter()
+        .map(|response| {
+            report(observer, "tracing", done.fetch_add(1, Ordering::Relaxed), total)?;
+            let (source, receiver) = (&room.sources()[response.source], &room.receivers()[response.receiver]);
+            let paths = tracer.trace_prepared(prepared, source, receiver, &response.air, &())?;
+            let places_m = [source.position_m, receiver.position_m];
+            let diffracted = Edges::paths(edges, places_m, paths.max_length_m());
+            Ok(TracedPair::new(paths, diffracted, response.air, materials)?)
+        })
+        .collect()
+}

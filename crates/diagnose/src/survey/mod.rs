@@ -1,0 +1,123 @@
+//! What was measured, as effects see it.
+
+pub(crate) mod planes;
+
+use crate::survey::planes::Plane;
+use sabine_acoustics::{Air, Bands, Measurement};
+
+/// One response of the survey.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct SurveyedResponse {
+    /// Index of its source.
+    pub source: usize,
+    /// Index of its receiver.
+    pub receiver: usize,
+    /// Its name: source and receiver.
+    pub name: String,
+    /// The air that the room file states for it.
+    pub air: Air,
+    /// Length in seconds.
+    pub duration_s: f64,
+    /// When the direct sound comes, in seconds from the first sample.
+    pub direct_s: f64,
+}
+
+/// A source or a receiver.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Place {
+    /// Its name.
+    pub id: String,
+    /// Metres.
+    pub position_m: [f64; 3],
+    /// Acoustic axis, where the room file states one.
+    pub axis: Option<[f64; 3]>,
+}
+
+/// What the room file and the responses say, before any fit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Survey {
+    pub(crate) bands: Bands,
+    pub(crate) air: Air,
+    pub(crate) air_assumed: bool,
+    pub(crate) measurement: Measurement,
+    pub(crate) materials: Vec<String>,
+    pub(crate) sources: Vec<Place>,
+    pub(crate) receivers: Vec<Place>,
+    pub(crate) responses: Vec<SurveyedResponse>,
+    pub(crate) box_m: [[f64; 3]; 2],
+    pub(crate) declared_scattering: f64,
+    pub(crate) planes: Vec<Plane>,
+    pub(crate) material_areas_m2: Vec<f64>,
+    pub(crate) diffracted: Vec<usize>,
+    /// Lowest bands for which there is a wave solution.
+    pub(crate) bands_of_modes: usize,
+}
+
+impl Survey {
+    /// Bands in which energies are compared.
+    pub fn bands(&self) -> Bands {
+        self.bands
+    }
+
+    /// The air of the room file.
+    pub fn air(&self) -> Air {
+        self.air
+    }
+
+    /// Whether the room file is silent about the air.
+    pub fn air_assumed(&self) -> bool {
+        self.air_assumed
+    }
+
+    /// What times and levels of the responses mean.
+    pub fn measurement(&self) -> Measurement {
+        self.measurement
+    }
+
+    /// Names of the materials.
+    pub fn materials(&self) -> &[String] {
+        &self.materials
+    }
+
+    /// Sources.
+    pub fn sources(&self) -> &[Place] {
+        &self.sources
+    }
+
+    /// Receivers.
+    pub fn receivers(&self) -> &[Place] {
+        &self.receivers
+    }
+
+    /// Responses.
+    pub fn responses(&self) -> &[SurveyedResponse] {
+        &self.responses
+    }
+
+    /// Two opposite corners of the mesh, in metres.
+    pub fn box_m(&self) -> [[f64; 3]; 2] {
+        self.box_m
+    }
+
+    /// The largest flat surfaces of the mesh.
+    pub fn planes(&self) -> &[Plane] {
+        &self.planes
+    }
+
+    /// Responses (indices) whose source and receiver do not see each other, with an edge of the mesh between them.
+    pub fn diffracted_responses(&self) -> &[usize] {
+        &self.diffracted
+    }
+
+    /// Area of a material in square metres.
+    pub fn material_area_m2(&self, material: usize) -> f64 {
+        self.material_areas_m2[material]
+    }
+
+    /// Octaves from 1 kHz to a band: -3 for 125 Hz.
+    pub fn octaves_from_1khz(&self, band: usize) -> f64 {
+        (self.bands.exact_hz(band) / 1000.0).log2()
+    }
+}
