@@ -303,8 +303,7 @@ fn without(search: &Search<'_>, state: &State, candidate: usize) -> Result<f64, 
 }
 
 fn common_gain(bench: &Workbench, state: &State) -> Option<f64> {
-    let index = bench.priors.len() * bench.survey.bands.len();
-    (bench.survey.measurement.levels == sabine_acoustics::Levels::Common).then(|| state.energy.values[index])
+    bench.decay_layout().common_gain().map(|index| state.energy.values[index])
 }
 
 /// The cause at work everywhere that gains least at positions which the fit has not seen, if chance may explain even that.
@@ -345,12 +344,13 @@ fn fitted_materials(bench: &Workbench, base: &State, state: &State) -> Vec<(Stri
     (0..bench.survey.materials.len())
         .map(|m| {
             let bands = bench.survey.bands.len();
-            let column = |values: &[f64]| values[m * bands..(m + 1) * bands].to_vec();
+            let layout = bench.decay_layout();
+            let column = |values: &[f64]| values[layout.material(m)].to_vec();
             let fitted = FittedMaterial {
                 stated: bench.priors[m].iter().map(|p| p.mean).collect(),
                 absorption_before: column(&base.energy.values),
                 absorption: column(&state.energy.values),
-                absorption_sd: (0..bands).map(|b| state.energy.sd(m * bands + b)).collect(),
+                absorption_sd: (0..bands).map(|b| state.energy.sd(layout.absorption(m, b))).collect(),
             };
             (bench.survey.materials[m].clone(), fitted)
         })

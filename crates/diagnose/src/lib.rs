@@ -66,6 +66,8 @@ mod effect;
 mod effects;
 mod error;
 mod extend;
+#[cfg(test)]
+mod hand_made;
 mod infer;
 mod likelihood;
 mod observe;

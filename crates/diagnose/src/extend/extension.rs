@@ -25,7 +25,7 @@ pub(crate) fn extended_model(bench: &Workbench, search: &Search<'_>, state: &Sta
             .materials
             .iter()
             .enumerate()
-            .map(|(m, name)| (name.clone(), state.energy.values[m * count..(m + 1) * count].to_vec()))
+            .map(|(m, name)| (name.clone(), state.energy.values[bench.decay_layout().material(m)].to_vec()))
             .collect(),
         ..ExtendedModel::default()
     };
@@ -120,7 +120,7 @@ pub(crate) fn extended_model(bench: &Workbench, search: &Search<'_>, state: &Sta
                 }
                 for (nuisance, _) in case.relaxes() {
                     if let Nuisance::ResponseGain(r) = nuisance {
-                        let gain_db = state.energy.values[state.energy_gain(search, r)];
+                        let gain_db = state.energy.values[bench.decay_layout().gain(r)];
                         model.response_gain_db.insert(survey.responses[r].name.clone(), gain_db);
                     }
                 }

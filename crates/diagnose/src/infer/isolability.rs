@@ -60,32 +60,21 @@ fn cosine(bench: &Workbench, evidence: Observable, a: &dyn Case, b: &dyn Case) -
         let mut values = model.start(None);
         for (m, material) in bench.absorption.iter().enumerate() {
             for (band, a) in material.iter().enumerate() {
-                values[m * material.len() + band] = *a;
+                values[model.layout.absorption(m, band)] = *a;
             }
         }
-        let place = |nuisance: Nuisance| match nuisance {
-            Nuisance::Absorption(m) => {
-                let bands = bench.survey.bands.len();
-                Some(m * bands..(m + 1) * bands)
-            }
-            Nuisance::ResponseGain(r) => Some(model.gain_index(r)..model.gain_index(r) + 1),
-            _ => None,
-        };
+        let place = |nuisance: Nuisance| model.layout.nuisance(nuisance);
         let firsts: Vec<(usize, usize)> =
-            (0..2).map(|order| first_of(&model.effects, order)).collect::<Option<_>>()?;
+            (0..2).map(|order| first_of(&model.terms, order)).collect::<Option<_>>()?;
         let directions = directions(bench, &cases, &firsts, &mut values, place);
         (expected(&model, &values), model.priors().to_vec(), directions)
     } else {
         let data = bench.arrival_data();
         let model = arrivals::at_fit(&data, &cases, &used);
         let mut values: Vec<f64> = model.priors().iter().map(|p| p.mean).collect();
-        let place = |nuisance: Nuisance| match nuisance {
-            Nuisance::SourcePosition(i) => Some(model.source_index(i)..model.source_index(i) + 3),
-            Nuisance::ReceiverPosition(i) => Some(model.receiver_index(i)..model.receiver_index(i) + 3),
-            _ => None,
-        };
+        let place = |nuisance: Nuisance| model.layout.nuisance(nuisance);
         let firsts: Vec<(usize, usize)> =
-            (0..2).map(|order| first_of(&model.effects, order)).collect::<Option<_>>()?;
+            (0..2).map(|order| first_of(&model.terms, order)).collect::<Option<_>>()?;
         // Arrivals belong where they are: the information is taken without the effects.
         let neutral = values.clone();
         let directions = directions(bench, &cases, &firsts, &mut values, place);
@@ -114,7 +103,10 @@ fn cosine(bench: &Workbench, evidence: Observable, a: &dyn Case, b: &dyn Case) -
     (aa > 1e-9 && bb > 1e-9).then(|| (ab.abs() / (aa * bb).sqrt()).min(1.0))
 }
 
-fn first_of(effects: &[crate::likelihood::decay::ModelTerm<'_>], order: usize) -> Option<(usize, usize)> {
+fn first_of(
+    effects: &[crate::likelihood::parameters::ModelTerm<'_>],
+    order: usize,
+) -> Option<(usize, usize)> {
     effects.iter().find(|p| p.order == order).map(|p| (p.first, p.parameters.len()))
 }
 

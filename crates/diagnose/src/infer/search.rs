@@ -55,13 +55,6 @@ impl State {
         WarmStart { values: &self.energy.values, firsts: &self.energy_firsts }
     }
 
-    /// Place of a response's gain among the values of the decays.
-    pub fn energy_gain(&self, search: &Search<'_>, response: usize) -> usize {
-        let survey = &search.bench.survey;
-        let common = usize::from(survey.measurement.levels == sabine_acoustics::Levels::Common);
-        search.bench.priors.len() * survey.bands.len() + common + response
-    }
-
     pub fn log_evidence(&self) -> f64 {
         self.energy.log_evidence
             + self.arrivals.log_evidence

@@ -84,17 +84,14 @@ impl Diagnoser {
             let (moved, warmer_k, resized, absorption) = {
                 let search = Search::new(bench, cases, self.effects.len(), used.to_vec());
                 let state = search.state(&named.chosen, None)?;
-                let offset = |first: usize| std::array::from_fn(|k| state.arrivals.values[first + k]);
+                let layout = bench.arrival_layout();
                 let moved: Vec<(Nuisance, [f64; 3])> = cases[best.best]
                     .2
                     .relaxes()
                     .into_iter()
-                    .filter_map(|(place, _)| match place {
-                        Nuisance::SourcePosition(i) => Some((place, offset(3 * i))),
-                        Nuisance::ReceiverPosition(i) => {
-                            Some((place, offset(3 * (bench.survey.sources.len() + i))))
-                        }
-                        _ => None,
+                    .filter_map(|(place, _)| {
+                        let first = layout.nuisance(place)?.start;
+                        Some((place, std::array::from_fn(|k| state.arrivals.values[first + k])))
                     })
                     .collect();
                 let (maximum, first) = place_of(&search, &state, best.best);

@@ -12,6 +12,7 @@ use crate::likelihood::decay;
 use crate::likelihood::decay::{ABSORPTION, BinResidual, EnergyData, EnergyModel, WarmStart};
 use crate::likelihood::discrepancy::FreeDiscrepancy;
 use crate::likelihood::laplace::{LaplaceFit, Prior};
+use crate::likelihood::parameters::{ArrivalLayout, DecayLayout};
 use crate::observe::band_pulse::BandPulse;
 use crate::observe::observed_response::{Measured, PEAKS_S};
 use crate::observe::pre_arrival::PreArrival;
@@ -261,9 +262,9 @@ impl Workbench {
 
     /// Expands about fitted absorption.
     pub fn expand_about(&mut self, values: &[f64]) -> Result<(), Error> {
-        let bands = self.survey.bands.len();
+        let layout = self.decay_layout();
         for (m, material) in self.absorption.iter_mut().enumerate() {
-            material.copy_from_slice(&values[m * bands..(m + 1) * bands]);
+            material.copy_from_slice(&values[layout.material(m)]);
         }
         self.expand(true)
     }
@@ -275,11 +276,11 @@ impl Workbench {
         for round in 0..ROUNDS {
             report(observer, "baseline", round as u64, ROUNDS as u64)?;
             let found = self.fit_energy(&[], &used, None)?;
-            let bands = self.survey.bands.len();
+            let layout = self.decay_layout();
             let mut moved = 0.0f64;
             for (m, material) in self.absorption.iter_mut().enumerate() {
                 for (b, a) in material.iter_mut().enumerate() {
-                    let next = found.0.values[m * bands + b];
+                    let next = found.0.values[layout.absorption(m, b)];
                     moved = moved.max((next - *a).abs() / self.priors[m][b].sd.min(0.1));
                     *a = next;
                 }
@@ -295,6 +296,14 @@ impl Workbench {
         }
         self.seconds.insert("baseline", started.elapsed().as_secs_f64());
         Ok(())
+    }
+
+    pub fn decay_layout(&self) -> DecayLayout {
+        DecayLayout::of(&self.survey)
+    }
+
+    pub fn arrival_layout(&self) -> ArrivalLayout {
+        ArrivalLayout::of(&self.survey)
     }
 
     pub fn energy_data(&self) -> EnergyData<'_> {

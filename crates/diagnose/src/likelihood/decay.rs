@@ -8,8 +8,9 @@ mod variance;
 
 pub(crate) use fit::{WarmStart, fit};
 
-use crate::effect::{Case, Nuisance, Parameter, Stage};
+use crate::effect::{Case, Stage};
 use crate::likelihood::laplace::{Model, Prior, Slopes};
+use crate::likelihood::parameters::{DecayLayout, ModelTerm, ModelTerms};
 use crate::observe::observed_response::Measured;
 use crate::simulate::reflection_reweighting::HitChanges;
 use crate::simulate::traced_pair::BandState;
@@ -54,25 +55,15 @@ pub(crate) struct EnergyData<'a> {
     pub dispersion: &'a [f64],
 }
 
-/// An effect in a model, and where its parameters stand.
-pub(crate) struct ModelTerm<'a> {
-    pub case: &'a dyn Case,
-    pub parameters: Vec<Parameter>,
-    pub first: usize,
-    /// Number of the case, as the caller counts.
-    pub order: usize,
-}
-
 pub(crate) struct EnergyModel<'a> {
     data: &'a EnergyData<'a>,
-    pub effects: Vec<ModelTerm<'a>>,
+    pub layout: DecayLayout,
+    pub terms: Vec<ModelTerm<'a>>,
     priors: Vec<Prior>,
     /// Pairs that count.
     used: &'a [bool],
     /// Which response holds which pair.
     assignment: Vec<usize>,
-    common_gain: Option<usize>,
-    first_gain: usize,
 }
 
 /// One compared bin.
@@ -91,59 +82,27 @@ pub(crate) struct BinResidual {
 impl<'a> EnergyModel<'a> {
     pub fn new(data: &'a EnergyData<'a>, cases: &[&'a dyn Case], used: &'a [bool]) -> Self {
         let survey = data.survey;
-        let bands = survey.bands.len();
-        let mut priors: Vec<Prior> = Vec::new();
+        let layout = DecayLayout::of(survey);
+        let mut priors: Vec<Prior> = Vec::with_capacity(layout.len());
         for material in data.priors {
-            priors.extend_from_slice(&material[..bands]);
+            priors.extend_from_slice(&material[..survey.bands.len()]);
         }
+        priors.extend(layout.common_gain().map(|_| Prior::normal(0.0, FREE_GAIN_DB)));
         let levels = survey.measurement.levels;
-        let common_gain = (levels == Levels::Common).then(|| {
-            priors.push(Prior::normal(0.0, FREE_GAIN_DB));
-            priors.len() - 1
-        });
-        let first_gain = priors.len();
         let sd = if levels == Levels::PerResponse { FREE_GAIN_DB } else { data.gain_sd_db };
         priors.extend(survey.responses.iter().map(|_| Prior::normal(0.0, sd)));
         let mut ordered: Vec<(usize, &dyn Case)> = cases.iter().copied().enumerate().collect();
         ordered.sort_by_key(|(_, c)| c.stage());
-        let mut assignment: Vec<usize> = (0..survey.responses.len()).collect();
-        let mut effects = Vec::new();
-        for (order, case) in ordered {
-            for (nuisance, sd) in case.relaxes() {
-                match nuisance {
-                    Nuisance::Absorption(material) => {
-                        priors[material * bands..(material + 1) * bands]
-                            .iter_mut()
-                            .for_each(|p| p.sd = p.sd.max(sd));
-                    }
-                    Nuisance::ResponseGain(response) => {
-                        let prior = &mut priors[first_gain + response];
-                        prior.sd = prior.sd.max(sd);
-                    }
-                    Nuisance::SourcePosition(_) | Nuisance::ReceiverPosition(_) => {}
-                }
-            }
-            if let Some((a, b)) = case.exchanged() {
-                assignment.swap(a, b);
-            }
-            let parameters = case.parameters(survey);
-            let first = priors.len();
-            priors.extend(parameters.iter().map(|p| Prior {
-                mean: p.neutral,
-                sd: p.prior_sd,
-                low: p.bounds.0,
-                high: p.bounds.1,
-            }));
-            effects.push(ModelTerm { case, parameters, first, order });
-        }
-        Self { data, effects, priors, used, assignment, common_gain, first_gain }
+        let all = ModelTerms::new(priors, ordered, survey, |nuisance| layout.nuisance(nuisance));
+        let ModelTerms { priors, terms, assignment } = all;
+        Self { data, layout, terms, priors, used, assignment }
     }
 
     /// Values to start from: those of another fit as far as they go, and the effect's.
     pub fn start(&self, before: Option<&[f64]>) -> Vec<f64> {
         let mut x: Vec<f64> = self.priors.iter().map(|p| p.mean).collect();
         if let Some(before) = before {
-            let n = self.nuisances().min(before.len());
+            let n = self.layout.len().min(before.len());
             x[..n].copy_from_slice(&before[..n]);
         }
         x
@@ -165,36 +124,26 @@ impl<'a> EnergyModel<'a> {
             median(ratios)
         };
         let pairs: Vec<usize> = (0..self.assignment.len()).filter(|&p| self.used[p]).collect();
-        if let Some(index) = self.common_gain {
+        if let Some(index) = self.layout.common_gain() {
             values[index] = median(pairs.iter().map(|&p| off_db(p)).collect());
         } else if self.data.survey.measurement.levels == Levels::PerResponse {
             for pair in pairs {
-                values[self.first_gain + self.assignment[pair]] = off_db(pair);
+                values[self.layout.gain(self.assignment[pair])] = off_db(pair);
             }
         }
     }
 
-    /// Parameters before those of the effects.
-    pub fn nuisances(&self) -> usize {
-        self.first_gain + self.data.survey.responses.len()
-    }
-
-    pub fn gain_index(&self, response: usize) -> usize {
-        self.first_gain + response
-    }
-
     /// Where the parameters of the case with this number start.
     pub fn first_of(&self, order: usize) -> usize {
-        self.effects.iter().find(|p| p.order == order).map_or(self.priors.len(), |p| p.first)
+        self.terms.iter().find(|p| p.order == order).map_or(self.priors.len(), |p| p.first)
     }
 
     /// From the octave's own energy to what its filter passes: effects up to the microphone act on the octave and on what
     /// leaks in from its neighbours, each as it is; the rest on their sum.
     fn apply(&self, values: &[f64], view: &BandView<'_>, gain_db: f64, ln_energy: &mut [f64]) {
         let effects = |early: bool, view: &BandView<'_>, ln_energy: &mut [f64]| {
-            for placed in self.effects.iter().filter(|p| (p.case.stage() <= Stage::Transducer) == early) {
-                let own = &values[placed.first..placed.first + placed.parameters.len()];
-                placed.case.energy(own, view, ln_energy);
+            for placed in self.terms.iter().filter(|p| (p.case.stage() <= Stage::Transducer) == early) {
+                placed.case.energy(placed.own(values), view, ln_energy);
             }
         };
         effects(true, view, ln_energy);
@@ -212,7 +161,8 @@ impl<'a> EnergyModel<'a> {
     }
 
     fn gain_db(&self, values: &[f64], pair: usize) -> f64 {
-        values[self.first_gain + self.assignment[pair]] + self.common_gain.map_or(0.0, |index| values[index])
+        values[self.layout.gain(self.assignment[pair])]
+            + self.layout.common_gain().map_or(0.0, |index| values[index])
     }
 
     /// Logarithm of the energy of the paths in one band at these materials and gains, before any effect, and, where wanted, its change
@@ -224,11 +174,12 @@ impl<'a> EnergyModel<'a> {
         count: usize,
         sloping: bool,
     ) -> (Vec<f64>, Vec<f64>) {
-        let bands = self.data.survey.bands.len();
         let m = self.data.absorption.len();
         let state = &self.data.states[pair][band];
         let shift: Vec<f64> = (0..m)
-            .map(|k| ((1.0 - values[k * bands + band]) / (1.0 - self.data.absorption[k][band])).ln())
+            .map(|k| {
+                ((1.0 - values[self.layout.absorption(k, band)]) / (1.0 - self.data.absorption[k][band])).ln()
+            })
             .collect();
         let moved = shift.iter().any(|s| *s != 0.0);
         let gain = self.gain_db(values, pair) * LN_PER_DB;
@@ -251,7 +202,10 @@ impl<'a> EnergyModel<'a> {
             }
             ln_energy.push(energy.ln() + gain);
             if sloping {
-                slopes.extend((0..m).map(|k| -mean_hits[k] / (energy * (1.0 - values[k * bands + band]))));
+                slopes.extend(
+                    (0..m)
+                        .map(|k| -mean_hits[k] / (energy * (1.0 - values[self.layout.absorption(k, band)]))),
+                );
             }
         }
         (ln_energy, slopes)
@@ -320,7 +274,6 @@ impl<'a> EnergyModel<'a> {
     fn band_likelihood(&self, values: &[f64], pair: usize, band: usize, slopes: Option<&mut Slopes>) -> f64 {
         let Some(energies) = self.compared(pair, band) else { return 0.0 };
         let count = energies.len();
-        let bands = self.data.survey.bands.len();
         let m = self.data.absorption.len();
         let gain_db = self.gain_db(values, pair);
         let changes = HitChanges::default();
@@ -340,7 +293,7 @@ impl<'a> EnergyModel<'a> {
         let Some(slopes) = slopes else { return value };
 
         // Columns that matter in this band, and the change of the predicted logarithm with each.
-        let mut columns: Vec<usize> = (0..m).map(|k| k * bands + band).collect();
+        let mut columns: Vec<usize> = (0..m).map(|k| self.layout.absorption(k, band)).collect();
         let through = self.through(values, &view, gain_db, &paths);
         let mut rows: Vec<Vec<f64>> =
             (0..m).map(|k| (0..count).map(|bin| path_slopes[bin * m + k] * through[bin]).collect()).collect();
@@ -351,13 +304,13 @@ impl<'a> EnergyModel<'a> {
             self.with_gain(values, &view, gain_db, &paths)
         };
         let gain: Vec<f64> = gained.iter().map(|t| t * LN_PER_DB).collect();
-        if let Some(index) = self.common_gain {
+        if let Some(index) = self.layout.common_gain() {
             columns.push(index);
             rows.push(gain.clone());
         }
-        columns.push(self.first_gain + self.assignment[pair]);
+        columns.push(self.layout.gain(self.assignment[pair]));
         rows.push(gain);
-        for placed in &self.effects {
+        for placed in &self.terms {
             for (i, p) in placed.parameters.iter().enumerate() {
                 if p.band.is_none_or(|own| own == band) {
                     columns.push(placed.first + i);
@@ -459,5 +412,80 @@ impl Model for EnergyModel<'_> {
             parts.iter().flat_map(|p| &p.1).for_each(|own| slopes.add(own));
         }
         parts.iter().map(|p| p.0).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::Effect;
+    use crate::effects::{
+        AirAbsorption, AngleDependentAbsorption, BackgroundNoise, CoupledVolume, RoomModes, Scattering,
+        SourceDirectivity, TransducerResponse, Truncation,
+    };
+    use crate::hand_made::Tables;
+    use sabine_acoustics::TimeZero;
+
+    /// Away from the expansion and from all neutral values and bounds.
+    fn somewhere(model: &EnergyModel<'_>) -> Vec<f64> {
+        let one = |(i, p): (usize, &Prior)| {
+            let sd = p.sd.min(0.2 * (p.high - p.low)).min(3.0);
+            (p.mean + 0.3 * sd * (1.0 + (i as f64).sin())).clamp(p.low + 0.1 * sd, p.high - 0.1 * sd)
+        };
+        model.priors.iter().enumerate().map(one).collect()
+    }
+
+    #[test]
+    fn the_gradient_is_that_of_central_differences() {
+        let effects: [&dyn Effect; 9] = [
+            &AirAbsorption,
+            &AngleDependentAbsorption,
+            &BackgroundNoise,
+            &CoupledVolume,
+            &RoomModes,
+            &Scattering,
+            &SourceDirectivity,
+            &TransducerResponse,
+            &Truncation,
+        ];
+        for levels in [Levels::Common, Levels::Absolute, Levels::PerResponse] {
+            let tables = Tables::new(levels, TimeZero::Emission);
+            let data = tables.energy_data();
+            let used = [true; 3];
+            for effect in effects {
+                let cases = effect.cases(&tables.survey);
+                let cases: Vec<&dyn Case> = cases.iter().map(|c| &**c).collect();
+                let model = EnergyModel::new(&data, &cases, &used);
+                let values = somewhere(&model);
+                let mut slopes = Slopes::zero(values.len());
+                model.log_likelihood(&values, Some(&mut slopes));
+                for i in 0..values.len() {
+                    let step = 1e-5 * model.priors[i].sd.min(1.0);
+                    let at = |offset: f64| {
+                        let mut moved = values.clone();
+                        moved[i] += offset;
+                        model.log_likelihood(&moved, None)
+                    };
+                    let expected = (at(step) - at(-step)) / (2.0 * step);
+                    let found = slopes.gradient[i];
+                    let off = (found - expected).abs();
+                    let name = effect.id();
+                    // Slopes of effects are differences themselves, rounded at 1e-6 of the likelihood's size.
+                    assert!(off < 1e-3 * expected.abs() + 2e-3, "{name} {levels:?} {i}: {found} {expected}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_response_that_does_not_count_has_no_say() {
+        let tables = Tables::new(Levels::Absolute, TimeZero::Emission);
+        let data = tables.energy_data();
+        let likelihood = |used: [bool; 3]| {
+            let model = EnergyModel::new(&data, &[], &used);
+            model.log_likelihood(&model.start(None), None)
+        };
+        let [first, second] = [[true, false, false], [false, true, true]].map(likelihood);
+        assert!((likelihood([true; 3]) - first - second).abs() < 1e-9);
     }
 }

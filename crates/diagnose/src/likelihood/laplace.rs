@@ -1,5 +1,6 @@
 //! The most probable parameters of a model, how sure they are, and how probable the model makes the data.
 
+use crate::effect::Parameter;
 use crate::error::Error;
 use nalgebra::{DMatrix, DVector};
 
@@ -15,6 +16,12 @@ pub(crate) struct Prior {
 impl Prior {
     pub fn normal(mean: f64, sd: f64) -> Self {
         Self { mean, sd, low: f64::NEG_INFINITY, high: f64::INFINITY }
+    }
+
+    /// That of a parameter of an effect.
+    pub fn of(parameter: &Parameter) -> Self {
+        let (low, high) = parameter.bounds;
+        Self { mean: parameter.neutral, sd: parameter.prior_sd, low, high }
     }
 }
 

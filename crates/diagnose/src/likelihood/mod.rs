@@ -5,5 +5,6 @@ pub(crate) mod decay;
 pub(crate) mod discrepancy;
 pub(crate) mod laplace;
 pub(crate) mod multilateration;
+pub(crate) mod parameters;
 pub(crate) mod polarity;
 pub(crate) mod reflection_gates;

@@ -160,9 +160,9 @@ pub(crate) fn gates(
 
 /// Logarithms of the isolated reflections' energies at fitted absorption.
 fn fitted(state: &BandState, bench: &Workbench, absorption: &[f64], band: usize) -> Vec<f64> {
-    let (materials, bands) = (bench.absorption.len(), bench.survey.bands.len());
+    let (materials, layout) = (bench.absorption.len(), bench.decay_layout());
     let change: Vec<f64> = (0..materials)
-        .map(|m| ((1.0 - absorption[m * bands + band]) / (1.0 - bench.absorption[m][band])).ln())
+        .map(|m| ((1.0 - absorption[layout.absorption(m, band)]) / (1.0 - bench.absorption[m][band])).ln())
         .collect();
     let one = |(i, l): (usize, &f64)| {
         let hits = &state.group_hits[i * materials..(i + 1) * materials];

@@ -39,24 +39,20 @@ pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -
         match nuisance {
             Nuisance::Absorption(m) => {
                 for b in 0..bands.len() {
-                    let i = m * bands.len() + b;
+                    let i = bench.decay_layout().absorption(m, b);
                     let name = format!("absorption_{}_hz", bands.nominal_hz(b));
                     push(name, state.energy.values[i], state.energy.sd(i), (0.0, 1.0), "");
                 }
             }
             Nuisance::SourcePosition(_) | Nuisance::ReceiverPosition(_) => {
-                let first = match nuisance {
-                    Nuisance::SourcePosition(i) => 3 * i,
-                    Nuisance::ReceiverPosition(i) => 3 * (bench.survey.sources.len() + i),
-                    _ => continue,
-                };
-                for (k, axis) in ["x", "y", "z"].iter().enumerate() {
-                    let (value, sd) = (state.arrivals.values[first + k], state.arrivals.sd(first + k));
+                let own = bench.arrival_layout().nuisance(nuisance).unwrap_or(0..0);
+                for (i, axis) in own.zip(["x", "y", "z"]) {
+                    let (value, sd) = (state.arrivals.values[i], state.arrivals.sd(i));
                     push(format!("offset_{axis}"), value, sd, open, "m");
                 }
             }
             Nuisance::ResponseGain(r) => {
-                let i = state.energy_gain(search, r);
+                let i = bench.decay_layout().gain(r);
                 push("gain".into(), state.energy.values[i], state.energy.sd(i), open, "dB");
             }
         }

@@ -122,6 +122,49 @@ impl BandState {
     }
 }
 
+#[cfg(test)]
+impl BandState {
+    /// A decay that falls by a neper in four bins: two groups of paths in each bin, whose hits grow with time, and tables of scattering and
+    /// of waves that change every bin.
+    pub fn by_hand(bins: Bins, count: usize, materials: usize, offset: f64) -> Self {
+        let early = |bin: usize| (-0.25 * bin as f64 - offset).exp();
+        let wavy =
+            |phase: f64| (0..count).map(|bin| 0.4 * (1.3 * bin as f64 + phase).sin()).collect::<Vec<f64>>();
+        let group_energy: Vec<f64> =
+            (0..count).flat_map(|bin| [0.7 * early(bin), 0.3 * early(bin)]).collect();
+        let hits =
+            |group: usize| (0..materials).map(move |m| 0.3 * (group / 2) as f64 + (group % 2 + m) as f64);
+        Self {
+            bins,
+            ln_energy: (0..count).map(|bin| early(bin).ln()).collect(),
+            own_share: 1.0,
+            leaks: Vec::new(),
+            groups: (0..=count).map(|bin| 2 * bin).collect(),
+            group_hits: (0..2 * count).flat_map(hits).collect(),
+            group_energy,
+            time_s: (0..count).map(|bin| bins.centre_s(bin)).collect(),
+            departure: (0..count).map(|bin| [0.5 - 0.1 * bin as f64, 0.2, -0.1]).collect(),
+            departure_products: vec![[0.4, 0.3, 0.3, 0.05, 0.0, -0.02]; count],
+            variance: (0..count).map(|bin| 0.15 + 0.02 * bin as f64).collect(),
+            monte_carlo: vec![0.0; count],
+            diffracted: DiffractedEnergy::default(),
+            scattering: SCATTERING_GRID
+                .iter()
+                .map(|extra| wavy(0.0).iter().map(|w| w * extra).collect())
+                .collect(),
+            scattering_variance: SCATTERING_GRID
+                .iter()
+                .map(|extra| vec![0.05 * extra.abs(); count])
+                .collect(),
+            local_reaction: LOCAL_GRID
+                .iter()
+                .map(|share| wavy(2.0).iter().map(|w| w * share).collect())
+                .collect(),
+            waves: wavy(1.0),
+        }
+    }
+}
+
 /// What a table, `[grid][bin]`, says between the places of its grid; nothing as long as it is empty.
 fn between(grid: &[f64], table: &[Vec<f64>], bin: usize, x: f64) -> f64 {
     if table.is_empty() {

@@ -106,12 +106,7 @@ struct HarmonicModel<'a> {
 impl<'a> HarmonicModel<'a> {
     fn new(cells: &'a [&'a PreArrivalBand], quiet: &[f64], parameters: &[Parameter]) -> Self {
         let mut priors: Vec<Prior> = quiet.iter().map(|q| Prior::normal(*q, FLOOR_SD)).collect();
-        priors.extend(parameters.iter().map(|p| Prior {
-            mean: p.neutral,
-            sd: p.prior_sd,
-            low: p.bounds.0,
-            high: p.bounds.1,
-        }));
+        priors.extend(parameters.iter().map(Prior::of));
         let mut octaves: Vec<f64> = cells.iter().map(|c| c.octaves_from_1khz).collect();
         octaves.sort_by(f64::total_cmp);
         octaves.dedup();

@@ -3,9 +3,9 @@
 use super::{ArrivalData, ArrivalModel, PEAKS_S, REFLECTION_SD_S, STRAY_SHARE, WIDTHS_S, at_fit, normal};
 use crate::effect::{Case, Nuisance};
 use crate::error::Error;
-use crate::likelihood::decay::ModelTerm;
 use crate::likelihood::laplace::{LaplaceFit, maximise};
 use crate::likelihood::multilateration::{UnassignedPeak, UnassignedPeaks};
+use crate::likelihood::parameters::ModelTerm;
 use crate::simulate::traced_pair::{Arrival, IsolatedReflection};
 use crate::simulate::views::ArrivalView;
 
@@ -29,7 +29,7 @@ impl<'a> ArrivalModel<'a> {
     pub(super) fn added(&self, values: &[f64], pair: usize) -> Vec<AddedArrival> {
         let one = |placed: &ModelTerm<'_>| {
             let survey = self.data.survey;
-            let range = placed.first..placed.first + placed.parameters.len();
+            let range = placed.range();
             let added = placed.case.added_reflection(&values[range.clone()], survey, pair)?;
             // What comes from where a predicted reflection comes from is that one: a wall must not be found a second time.
             let image = |direction: [f64; 3], length_m: f64| direction.map(|d| d * length_m);
@@ -62,7 +62,7 @@ impl<'a> ArrivalModel<'a> {
             }
             Some(AddedArrival { time_s, slopes, level_db: added.level_db, level_slopes })
         };
-        self.effects.iter().filter_map(one).collect()
+        self.terms.iter().filter_map(one).collect()
     }
 
     /// When reflections that effects add come, in seconds of the file.
@@ -114,19 +114,23 @@ impl<'a> ArrivalModel<'a> {
             arrival: single.arrival,
         };
         let moved: Vec<Nuisance> =
-            self.effects.iter().flat_map(|p| p.case.relaxes()).map(|(nuisance, _)| nuisance).collect();
+            self.terms.iter().flat_map(|p| p.case.relaxes()).map(|(nuisance, _)| nuisance).collect();
         let mut later_s = 0.0;
-        for placed in &self.effects {
-            let own = &values[placed.first..placed.first + placed.parameters.len()];
+        for placed in &self.terms {
+            let own = placed.own(values);
             if placed.case.warmer_by_k(own, self.data.survey) == 0.0 {
                 later_s += placed.case.delay_s(own, &view);
             }
         }
         for (place, first, direction) in [
-            (Nuisance::SourcePosition(response.source), self.source_index(response.source), single.departure),
+            (
+                Nuisance::SourcePosition(response.source),
+                self.layout.source(response.source).start,
+                single.departure,
+            ),
             (
                 Nuisance::ReceiverPosition(response.receiver),
-                self.receiver_index(response.receiver),
+                self.layout.receiver(response.receiver).start,
                 single.arrival,
             ),
         ] {
@@ -153,15 +157,15 @@ pub(super) fn fit(
     let mut origin: Vec<f64> = model.priors.iter().map(|p| p.mean).collect();
     let nuisances = known_firsts.first().copied().unwrap_or(known.values.len());
     origin[..nuisances].copy_from_slice(&known.values[..nuisances]);
-    for (i, placed) in model.effects.iter().enumerate().filter(|(i, _)| *i != place) {
+    for (i, placed) in model.terms.iter().enumerate().filter(|(i, _)| *i != place) {
         let first = known_firsts[if i < place { i } else { i - 1 }];
         let count = placed.parameters.len();
-        origin[placed.first..placed.first + count].copy_from_slice(&known.values[first..first + count]);
+        origin[placed.range()].copy_from_slice(&known.values[first..first + count]);
     }
-    let own = model.effects[place].first;
+    let own = model.terms[place].first;
     let mut best: Option<LaplaceFit> = None;
     // Where nothing points anywhere, the case is fitted where it does no harm.
-    let nowhere = vec![origin[own..own + model.effects[place].parameters.len()].to_vec()];
+    let nowhere = vec![model.terms[place].own(&origin).to_vec()];
     for start in if starts.is_empty() { &nowhere } else { &starts } {
         let mut x = origin.clone();
         x[own..own + start.len()].copy_from_slice(start);
@@ -176,6 +180,6 @@ pub(super) fn fit(
             best = Some(found);
         }
     }
-    let firsts = model.effects.iter().map(|p| p.first).collect();
+    let firsts = model.terms.iter().map(|p| p.first).collect();
     best.map(|b| (b, firsts)).ok_or(Error::Singular { what: "arrival times" })
 }

@@ -56,10 +56,9 @@ pub(crate) fn fit(
                     model.start_gains(&mut plain);
                     plain
                 });
-                let bands = data.survey.bands.len();
                 more.extend(WIDENED_STARTS.map(|absorption| {
                     let mut x = plain.clone();
-                    x[material * bands..(material + 1) * bands].fill(absorption);
+                    x[model.layout.material(material)].fill(absorption);
                     x
                 }));
             }

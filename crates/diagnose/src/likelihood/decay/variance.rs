@@ -31,9 +31,8 @@ impl EnergyModel<'_> {
         let mut variances = self.data.states[pair][band].variance[..count].to_vec();
         let changes = HitChanges::default();
         let view = self.view((pair, band), self.gain_db(values, pair), &changes);
-        for placed in &self.effects {
-            let own = &values[placed.first..placed.first + placed.parameters.len()];
-            placed.case.variance(own, &view, &mut variances);
+        for placed in &self.terms {
+            placed.case.variance(placed.own(values), &view, &mut variances);
         }
         variances
     }
@@ -57,7 +56,7 @@ impl EnergyModel<'_> {
         slopes: &mut Slopes,
     ) {
         let mut rows: Vec<(usize, Vec<f64>)> = Vec::new();
-        for placed in &self.effects {
+        for placed in &self.terms {
             for (i, p) in placed.parameters.iter().enumerate() {
                 if p.band.is_some_and(|own| own != band) {
                     continue;

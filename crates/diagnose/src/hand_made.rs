@@ -1,0 +1,179 @@
+//! A survey and tables of energy made by hand, for unit tests: no mesh, no paths, no files.
+
+use crate::likelihood::arrivals::ArrivalData;
+use crate::likelihood::decay::EnergyData;
+use crate::likelihood::laplace::Prior;
+use crate::observe::early_energy::EarlySamples;
+use crate::observe::observed_response::Measured;
+use crate::observe::time_bins::Bins;
+use crate::simulate::traced_pair::{Arrival, BandState};
+use crate::survey::{Place, Survey, SurveyedResponse};
+use sabine_acoustics::{Air, Bands, Levels, Measurement, TimeZero};
+
+/// Bins of each band.
+const BINS: usize = 14;
+
+/// Two materials, two octaves, one source, three receivers.
+pub(crate) fn survey(levels: Levels, time_zero: TimeZero) -> Survey {
+    let air = Air::new(20.0, 50.0, 101.325).expect("ordinary air");
+    let place = |id: &str, position_m| Place { id: id.to_owned(), position_m, axis: Some([1.0, 0.0, 0.0]) };
+    let receivers =
+        vec![place("r0", [3.0, 1.5, 1.2]), place("r1", [4.0, 3.0, 1.5]), place("r2", [1.5, 3.2, 1.1])];
+    let source = place("s0", [1.0, 1.0, 1.4]);
+    let responses = (0..3)
+        .map(|receiver| {
+            let far: f64 = (0..3)
+                .map(|k| (receivers[receiver].position_m[k] - source.position_m[k]).powi(2))
+                .sum::<f64>()
+                .sqrt();
+            SurveyedResponse {
+                source: 0,
+                receiver,
+                name: format!("s0-r{receiver}"),
+                air,
+                duration_s: 0.4,
+                direct_s: far / air.speed_of_sound_m_s(),
+            }
+        })
+        .collect();
+    Survey {
+        bands: Bands::octaves(1000.0, 2000.0).expect("two octaves"),
+        air,
+        air_assumed: false,
+        measurement: Measurement { time_zero, levels },
+        materials: vec!["carpet".to_owned(), "plaster".to_owned()],
+        sources: vec![source],
+        receivers,
+        responses,
+        box_m: [[0.0; 3], [5.0, 4.0, 2.5]],
+        declared_scattering: 0.1,
+        planes: Vec::new(),
+        material_areas_m2: vec![20.0, 65.0],
+        diffracted: Vec::new(),
+        bands_of_modes: 1,
+    }
+}
+
+/// Everything that a likelihood needs.
+pub(crate) struct Tables {
+    pub survey: Survey,
+    pub measured: Vec<Measured>,
+    pub states: Vec<Vec<BandState>>,
+    pub arrivals: Vec<Vec<Arrival>>,
+    ends: Vec<Vec<usize>>,
+    direct_s: Vec<f64>,
+    speed_m_s: Vec<f64>,
+    reference: Vec<f64>,
+    pub absorption: Vec<Vec<f64>>,
+    priors: Vec<Vec<Prior>>,
+    dispersion: Vec<f64>,
+}
+
+impl Tables {
+    /// Decays of 0.4 s with a scatter of a few decibels, one bin of which is far louder than anything predicted.
+    pub fn new(levels: Levels, time_zero: TimeZero) -> Self {
+        let survey = survey(levels, time_zero);
+        let (pairs, bands) = (survey.responses.len(), survey.bands.len());
+        let states: Vec<Vec<BandState>> = (0..pairs)
+            .map(|pair| {
+                let one = |band: usize| {
+                    BandState::by_hand(Bins::new(survey.bands, band), BINS, 2, 0.1 * pair as f64)
+                };
+                (0..bands).map(one).collect()
+            })
+            .collect();
+        let arrivals: Vec<Vec<Arrival>> = survey.responses.iter().map(|r| arrivals(&survey, r)).collect();
+        let measured =
+            (0..pairs).map(|pair| measured(&survey, pair, &states[pair], &arrivals[pair])).collect();
+        let prior = |mean: f64| Prior { mean, sd: 0.1, low: 0.002, high: 0.98 };
+        Self {
+            ends: vec![vec![BINS; bands]; pairs],
+            direct_s: survey.responses.iter().map(|r| r.direct_s).collect(),
+            speed_m_s: survey.responses.iter().map(|r| r.air.speed_of_sound_m_s()).collect(),
+            reference: vec![0.05; bands],
+            absorption: vec![vec![0.3, 0.4], vec![0.1, 0.12]],
+            priors: vec![vec![prior(0.3), prior(0.4)], vec![prior(0.1), prior(0.12)]],
+            dispersion: vec![1.0, 1.3],
+            survey,
+            measured,
+            states,
+            arrivals,
+        }
+    }
+
+    pub fn energy_data(&self) -> EnergyData<'_> {
+        EnergyData {
+            survey: &self.survey,
+            measured: &self.measured,
+            states: &self.states,
+            ends: &self.ends,
+            direct_s: &self.direct_s,
+            reference: &self.reference,
+            absorption: &self.absorption,
+            priors: &self.priors,
+            gain_sd_db: 0.4,
+            dispersion: &self.dispersion,
+        }
+    }
+
+    pub fn arrival_data(&self) -> ArrivalData<'_> {
+        ArrivalData {
+            survey: &self.survey,
+            measured: &self.measured,
+            arrivals: &self.arrivals,
+            speed_m_s: &self.speed_m_s,
+            position_sd_m: 0.01,
+        }
+    }
+}
+
+/// The direct sound and the first reflections at floor, ceiling and two walls.
+fn arrivals(survey: &Survey, response: &SurveyedResponse) -> Vec<Arrival> {
+    let source = survey.sources[response.source].position_m;
+    let receiver = survey.receivers[response.receiver].position_m;
+    let mut found = Vec::new();
+    for (axis, wall) in [(0, None), (2, Some(0.0)), (2, Some(2.5)), (0, Some(0.0)), (1, Some(4.0))] {
+        let mut image = source;
+        if let Some(wall) = wall {
+            image[axis] = 2.0 * wall - source[axis];
+        }
+        let way: [f64; 3] = std::array::from_fn(|k| image[k] - receiver[k]);
+        let length_m = way.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let arrival = way.map(|x| x / length_m);
+        let mut departure = arrival.map(|x| -x);
+        if wall.is_some() {
+            departure[axis] = -departure[axis];
+        }
+        found.push(Arrival { length_m, departure, arrival, energy: 1.0 / (length_m * length_m) });
+    }
+    found.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
+    found
+}
+
+fn measured(survey: &Survey, pair: usize, states: &[BandState], arrivals: &[Arrival]) -> Measured {
+    let speed_m_s = survey.responses[pair].air.speed_of_sound_m_s();
+    let off = [1.2, 0.7, 1.0, 1.6, 0.5, 0.9, 1.1];
+    let energies = states.iter().enumerate().map(|(band, state)| {
+        let one = |(bin, ln): (usize, &f64)| {
+            let far = if (pair, band, bin) == (1, 0, 6) { 40.0 } else { 1.0 };
+            far * off[(3 * pair + 5 * band + bin) % off.len()] * ln.exp()
+        };
+        Some(state.ln_energy.iter().enumerate().map(one).collect())
+    });
+    let later = &arrivals[1..];
+    Measured {
+        energies: energies.collect(),
+        direct_s: arrivals[0].length_m / speed_m_s + 6e-6,
+        peaks_s: later
+            .iter()
+            .zip([3e-5, -4e-5, 2e-5, 9e-5])
+            .map(|(a, d)| a.length_m / speed_m_s + d)
+            .collect(),
+        peaks_db: vec![-6.0; later.len()],
+        early: EarlySamples::default(),
+        pulse: Vec::new(),
+        lead_in: Vec::new(),
+        sample_rate_hz: 48_000,
+        duration_s: 0.4,
+    }
+}
