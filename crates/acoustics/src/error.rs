@@ -130,7 +130,7 @@ pub enum Error {
         file_bytes: u64,
     },
     /// A file of several channels where one was expected.
-    #[error("{}: {channels} channels; choose one, or their mean", path.display())]
+    #[error("{}: {channels} channels where one is needed: choose one, counted from 0, or their mean", path.display())]
     ManyChannels {
         /// The file.
         path: PathBuf,

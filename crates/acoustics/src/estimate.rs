@@ -26,6 +26,11 @@ impl Estimate {
     }
 }
 
+/// Rounded down, so that what is just too little is not printed as enough.
+fn floor_to_tenth(value: f64) -> f64 {
+    (10.0 * value).floor() / 10.0
+}
+
 /// A measured quantity: its estimate, or why it cannot be had.
 pub type Reading = Result<Estimate, NoReading>;
 
@@ -34,7 +39,7 @@ pub type Reading = Result<Estimate, NoReading>;
 #[non_exhaustive]
 pub enum NoReading {
     /// The noise floor, or the end of the response, comes before the decay has fallen far enough (ISO 3382-2, 5.3).
-    #[error("needs {needed_db:.0} dB of decay range; {available_db:.0} dB are available")]
+    #[error("needs {needed_db:.1} dB of decay range; {:.1} dB are available", floor_to_tenth(*available_db))]
     DynamicRange {
         /// Decay range that the quantity needs, in dB.
         needed_db: f64,
@@ -79,4 +84,15 @@ pub enum NoReading {
     /// The level does not fall, or the fit did not settle.
     #[error("the level does not decay")]
     NoDecay,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_range_that_is_just_too_small_does_not_look_large_enough() {
+        let reason = NoReading::DynamicRange { needed_db: 20.0, available_db: 19.98 };
+        assert_eq!(reason.to_string(), "needs 20.0 dB of decay range; 19.9 dB are available");
+    }
 }

@@ -97,9 +97,9 @@ pub enum Error {
         found_hz: u32,
     },
     /// Too few files, rooms or speakers for what is asked.
-    #[error("{needed} {what} are needed for {purpose}; there are {found}")]
+    #[error("{purpose}: at least {needed} {what} needed, {found} found")]
     TooFew {
-        /// What there is too little of.
+        /// What there is too little of, in the plural.
         what: &'static str,
         /// For what.
         purpose: &'static str,

@@ -106,10 +106,21 @@ impl PartitionConfig {
         dealt.extend(free.map(|name| (name.clone(), Partition::Train)));
         for partition in Partition::ALL {
             if !dealt.values().any(|&p| p == partition) {
-                return Err(Error::TooFew { what, purpose, needed: 3, found: known });
+                return Err(Error::TooFew { what: plural(what), purpose, needed: 3, found: known });
             }
         }
         Ok(dealt)
+    }
+}
+
+/// What is dealt out, as a sentence about several of them has it.
+fn plural(what: &'static str) -> &'static str {
+    match what {
+        "speaker" => "speakers",
+        "room" => "rooms",
+        "traced room" => "traced rooms",
+        "noise" => "noise files",
+        other => other,
     }
 }
 

@@ -1,5 +1,6 @@
 //! The command line: its subcommands, and what is true of all of them.
 
+use crate::channel;
 use crate::commands::{
     augment, diagnose, eq, estimate, evaluate, fit, listen, live, match_room, measure, mix, replace, trace,
     train, validate, walk,
@@ -11,6 +12,7 @@ use clap::builder::ValueParser;
 use clap::error::ErrorKind;
 use clap::{Arg, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::any::TypeId;
+use std::error::Error;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
@@ -112,10 +114,22 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> 
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            eprintln!("error: {error}{}", hint(&*error));
             ExitCode::FAILURE
         }
     }
+}
+
+/// The option that helps, where an error of a library cannot know it.
+fn hint(error: &(dyn Error + 'static)) -> String {
+    let mut cause = Some(error);
+    while let Some(error) = cause {
+        if matches!(error.downcast_ref(), Some(sabine::acoustics::Error::ManyChannels { .. })) {
+            return format!(" {}", channel::HINT);
+        }
+        cause = error.source();
+    }
+    String::new()
 }
 
 impl Job {

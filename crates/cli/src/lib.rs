@@ -22,6 +22,7 @@
 mod console;
 
 pub mod bar;
+mod channel;
 pub mod chart;
 mod command;
 mod commands;

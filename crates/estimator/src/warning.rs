@@ -81,7 +81,7 @@ impl fmt::Display for Warning {
             Self::Unfamiliar { novelty, limit } => {
                 write!(
                     f,
-                    "unlike the speech that was trained on: novelty {novelty:.1}, usual is below {limit:.1}"
+                    "unlike the speech that the network was trained on: its statistics are {novelty:.1} standard deviations away on average, those of 99.5 % of known recordings less than {limit:.1}"
                 )
             }
         }

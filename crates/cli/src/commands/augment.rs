@@ -141,6 +141,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             &observer,
         )?);
     }
+    // Before rooms are traced, which takes long.
+    config.check(&speech, &responses)?;
     let noise = match &arguments.noise {
         Some(folder) => NoiseCorpus::read(folder, rate_hz, &observer)?,
         None => NoiseCorpus::default(),

@@ -2,6 +2,7 @@
 //!
 //! `estimate_speech FILE... [--json F]`
 
+use crate::channel::channel;
 use crate::failure::Failure;
 use clap::Args;
 use sabine::acoustics::{Channel, read_audio, write_atomically};
@@ -16,9 +17,9 @@ pub struct Arguments {
     /// Recordings, 1 s or longer.
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Channel to listen to, counted from 0, where there are several.
-    #[arg(long)]
-    channel: Option<usize>,
+    /// Channel of files that have several, from 0, or `mean`; without it they must be mono
+    #[arg(long, value_name = "N|mean", value_parser = channel)]
+    channel: Option<Channel>,
     /// Write the numbers here as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
@@ -50,7 +51,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut entries = Vec::new();
     for file in &arguments.files {
         let name = |error: &dyn std::fmt::Display| format!("{}: {error}", file.display());
-        let speech = read_audio(file, arguments.channel.map_or(Channel::Mono, Channel::Index))?;
+        let speech = read_audio(file, arguments.channel.unwrap_or_default())?;
         let estimate = estimator.estimate_detailed(&speech).map_err(|error| name(&error))?;
         let entry = entry(file.clone(), &estimate);
         print(&entry);

@@ -1,5 +1,6 @@
 //! Measures impulse responses: room-acoustic parameters per octave, with the reason where there is no answer.
 
+use crate::channel::channel;
 use crate::chart::{Chart, Look, Scale, Series, chart_sheet};
 use crate::failure::Failure;
 use crate::output::OutputFolder;
@@ -23,9 +24,9 @@ pub struct Arguments {
     /// Impulse responses (WAV)
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// Channel of files that have several, from 0; without it they must be mono
-    #[arg(long)]
-    channel: Option<usize>,
+    /// Channel of files that have several, from 0, or `mean`; without it they must be mono
+    #[arg(long, value_name = "N|mean", value_parser = channel)]
+    channel: Option<Channel>,
     /// Lowest band in Hz [default: 62.5, or 50 in third octaves]
     #[arg(long, value_name = "HZ")]
     from: Option<f64>,
@@ -53,7 +54,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     } else {
         Bands::octaves(arguments.from.unwrap_or(62.5), arguments.to.unwrap_or(8000.0))?
     };
-    let channel = arguments.channel.map_or(Channel::Mono, Channel::Index);
+    let channel = arguments.channel.unwrap_or_default();
     let (mut results, mut plots) = (Vec::new(), Vec::new());
     for path in &arguments.files {
         let response = ImpulseResponse::from(read_audio(path, channel)?);

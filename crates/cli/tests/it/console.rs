@@ -58,3 +58,59 @@ fn manual_pages_cover_every_command() {
         assert!(page.contains(".TH") && page.contains("sabine"), "{}", job.get_name());
     }
 }
+
+/// A file of two channels: the left one rings longer.
+fn stereo(folder: &std::path::Path) -> std::path::PathBuf {
+    use sabine::acoustics::{SampleFormat, write_wav_channels};
+    let decay = |t60_s: f32| -> Vec<f32> {
+        let noise = (0..24_000u32).map(|i| ((i.wrapping_mul(2_654_435_761) >> 8) as f32 / 8_388_608.0) - 1.0);
+        noise.enumerate().map(|(i, n)| 0.3 * n * (-6.9 * i as f32 / 48_000.0 / t60_s).exp()).collect()
+    };
+    let path = folder.join("stereo.wav");
+    write_wav_channels(&path, &[&decay(0.4), &decay(0.2)], 48_000, SampleFormat::Float32).unwrap();
+    path
+}
+
+#[test]
+fn a_file_of_two_channels_names_the_option_that_chooses() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = stereo(folder.path());
+    let refused = sabine("measure").arg(&file).output().unwrap();
+    let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert_eq!(refused.status.code(), Some(1), "{message}");
+    for part in ["stereo.wav", "2 channels", "--channel 0", "--channel mean"] {
+        assert!(message.contains(part), "{part}: {message}");
+    }
+    for choice in ["0", "1", "mean"] {
+        let output = sabine("measure").arg(&file).args(["--channel", choice]).output().unwrap();
+        assert!(output.status.success(), "{choice}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    let odd = sabine("measure").arg(&file).args(["--channel", "left"]).output().unwrap();
+    assert_eq!(odd.status.code(), Some(2));
+}
+
+#[test]
+fn too_few_speakers_are_found_before_rooms_are_traced() {
+    let folder = tempfile::tempdir().unwrap();
+    let fixtures = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures");
+    for speaker in ["one", "two"] {
+        let own = folder.path().join("speech").join(speaker);
+        std::fs::create_dir_all(&own).unwrap();
+        std::fs::copy(fixtures.join("speech/dry_talker.wav"), own.join("a.wav")).unwrap();
+    }
+    let out = folder.path().join("out");
+    // So many rooms would take an hour.
+    let output = sabine("augment")
+        .arg("--speech")
+        .arg(folder.path().join("speech"))
+        .arg("--rir")
+        .arg(fixtures.join("room/ir"))
+        .args(["--rooms", "20000", "--count", "10", "--measured", "0,0,0", "--out"])
+        .arg(&out)
+        .output()
+        .unwrap();
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("at least 3 speakers needed, 2 found"), "{message}");
+    assert!(!out.join("rooms").exists());
+}

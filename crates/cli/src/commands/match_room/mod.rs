@@ -5,6 +5,7 @@
 pub mod report;
 
 use crate::bar::Bar;
+use crate::channel::channel;
 use crate::demo::Demo;
 use crate::failure::Failure;
 use crate::output::OutputFolder;
@@ -37,9 +38,9 @@ pub struct Arguments {
     /// Sound to place in the room (WAV) [default: the built-in demo]
     #[arg(long, value_name = "F.wav")]
     dry: Option<PathBuf>,
-    /// Channel of the recordings, from 0; without it they must be mono
-    #[arg(long)]
-    channel: Option<usize>,
+    /// Channel of files that have several, from 0, or `mean`; without it they must be mono
+    #[arg(long, value_name = "N|mean", value_parser = channel)]
+    channel: Option<Channel>,
     /// Seed of rays and noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -67,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
     // A folder that cannot be written to should not cost the user a computation first.
     let mut out = OutputFolder::create(&arguments.out)?;
-    let channel = arguments.channel.map_or(Channel::Mono, Channel::Index);
+    let channel = arguments.channel.unwrap_or_default();
     let speech = read_audio(&speech_path, channel)?;
     let dry = read_audio(&dry_path, channel)?;
     let (mut room, room_name) = arguments.room.read(&mut demo)?;
