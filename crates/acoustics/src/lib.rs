@@ -144,6 +144,7 @@ pub use estimate::{Estimate, NoReading, Reading};
 pub use filter_bank::FilterBank;
 pub use material::Material;
 pub use material_library::{LibraryMaterial, library_material, material_library};
+pub use measured_room::materials::{MaterialTable, Materials};
 pub use measured_room::{
     Levels, MaterialPrior, MeasuredRoom, Measurement, NewResponse, NewRoom, ResponseEntry, TimeZero,
 };

@@ -1,6 +1,7 @@
 //! A room as it was measured: mesh, materials as far as they are known, places and responses, from a folder.
 
 mod file;
+pub(crate) mod materials;
 mod other_model;
 mod write;
 

@@ -1,6 +1,6 @@
 //! The answer, put together from its bands.
 
-use crate::fit::{AtBound, MaterialFit, Warning};
+use crate::fit::{AtBound, MaterialFit, Unconverged, Warning};
 use crate::history::History;
 use crate::uncertainty::Spread;
 use crate::unknowns::BandPrior;
@@ -18,11 +18,24 @@ pub(crate) struct FoundBand<'s> {
     pub spread: &'s Spread,
     /// Its place in that group.
     pub place: usize,
+    /// Why there is no answer, where there is none.
+    pub unconverged: Option<Unconverged>,
+}
+
+impl FoundBand<'_> {
+    /// Standard error of a material; what is no answer is known no better than beforehand.
+    fn standard_error(&self, material: usize) -> f64 {
+        let error = self.spread.standard_error[self.place][material];
+        if self.unconverged.is_some() { error.max(self.prior.standard_deviation[material]) } else { error }
+    }
 }
 
 impl MaterialFit {
     /// Materials, their standard errors, bounds, open questions and far priors of all bands; reverberation times are left to
     /// whoever reads them.
+    ///
+    /// # Errors
+    /// [`Error::NotConverged`] if no band has an answer.
     pub(crate) fn of_bands(
         materials: &[Material],
         histories: &[History],
@@ -30,6 +43,11 @@ impl MaterialFit {
         config: &FitConfig,
     ) -> Result<Self, Error> {
         let octaves = materials[0].bands();
+        let with_data: Vec<&FoundBand<'_>> = found.iter().filter(|f| f.spread.data[f.place]).collect();
+        let failed = with_data.iter().filter_map(|f| f.unconverged);
+        if let Some(reason) = failed.clone().next().filter(|_| failed.count() == with_data.len()) {
+            return Err(Error::NotConverged { bands: with_data.len(), reason });
+        }
         let hits: Vec<u64> =
             (0..materials.len()).map(|k| histories.iter().map(|h| h.hits[k]).sum()).collect();
         let mut fit = Self {
@@ -45,6 +63,9 @@ impl MaterialFit {
         };
         for (band_hz, found) in octaves.iter_hz().zip(found) {
             let prior = found.prior;
+            if let Some(reason) = found.unconverged {
+                fit.warnings.push(Warning::NotConverged { band_hz, reason });
+            }
             let bounded = AtBound::find(&prior.standard_deviation, found.absorption, band_hz, config.bounds);
             let open = &mut fit.not_determined;
             found.spread.name_open(found.place, &prior.standard_deviation, band_hz, &hits, &bounded, open);
@@ -59,7 +80,7 @@ impl MaterialFit {
         for (k, material) in materials.iter().enumerate() {
             let absorption = PerBand::from_fn(octaves, |b| found[b].absorption[k]);
             fit.materials.push(material.with_absorption(absorption)?);
-            let error = |b: usize| found[b].spread.standard_error[found[b].place][k];
+            let error = |b: usize| found[b].standard_error(k);
             fit.absorption_standard_error.push(PerBand::from_fn(octaves, error));
         }
         Ok(fit)

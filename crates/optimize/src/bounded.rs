@@ -1,11 +1,26 @@
 //! L-BFGS-B on any objective.
 
 use crate::Error;
-use basin::{BoxBounds, ConstraintDescription, ConstraintSet, Executor, FirstOrderState, Lbfgsb};
+use basin::{
+    BoxBounds, ConstraintDescription, ConstraintSet, Executor, FirstOrderState, Lbfgsb, Termination,
+};
 use sabine_acoustics::Objective;
 use std::convert::Infallible;
 
-/// Where a minimisation ended.
+/// Why a minimisation stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Stop {
+    /// The projected gradient is below 1e-9, or the cost fell by no more than rounding.
+    Converged,
+    /// The iterations ran out.
+    IterationLimit,
+    /// No step along a direction of descent lowered the cost: it is not finite there, rounding hides its fall, or the gradient is
+    /// wrong. `x` is the best point so far, which may be the start.
+    NoDescent,
+}
+
+/// Where a minimisation ended. Only [`Stop::Converged`] says that it is a minimum.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Minimum {
     /// The variables.
@@ -14,6 +29,18 @@ pub struct Minimum {
     pub cost: f64,
     /// Iterations of the solver.
     pub iterations: usize,
+    /// Why it stopped.
+    pub stop: Stop,
+    /// Euclidean norm of the gradient there, without the components that point out of the bounds.
+    pub gradient_norm: f64,
+}
+
+impl Minimum {
+    /// Whether the cost could fall by no more than `gain` from here on. The costs of this crate contain squared standardised
+    /// deviations, whose curvature is 1: at most half the squared gradient is left.
+    pub(crate) fn is_within(&self, gain: f64) -> bool {
+        self.stop == Stop::Converged || 0.5 * self.gradient_norm * self.gradient_norm <= gain
+    }
 }
 
 /// Minimises an objective within bounds by L-BFGS-B (Zhu et al. 1997, version 3.0) from `start`, which is moved inside them.
@@ -30,11 +57,13 @@ pub struct Minimum {
 /// }
 /// let minimum = sabine_optimize::minimise(&Parabola, &[0.0], &[0.0], &[2.0], 20)?;
 /// assert_eq!(minimum.x, [2.0]); // 3 lies beyond the bound
+/// assert_eq!(minimum.stop, sabine_optimize::Stop::Converged);
 /// # Ok::<(), sabine_optimize::Error>(())
 /// ```
 ///
 /// # Errors
-/// [`Error::Count`] where lengths differ, [`Error::Solver`] for bounds that contradict each other.
+/// [`Error::Count`] where lengths differ, [`Error::Solver`] for bounds that contradict each other, [`Error::NotFinite`] if the
+/// cost at the start is not finite. A minimisation that stops early is no error: see [`Minimum::stop`].
 pub fn minimise(
     objective: &dyn Objective,
     start: &[f64],
@@ -52,18 +81,31 @@ pub fn minimise(
     }
     if expected == 0 {
         let cost = objective.value_and_gradient(&[], &mut []);
-        return Ok(Minimum { x: Vec::new(), cost, iterations: 0 });
+        let stop = Stop::Converged;
+        return Ok(Minimum { x: Vec::new(), cost, iterations: 0, stop, gradient_norm: 0.0 });
     }
     let problem = Boxed { objective, lower: lower.to_vec(), upper: upper.to_vec() };
     let result = Executor::new(problem, Lbfgsb::new(), FirstOrderState::new(start.to_vec()))
         .max_iter(max_iterations as u64)
         .run()
         .map_err(|source| Error::Solver { source: Box::new(source) })?;
-    Ok(Minimum {
-        x: result.best_param().clone(),
-        cost: result.best_cost(),
-        iterations: result.iter() as usize,
-    })
+    let (x, cost) = (result.best_param().clone(), result.best_cost());
+    if !cost.is_finite() {
+        return Err(Error::NotFinite { cost });
+    }
+    let stop = match result.report.termination {
+        Termination::Converged(_) => Stop::Converged,
+        Termination::Limit(_) => Stop::IterationLimit,
+        _ => Stop::NoDescent,
+    };
+    let mut gradient = vec![0.0; expected];
+    objective.value_and_gradient(&x, &mut gradient);
+    let inward = |i: usize| {
+        let outward = (x[i] <= lower[i] && gradient[i] > 0.0) || (x[i] >= upper[i] && gradient[i] < 0.0);
+        if outward { 0.0 } else { gradient[i] }
+    };
+    let gradient_norm = (0..expected).map(|i| inward(i).powi(2)).sum::<f64>().sqrt();
+    Ok(Minimum { x, cost, iterations: result.iter() as usize, stop, gradient_norm })
 }
 
 struct Boxed<'a> {

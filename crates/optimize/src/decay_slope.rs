@@ -2,14 +2,10 @@
 
 use crate::decay::slope_with_sensitivity;
 use crate::expansion::{Bins, Expansion};
-use crate::history::History;
-use crate::objective::SlopeModel;
+use crate::history::{History, Traces};
+use crate::slope_model::SlopeModel;
 use sabine_acoustics::{EnergyDecayCurve, Estimate, NoReading, Reading};
 use std::borrow::Borrow;
-
-/// The traces of one source-receiver pair, each a history and the weights of its paths in a band, the share of the trace in
-/// the whole included: their energies add up.
-pub(crate) type Traces<H> = Vec<(H, Vec<f32>)>;
 
 /// Slope of the decay curves of several source-receiver pairs: -60 over the mean of their reverberation times
 /// (ISO 3382-1, 8.1: arithmetic mean over positions).

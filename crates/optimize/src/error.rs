@@ -112,6 +112,20 @@ pub enum Error {
         /// Number of bands.
         bands: usize,
     },
+    /// The fit converged in none of the bands, so that there is no result at all.
+    #[error("the fit has converged in none of {bands} bands: {reason}")]
+    NotConverged {
+        /// Number of bands.
+        bands: usize,
+        /// Why, in the first of them.
+        reason: crate::Unconverged,
+    },
+    /// The cost of a minimisation is not finite at its start.
+    #[error("the cost at the start is {cost}; it must be finite")]
+    NotFinite {
+        /// The cost.
+        cost: f64,
+    },
     /// A vocabulary value was refused, or the observer stopped the fit.
     #[error(transparent)]
     Acoustics(#[from] sabine_acoustics::Error),

@@ -1,9 +1,8 @@
 //! A decay curve near given materials: one energy and one mean number of hits for each time bin, instead of all paths.
 
 use crate::decay::slope_with_sensitivity;
-use crate::decay_slope::Traces;
-use crate::history::History;
-use crate::objective::SlopeModel;
+use crate::history::{History, Traces};
+use crate::slope_model::SlopeModel;
 use std::borrow::Borrow;
 
 /// Energies of the time bins about a point: E(a) = E0 product of ((1 - a)/(1 - a0))^h, h being the mean number of hits of the

@@ -21,7 +21,7 @@ pub struct MaterialFit {
     pub at_bounds: Vec<AtBound>,
     /// Absorptions, or differences between them, that the data leave open.
     pub not_determined: Vec<Undetermined>,
-    /// Answers to be taken with care.
+    /// Answers to be taken with care, and bands without one ([`Warning::NotConverged`]).
     pub warnings: Vec<Warning>,
     /// Iterations of the solver, over all bands and rounds.
     pub iterations: usize,
@@ -206,12 +206,13 @@ pub enum Warning {
         /// Fitted absorption less the prior's mean, in standard deviations.
         deviations: f64,
     },
-    /// The fit to responses stopped before the materials came to rest.
-    NotSettled {
+    /// The fit of this band has not converged: its absorptions are where the solver stopped, not a result. Their standard errors are
+    /// no less than those of the priors.
+    NotConverged {
         /// Nominal centre of the band, in Hz.
         band_hz: f64,
-        /// Greatest change of a material in the last round, in standard deviations of its prior.
-        deviations: f64,
+        /// Why.
+        reason: Unconverged,
     },
     /// So few paths carry the decay that T60 is uncertain by more than 3 %: the fit follows their accidents, and other
     /// rays will decay otherwise, most likely longer.
@@ -232,6 +233,42 @@ pub enum Warning {
     },
 }
 
+/// Why a fit has not converged.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Unconverged {
+    /// The iterations ran out while a material still moved.
+    StillMoving {
+        /// Greatest change of a material in the last round, in standard deviations of its prior.
+        deviations: f64,
+    },
+    /// The solver found no step that lowers the cost, though the gradient is not zero.
+    NoDescent,
+}
+
+impl fmt::Display for Unconverged {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::StillMoving { deviations } => write!(
+                f,
+                "the iterations ran out while a material still moved by {deviations:.2} standard deviations of its prior"
+            ),
+            Self::NoDescent => f.write_str("the solver found no step that lowers the cost"),
+        }
+    }
+}
+
+impl MaterialFit {
+    /// Nominal centres of the bands in which the fit has not converged, in Hz; empty for a result.
+    pub fn unconverged_hz(&self) -> Vec<f64> {
+        let of = |warning: &Warning| match warning {
+            Warning::NotConverged { band_hz, .. } => Some(*band_hz),
+            _ => None,
+        };
+        self.warnings.iter().filter_map(of).collect()
+    }
+}
+
 impl Warning {
     /// The warning in words, with a name for each material; one without a name is called by its number.
     pub fn describe(&self, names: &[&str]) -> String {
@@ -240,9 +277,9 @@ impl Warning {
                 "{band_hz} Hz: {} had to move {deviations:+.1} standard deviations from its prior",
                 name_of(*material, names)
             ),
-            Self::NotSettled { band_hz, deviations } => format!(
-                "{band_hz} Hz: the fit has not settled; a material still moved by {deviations:.2} standard deviations"
-            ),
+            Self::NotConverged { band_hz, reason } => {
+                format!("{band_hz} Hz: the fit has not converged, this is no result: {reason}")
+            }
             Self::FewPaths { band_hz, relative_error } => format!(
                 "{band_hz} Hz: the rays leave T60 uncertain by {:.0} %; trace more of them",
                 100.0 * relative_error
@@ -278,6 +315,29 @@ fn bands_in_words(bands_hz: &[f64]) -> String {
     match bands_hz {
         [first, _, .., last] if octaves => format!("{} to {}", band(*first), band(*last)),
         _ => in_words(&bands_hz.iter().map(|&hz| band(hz)).collect::<Vec<_>>()),
+    }
+}
+
+/// Whether an absorption stands at a bound, but for a rounding error.
+pub(crate) fn at_bound(absorption: f64, bound: f64) -> bool {
+    (absorption - bound).abs() < 1e-7
+}
+
+impl AtBound {
+    pub(crate) fn find(
+        standard_deviation: &[f64],
+        absorption: &[f64],
+        band_hz: f64,
+        bounds: (f64, f64),
+    ) -> Vec<Self> {
+        let free = absorption.iter().enumerate().filter(|&(k, _)| standard_deviation[k] > 0.0);
+        free.flat_map(|(material, &a)| {
+            [(bounds.0, false), (bounds.1, true)]
+                .into_iter()
+                .filter(move |&(bound, _)| at_bound(a, bound))
+                .map(move |(absorption, upper)| Self { material, band_hz, absorption, upper })
+        })
+        .collect()
     }
 }
 

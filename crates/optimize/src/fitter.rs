@@ -2,10 +2,9 @@
 
 use crate::assembly::FoundBand;
 use crate::decay_slope::DecaySlope;
-use crate::fit::{AtBound, MaterialFit, Unreachable, UnreachableReason, Warning};
+use crate::fit::{MaterialFit, Unreachable, UnreachableReason, Warning, at_bound};
 use crate::group::{Band, Fitted, Group};
-use crate::history::History;
-use crate::objective::check_paths;
+use crate::history::{History, Trace, by_pair, check_paths};
 use crate::single_paths::SinglePathSlope;
 use crate::uncertainty::Spread;
 use crate::unknowns::BandPrior;
@@ -52,7 +51,7 @@ impl MaterialFitter {
     /// nearest band which has one: 62.5 Hz that of 125 Hz, as the paper does.
     ///
     /// # Errors
-    /// For paths, materials, priors or targets that do not match or are out of range, paths too short for a target, and
+    /// For paths, materials, priors or targets that do not match or are out of range, paths too short for a target, [`Error::NotConverged`] if the fit converges in none of the bands, and
     /// [`sabine_acoustics::Error::Cancelled`] if the observer asks to stop. A target that cannot be reached is no error.
     #[allow(clippy::too_many_arguments)] // each is a different thing that only the caller has
     pub fn fit_t60(
@@ -149,7 +148,13 @@ impl MaterialFitter {
             .map(|(b, band)| {
                 let (solution, spread) = &fitted[b / together];
                 let place = b % together;
-                FoundBand { prior: &band.prior, absorption: &solution.bands[place].absorption, spread, place }
+                FoundBand {
+                    prior: &band.prior,
+                    absorption: &solution.bands[place].absorption,
+                    spread,
+                    place,
+                    unconverged: solution.unconverged,
+                }
             })
             .collect();
         let mut fit = MaterialFit::of_bands(materials, &histories, &found, &self.config)?;
@@ -246,25 +251,6 @@ impl MaterialFitter {
     }
 }
 
-/// One trace of a source-receiver pair.
-#[derive(Clone, Copy)]
-pub(crate) struct Trace<'p> {
-    pub pair: usize,
-    pub paths: &'p PathSet,
-    /// What its energies count: the shares of the traces of a pair sum to 1.
-    pub share: f64,
-}
-
-/// Collects what belongs to the same pair.
-pub(crate) fn by_pair<T>(traces: &[Trace<'_>], of_trace: Vec<T>) -> Vec<Vec<T>> {
-    let pairs = traces.iter().map(|t| t.pair + 1).max().unwrap_or(0);
-    let mut grouped: Vec<Vec<T>> = (0..pairs).map(|_| Vec::new()).collect();
-    for (trace, value) in traces.iter().zip(of_trace) {
-        grouped[trace.pair].push(value);
-    }
-    grouped
-}
-
 fn check_targets(target_t60_s: &PerBand<Estimate>) -> Result<(), Error> {
     let (low_s, high_s) = TARGET_RANGE_S;
     for (band_hz, target) in target_t60_s.iter() {
@@ -276,27 +262,4 @@ fn check_targets(target_t60_s: &PerBand<Estimate>) -> Result<(), Error> {
         }
     }
     Ok(())
-}
-
-/// Whether an absorption stands at a bound, but for a rounding error.
-pub(crate) fn at_bound(absorption: f64, bound: f64) -> bool {
-    (absorption - bound).abs() < 1e-7
-}
-
-impl AtBound {
-    pub(crate) fn find(
-        standard_deviation: &[f64],
-        absorption: &[f64],
-        band_hz: f64,
-        bounds: (f64, f64),
-    ) -> Vec<Self> {
-        let free = absorption.iter().enumerate().filter(|&(k, _)| standard_deviation[k] > 0.0);
-        free.flat_map(|(material, &a)| {
-            [(bounds.0, false), (bounds.1, true)]
-                .into_iter()
-                .filter(move |&(bound, _)| at_bound(a, bound))
-                .map(move |(absorption, upper)| Self { material, band_hz, absorption, upper })
-        })
-        .collect()
-    }
 }

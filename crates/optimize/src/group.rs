@@ -1,11 +1,12 @@
 //! Bands that are fitted together, and the rounds in which their targets are met.
 
-use crate::bounded::{Minimum, minimise};
+use crate::bounded::{Minimum, Stop, minimise};
 use crate::decay_slope::DecaySlope;
 use crate::expansion::Expansion;
+use crate::fit::Unconverged;
 use crate::history::History;
-use crate::objective::SlopeModel;
 use crate::single_paths::SinglePathSlope;
+use crate::slope_model::SlopeModel;
 use crate::unknowns::{BandPrior, Unknowns};
 use crate::{Error, FitConfig};
 use rayon::prelude::*;
@@ -68,6 +69,8 @@ pub(crate) struct Solution {
     pub bands: Vec<Fitted>,
     pub iterations: usize,
     pub cost: f64,
+    /// Why it is no result, if the fit has not converged.
+    pub unconverged: Option<Unconverged>,
 }
 
 /// Where the fit of a band ended.
@@ -88,6 +91,11 @@ const STRIDE: f64 = 1.6;
 /// Change of any material, in standard deviations of its prior, below which another pass would bring nothing: the error
 /// left is of the order of its square.
 const SETTLED: f64 = 0.02;
+/// How far a step may go after one that failed, and below which reach no shorter one is tried, in standard deviations of the priors.
+const FIRST_REACH: f64 = 1.0;
+const MIN_REACH: f64 = 1e-6;
+/// A gain in log-probability that is not worth another iteration: it moves a material by a few hundredths of its standard deviation.
+const WORTHLESS: f64 = 1e-3;
 /// Square of the relative change of a slope over one standard deviation of the prior that is rounding: a slope that nothing moves, as
 /// that of a single path, is not fitted.
 const RIGID: f64 = 1e-18;
@@ -96,7 +104,7 @@ const RIGID: f64 = 1e-18;
 /// deviations, subject to m/m' = 1, by the method of multipliers (Nocedal and Wright 2006, chapter 17).
 ///
 /// The decay curves are expanded about the present materials, the problem is solved on the expansion, and expanded again,
-/// until the materials settle. Four passes over the paths are usual, instead of one for each of some thirty evaluations.
+/// until the materials stay where they are. Four passes over the paths are usual, instead of one for each of some thirty evaluations.
 pub(crate) struct Group<'a, 'b> {
     bands: &'b [Band<'a>],
     config: &'b FitConfig,
@@ -136,8 +144,13 @@ impl<'a, 'b> Group<'a, 'b> {
         let (mut relaxation, mut last) = (1.0, vec![0.0; x.len()]);
         for _ in 0..PASSES {
             let at_last = rounds.approach(&x);
-            let minimum = rounds.solve(&x, reach)?;
+            let (minimum, failed) = rounds.solve(&x, reach)?;
             iterations += minimum.iterations;
+            if failed {
+                // The solver's first step was too long.
+                reach = 0.25 * reach.min(FIRST_REACH);
+                continue;
+            }
             let moved = self.unknowns.distance(&x, &minimum.x);
             // Steps that turn back upon themselves are shortened: what the expansion leaves out makes them overshoot.
             let step: Vec<f64> = x.iter().zip(&minimum.x).map(|(from, to)| to - from).collect();
@@ -153,21 +166,40 @@ impl<'a, 'b> Group<'a, 'b> {
                 _ => w,
             });
             if at_last && moved < SETTLED && surprise < 0.1 * self.config.target_tolerance {
-                return Ok(self.solution(&x, rounds.models, iterations));
+                return Ok(self.solution(&x, rounds.models, iterations, None));
             }
             // An expansion that was far off was trusted too far.
             let stepped = last.iter().fold(0.0, |w: f64, s| w.max(s.abs()));
             reach = if surprise > 0.1 { 0.5 * stepped } else { 2.0 * reach };
         }
-        // The expansion does not settle, where bins hold few paths of very different histories: use the paths themselves.
+        // The expansion does not converge, where bins hold few paths of very different histories: use the paths themselves.
         rounds.models = self.bands.iter().map(Band::paths).collect();
         rounds.aim.fill(1.0);
-        let minimum = rounds.solve(&x, f64::INFINITY)?;
+        let (mut minimum, mut failed) = rounds.solve(&x, f64::INFINITY)?;
+        let mut reach = FIRST_REACH;
+        while failed && reach > MIN_REACH {
+            iterations += minimum.iterations;
+            (minimum, failed) = rounds.solve(&x, reach)?;
+            reach *= 0.25;
+        }
         rounds.models = self.expand(&minimum.x);
-        Ok(self.solution(&minimum.x, rounds.models, iterations + minimum.iterations))
+        let unconverged = match minimum.stop {
+            _ if failed => Some(Unconverged::NoDescent),
+            Stop::Converged | Stop::NoDescent => None,
+            // The curvature is 1 or more: no material would move farther than this.
+            Stop::IterationLimit => Some(Unconverged::StillMoving { deviations: minimum.gradient_norm })
+                .filter(|_| !minimum.is_within(WORTHLESS)),
+        };
+        Ok(self.solution(&minimum.x, rounds.models, iterations + minimum.iterations, unconverged))
     }
 
-    fn solution(&self, x: &[f64], models: Vec<Model<'b>>, iterations: usize) -> Solution {
+    fn solution(
+        &self,
+        x: &[f64],
+        models: Vec<Model<'b>>,
+        iterations: usize,
+        unconverged: Option<Unconverged>,
+    ) -> Solution {
         let absorption = self.unknowns.absorption(x);
         let at = |((band, model), absorption): ((&Band<'_>, Model<'_>), &Vec<f64>)| {
             let mut gradient = vec![0.0; absorption.len()];
@@ -180,7 +212,7 @@ impl<'a, 'b> Group<'a, 'b> {
         };
         let bands = self.bands.par_iter().zip(models).zip(&absorption).map(at).collect();
         let cost = self.unknowns.prior_cost(x, &mut vec![0.0; x.len()]);
-        Solution { bands, iterations, cost }
+        Solution { bands, iterations, cost, unconverged }
     }
 
     fn expand(&self, x: &[f64]) -> Vec<Model<'b>> {
@@ -271,19 +303,23 @@ impl<'g, 'a, 'b> Rounds<'g, 'a, 'b> {
     }
 
     /// Minimises, shifts the targets by what is missing, and minimises again, until they are met or nothing helps.
-    /// No variable moves by more than `reach`.
-    fn solve(&mut self, start: &[f64], reach: f64) -> Result<Minimum, Error> {
+    /// No variable moves by more than `reach`. Also whether the solver failed at the start.
+    fn solve(&mut self, start: &[f64], reach: f64) -> Result<(Minimum, bool), Error> {
         let config = self.group.config;
         // A tenth of the tolerance, so that a target is well met where it can be.
         let enough = 0.1 * config.target_tolerance;
         let mut before = vec![f64::INFINITY; self.models.len()];
         let mut stuck = vec![0; self.models.len()];
-        let mut minimum = Minimum { x: start.to_vec(), cost: f64::NAN, iterations: 0 };
+        let (x, stop) = (start.to_vec(), Stop::IterationLimit);
+        let mut minimum = Minimum { x, cost: f64::NAN, iterations: 0, stop, gradient_norm: f64::INFINITY };
         let unknowns = &self.group.unknowns;
         let lower: Vec<f64> = unknowns.lower.iter().zip(start).map(|(l, x)| l.max(x - reach)).collect();
         let upper: Vec<f64> = unknowns.upper.iter().zip(start).map(|(u, x)| u.min(x + reach)).collect();
         for _ in 0..config.max_rounds {
             let next = minimise(&*self, &minimum.x, &lower, &upper, config.max_iterations)?;
+            if minimum.iterations == 0 && next.iterations == 0 && !next.is_within(WORTHLESS) {
+                return Ok((next, true));
+            }
             minimum = Minimum { iterations: minimum.iterations + next.iterations, ..next };
             let mut open = false;
             for (b, residual) in self.residual(&minimum.x).into_iter().enumerate() {
@@ -300,7 +336,7 @@ impl<'g, 'a, 'b> Rounds<'g, 'a, 'b> {
                 break;
             }
         }
-        Ok(minimum)
+        Ok((minimum, false))
     }
 }
 

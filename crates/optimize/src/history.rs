@@ -232,3 +232,52 @@ pub(crate) fn variance_of_sum(parts: &[f64]) -> f64 {
     let scatter: f64 = parts.iter().map(|p| (p - mean) * (p - mean)).sum();
     scatter * n / (n - 1.0)
 }
+
+/// The traces of one source-receiver pair, each a history and the weights of its paths in a band, the share of the trace in
+/// the whole included: their energies add up.
+pub(crate) type Traces<H> = Vec<(H, Vec<f32>)>;
+
+/// One trace of a source-receiver pair.
+#[derive(Clone, Copy)]
+pub(crate) struct Trace<'p> {
+    pub pair: usize,
+    pub paths: &'p PathSet,
+    /// What its energies count: the shares of the traces of a pair sum to 1.
+    pub share: f64,
+}
+
+/// Collects what belongs to the same pair.
+pub(crate) fn by_pair<T>(traces: &[Trace<'_>], of_trace: Vec<T>) -> Vec<Vec<T>> {
+    let pairs = traces.iter().map(|t| t.pair + 1).max().unwrap_or(0);
+    let mut grouped: Vec<Vec<T>> = (0..pairs).map(|_| Vec::new()).collect();
+    for (trace, value) in traces.iter().zip(of_trace) {
+        grouped[trace.pair].push(value);
+    }
+    grouped
+}
+
+/// That there are paths, and that they and the materials belong together.
+pub(crate) fn check_paths(paths: &[&PathSet], materials: &[Material]) -> Result<(), Error> {
+    if paths.is_empty() {
+        return Err(Error::NoPaths { index: 0, count: 0 });
+    }
+    for (index, set) in paths.iter().enumerate() {
+        if set.is_empty() {
+            return Err(Error::NoPaths { index, count: paths.len() });
+        }
+        if set.materials() != materials.len() || materials.is_empty() {
+            return Err(sabine_acoustics::Error::MaterialCount {
+                expected: set.materials(),
+                found: materials.len(),
+            }
+            .into());
+        }
+    }
+    let bands = materials[0].bands();
+    match materials.iter().find(|m| m.bands() != bands) {
+        Some(other) => {
+            Err(sabine_acoustics::Error::BandMismatch { left: bands, right: other.bands() }.into())
+        }
+        None => Ok(()),
+    }
+}

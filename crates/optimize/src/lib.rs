@@ -122,15 +122,17 @@ mod responses;
 mod retrace;
 mod scale;
 mod single_paths;
+mod slope_model;
 mod uncertainty;
 mod unknowns;
 mod variables;
 
-pub use bounded::{Minimum, minimise};
+pub use bounded::{Minimum, Stop, minimise};
 pub use config::{AbsorptionPrior, FitConfig, SlopeObjective};
 pub use error::Error;
 pub use fit::{
-    AtBound, MaterialFit, Undetermined, UndeterminedKind, Unreachable, UnreachableReason, Warning,
+    AtBound, MaterialFit, Unconverged, Undetermined, UndeterminedKind, Unreachable, UnreachableReason,
+    Warning,
 };
 pub use fitter::MaterialFitter;
 pub use measured_decay::MeasuredDecay;

@@ -1,7 +1,6 @@
 //! How far the decay of a simulation is from that of a measured response.
 
-use crate::history::History;
-use crate::objective::check_paths;
+use crate::history::{History, check_paths};
 use crate::responses::latencies_s;
 use crate::{Error, MeasuredPair};
 use sabine_acoustics::{Air, EnergyDecayCurve, Material, NoReading, PerBand, Reading, TimeZero};

@@ -1,16 +1,11 @@
 //! Cost of one band: the squared difference between the slope of its simulated decay and the slope that is wanted.
 
 use crate::decay_slope::DecaySlope;
-use crate::history::History;
+use crate::history::{History, check_paths};
 use crate::single_paths::SinglePathSlope;
+use crate::slope_model::SlopeModel;
 use crate::{Error, FitConfig, SlopeObjective};
 use sabine_acoustics::{Air, Material, Objective, PathSet};
-
-/// Slope of a band's decay as a function of the absorption of each material.
-pub(crate) trait SlopeModel: Send + Sync {
-    /// Slope in dB/s; its derivative by each absorption goes to `gradient`. `None` where there is no slope.
-    fn slope(&self, absorption: &[f64], gradient: &mut [f64]) -> Option<f64>;
-}
 
 /// J(absorption) = (m - m')2 of one octave band, in (dB/s)2, m' = -60/T60 (Tang et al. 2020, section 3.4).
 ///
@@ -142,31 +137,5 @@ impl Objective for SlopeEvaluation {
                 0.0
             }
         }
-    }
-}
-
-/// That there are paths, and that they and the materials belong together.
-pub(crate) fn check_paths(paths: &[&PathSet], materials: &[Material]) -> Result<(), Error> {
-    if paths.is_empty() {
-        return Err(Error::NoPaths { index: 0, count: 0 });
-    }
-    for (index, set) in paths.iter().enumerate() {
-        if set.is_empty() {
-            return Err(Error::NoPaths { index, count: paths.len() });
-        }
-        if set.materials() != materials.len() || materials.is_empty() {
-            return Err(sabine_acoustics::Error::MaterialCount {
-                expected: set.materials(),
-                found: materials.len(),
-            }
-            .into());
-        }
-    }
-    let bands = materials[0].bands();
-    match materials.iter().find(|m| m.bands() != bands) {
-        Some(other) => {
-            Err(sabine_acoustics::Error::BandMismatch { left: bands, right: other.bands() }.into())
-        }
-        None => Ok(()),
     }
 }

@@ -2,11 +2,9 @@
 
 use crate::Error;
 use crate::decay::{DB_PER_NEPER, slope_with_sensitivity};
-use crate::decay_slope::Traces;
 use crate::expansion::Bins;
-use crate::fitter::Trace;
 use crate::history::{History, variance_of_sum};
-use crate::objective::check_paths;
+use crate::history::{Trace, Traces, by_pair, check_paths};
 use rayon::prelude::*;
 use sabine_acoustics::{Air, EnergyDecayCurve, Estimate, Material, NoReading, PathSet, PerBand, Reading};
 
@@ -162,7 +160,7 @@ pub(crate) fn t60_of_traces(
                 .zip(traces)
                 .map(|(h, t)| Ok((h, h.weights(t.paths, materials, exponents.values()[b], b, t.share)?)))
                 .collect::<Result<Vec<_>, Error>>()?;
-            let pairs: Vec<Traces<&History>> = crate::fitter::by_pair(traces, weighted);
+            let pairs: Vec<Traces<&History>> = by_pair(traces, weighted);
             let curve = crate::decay_slope::DecaySlope::new(pairs, range_db);
             let absorption: Vec<f64> = materials.iter().map(|m| m.absorption().values()[b]).collect();
             Ok(curve.reading(&curve.expand(&absorption)))

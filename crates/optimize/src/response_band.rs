@@ -1,8 +1,7 @@
 //! The measured responses of one band, and which paths fall into which of their time bins.
 
 use crate::AbsorptionPrior;
-use crate::decay_slope::Traces;
-use crate::history::History;
+use crate::history::{History, Traces};
 use crate::measured_decay::BinnedDecay;
 use crate::pulse::Pulse;
 use crate::unknowns::BandPrior;

@@ -91,15 +91,22 @@ impl<'b> ResponseExpansion<'b> {
     fn log_ratios(&self, absorption: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let raw: Vec<f64> =
             self.bins.iter().map(|b| b.measured.ln() - self.log_energy(b, absorption)).collect();
+        // Far from the expansion ratios exceed any number: they are summed relative to the greatest.
+        let mut greatest = vec![f64::NEG_INFINITY; self.groups()];
+        for (bin, raw) in self.bins.iter().zip(&raw) {
+            if let Some(group) = bin.group {
+                greatest[group] = greatest[group].max(*raw);
+            }
+        }
         let mut sums = vec![(0.0, 0.0); self.groups()];
         for (bin, raw) in self.bins.iter().zip(&raw) {
             if let Some(group) = bin.group {
-                sums[group].0 += bin.weight * raw.exp();
+                sums[group].0 += bin.weight * (raw - greatest[group]).exp();
                 sums[group].1 += bin.weight;
             }
         }
-        let gains: Vec<f64> =
-            sums.into_iter().map(|(ratio, weight): (f64, f64)| (ratio / weight).ln()).collect();
+        let mean = |((ratio, weight), greatest): ((f64, f64), f64)| greatest + (ratio / weight).ln();
+        let gains: Vec<f64> = sums.into_iter().zip(greatest).map(mean).collect();
         let of = |(bin, raw): (&Bin, f64)| raw - bin.group.map_or(0.0, |g| gains[g]);
         (self.bins.iter().zip(raw).map(of).collect(), gains)
     }

@@ -1,6 +1,7 @@
 //! The most probable materials, given measured responses.
 
 use crate::bounded::minimise;
+use crate::fit::Unconverged;
 use crate::response_band::{BandResponse, ResponseBand};
 use crate::response_expansion::ResponseExpansion;
 use crate::uncertainty::Spread;
@@ -12,8 +13,13 @@ use sabine_acoustics::Objective;
 const WEIGHINGS: usize = 40;
 /// Most expansions between two weighings.
 const STEPS: usize = 40;
-/// Change of any material from one weighing to the next, in standard deviations of its prior, below which it has settled.
-const SETTLED: f64 = 0.005;
+/// Change of any material from one weighing to the next, in standard deviations of its prior, below which the fit has converged.
+const TOLERANCE: f64 = 0.005;
+/// How far a first step may go, in standard deviations of the priors: an expansion says nothing of materials far away, and at
+/// nearly full absorption the energy of late bins is zero.
+const FIRST_REACH: f64 = 1.0;
+/// A reach below which no shorter step is tried.
+const MIN_REACH: f64 = 1e-6;
 /// Gain in log-probability that is not worth a step: it moves an answer by a thousandth of its standard error.
 const NEGLIGIBLE: f64 = 1e-5;
 /// A step is taken if the paths gain this share of what the expansion promised, and the next may be longer if they gain
@@ -33,8 +39,8 @@ pub(crate) struct Solved {
     pub dispersion: Vec<Option<f64>>,
     pub prior_cost: f64,
     pub iterations: usize,
-    /// Change of the materials in the last round, in standard deviations, if it has not settled.
-    pub unsettled: Option<f64>,
+    /// Why it is no result, if the fit has not converged.
+    pub unconverged: Option<Unconverged>,
 }
 
 /// Minimises priors plus half the deviance over the dispersion.
@@ -58,17 +64,18 @@ pub(crate) fn solve(bands: &[ResponseBand<'_>], config: &FitConfig) -> Result<So
     let mut expansions = expand(&x);
     // Far from the answer everything is badly explained, which says nothing of how well it will be.
     let mut dispersion = vec![1.0; bands.len()];
-    let (mut iterations, mut unsettled) = (0, Some(f64::INFINITY));
+    let (mut iterations, mut unconverged) = (0, None);
     for _ in 0..WEIGHINGS {
         let before = x.clone();
-        iterations += descend(&unknowns, &mut x, &mut expansions, &dispersion, config)?;
+        let descent = descend(&unknowns, &mut x, &mut expansions, &dispersion, config)?;
+        iterations += descent.iterations;
         let moved = unknowns.distance(&before, &x);
         expansions = expand(&x);
         let absorption = unknowns.absorption(&x);
         dispersion = expansions.iter().zip(&absorption).map(|(e, a)| e.dispersion(a)).collect();
-        unsettled = Some(moved);
-        if moved < SETTLED {
-            unsettled = None;
+        unconverged = Some(Unconverged::StillMoving { deviations: moved });
+        if moved < TOLERANCE {
+            unconverged = (!descent.converged).then_some(Unconverged::NoDescent);
             break;
         }
     }
@@ -78,18 +85,25 @@ pub(crate) fn solve(bands: &[ResponseBand<'_>], config: &FitConfig) -> Result<So
     let prior_cost = unknowns.prior_cost(&x, &mut vec![0.0; x.len()]);
     let dispersion = dispersion.iter().zip(&expansions).map(|(d, e)| (!e.bins.is_empty()).then_some(*d));
     let dispersion = dispersion.collect();
-    Ok(Solved { absorption, spread, gains_db, dispersion, prior_cost, iterations, unsettled })
+    Ok(Solved { absorption, spread, gains_db, dispersion, prior_cost, iterations, unconverged })
 }
 
-/// The trust-region method with weights and dispersions held; moves `x` and the expansions, and counts the solver's iterations.
+/// What a descent came to.
+struct Descent {
+    iterations: usize,
+    /// Whether no step promises anything any more.
+    converged: bool,
+}
+
+/// The trust-region method with weights and dispersions held; moves `x` and the expansions.
 fn descend(
     unknowns: &Unknowns<'_>,
     x: &mut Vec<f64>,
     expansions: &mut Vec<ResponseExpansion<'_>>,
     dispersion: &[f64],
     config: &FitConfig,
-) -> Result<usize, Error> {
-    let (mut reach, mut iterations) = (f64::INFINITY, 0);
+) -> Result<Descent, Error> {
+    let (mut reach, mut iterations) = (FIRST_REACH, 0);
     for _ in 0..STEPS {
         let cost = Likelihood { unknowns, expansions, dispersion };
         let scratch = &mut vec![0.0; x.len()];
@@ -98,9 +112,19 @@ fn descend(
         let upper: Vec<f64> = unknowns.upper.iter().zip(&*x).map(|(u, x)| u.min(x + reach)).collect();
         let minimum = minimise(&cost, x, &lower, &upper, config.max_iterations)?;
         iterations += minimum.iterations;
+        let step = x.iter().zip(&minimum.x).fold(0.0, |w: f64, (from, to)| w.max((to - from).abs()));
         let promised = here - minimum.cost;
-        if promised.is_nan() || promised <= NEGLIGIBLE {
-            break;
+        if !minimum.is_within(NEGLIGIBLE) && promised <= NEGLIGIBLE {
+            // The solver failed, most likely because its first step was too long.
+            reach *= 0.25;
+            if reach < MIN_REACH {
+                break;
+            }
+            continue;
+        }
+        // Little is promised at an optimum, but also where a short reach ends the step.
+        if promised <= NEGLIGIBLE && step < 0.99 * reach {
+            return Ok(Descent { iterations, converged: true });
         }
         let absorption = unknowns.absorption(&minimum.x);
         let moved: Option<Vec<ResponseExpansion<'_>>> = expansions
@@ -112,19 +136,21 @@ fn descend(
             here - Likelihood { unknowns, expansions: moved, dispersion }
                 .value_and_gradient(&minimum.x, scratch)
         });
-        let step = x.iter().zip(&minimum.x).fold(0.0, |w: f64, (from, to)| w.max((to - from).abs()));
         let kept = gained / promised;
         if kept > LONGER {
             reach = reach.max(2.0 * step);
         } else if kept < SHORTER || kept.is_nan() {
             reach = 0.25 * step;
+            if reach < MIN_REACH {
+                break;
+            }
         }
         if let Some(moved) = moved.filter(|_| kept > TAKEN) {
             *x = minimum.x;
             *expansions = moved;
         }
     }
-    Ok(iterations)
+    Ok(Descent { iterations, converged: false })
 }
 
 fn gains_db(expansion: &ResponseExpansion<'_>, absorption: &[f64]) -> Vec<(usize, f64)> {

@@ -1,6 +1,6 @@
 //! What measured responses tell of the materials, and what they leave open.
 
-use crate::fitter::at_bound;
+use crate::fit::at_bound;
 use crate::response_expansion::ResponseExpansion;
 use crate::uncertainty::Spread;
 use crate::unknowns::Unknowns;

@@ -1,11 +1,8 @@
 //! Fits the absorption of materials to measured responses.
 
 use crate::assembly::FoundBand;
-use crate::fit::Warning;
-use crate::fitter::Trace;
-use crate::history::History;
+use crate::history::{History, Trace, check_paths};
 use crate::measured_decay::MeasuredDecay;
-use crate::objective::check_paths;
 use crate::prediction::t60_of_traces;
 use crate::response_band::ResponseBand;
 use crate::response_solver::{Solved, solve};
@@ -51,11 +48,11 @@ impl MaterialFitter {
     /// more in low octaves) is left out: it depends on the source's directivity.
     ///
     /// Of the settings it uses bin width, bounds, smoothness, the errors of reflections and of their arrival and the number of iterations. It runs
-    /// until the materials settle, and says where they do not ([`Warning::NotSettled`]).
+    /// until the materials converge, and says where they do not ([`Warning::NotConverged`](crate::Warning::NotConverged)).
     ///
     /// # Errors
     /// For responses, paths, materials or priors that do not match or are out of range, [`Error::NoDecay`] if nothing can be read,
-    /// and [`sabine_acoustics::Error::Cancelled`] if the observer asks to stop.
+    /// [`Error::NotConverged`] if the fit converges in none of the bands, and [`sabine_acoustics::Error::Cancelled`] if the observer asks to stop.
     pub fn fit_responses(
         &self,
         pairs: &[MeasuredPair<'_>],
@@ -122,17 +119,14 @@ impl MaterialFitter {
             .map(|(b, band)| {
                 let (group, place) = group(b);
                 let (prior, absorption, spread) = (&band.prior, &group.absorption[place][..], &group.spread);
-                FoundBand { prior, absorption, spread, place }
+                // A band without data keeps its priors, and says so.
+                let unconverged = group.unconverged.filter(|_| !band.is_empty());
+                FoundBand { prior, absorption, spread, place, unconverged }
             })
             .collect();
         let mut fit = MaterialFit::of_bands(materials, &histories, &found, config)?;
         fit.iterations = solved.iter().map(|s| s.iterations).sum();
         fit.cost = solved.iter().map(|s| s.prior_cost).sum();
-        for (b, band_hz) in octaves.iter_hz().enumerate() {
-            if let Some(deviations) = group(b).0.unsettled {
-                fit.warnings.push(Warning::NotSettled { band_hz, deviations });
-            }
-        }
         let traces: Vec<Trace<'_>> =
             paths.iter().enumerate().map(|(pair, paths)| Trace { pair, paths, share: 1.0 }).collect();
         fit.predicted_t60_s = t60_of_traces(&traces, &fit.materials, air, config.bin_s, config.range_db)?;

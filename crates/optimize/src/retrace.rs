@@ -1,7 +1,6 @@
 //! The fit on one set of rays, held against other rays.
 
-use crate::fitter::Trace;
-use crate::objective::check_paths;
+use crate::history::{Trace, check_paths};
 use crate::prediction::t60_of_traces;
 use crate::{AbsorptionPrior, Error, MaterialFit, MaterialFitter, Unreachable, UnreachableReason};
 use sabine_acoustics::{Air, Bands, Estimate, Material, Observer, PathSet, PerBand, Reading, report};

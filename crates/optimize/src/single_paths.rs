@@ -2,7 +2,7 @@
 
 use crate::decay::DB_PER_NEPER;
 use crate::history::History;
-use crate::objective::SlopeModel;
+use crate::slope_model::SlopeModel;
 use std::borrow::Borrow;
 
 /// A line through (t, 10 lg e) of every path, all counting alike. As 10 lg e is linear in ln(1 - absorption), so is the

@@ -1,7 +1,7 @@
 //! How well the data determine the materials, and what they leave open.
 
+use crate::fit::at_bound;
 use crate::fit::{AtBound, Undetermined, UndeterminedKind};
-use crate::fitter::at_bound;
 use crate::group::{Band, Group, Solution};
 use nalgebra::{DMatrix, DVector};
 

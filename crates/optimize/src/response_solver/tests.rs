@@ -194,7 +194,7 @@ fn it_finds_what_a_search_without_gradients_finds() {
     {
         let found = by_solver(1, 0.0, path_error, prior);
         let expected = by_search(1, 0.0, path_error, prior);
-        assert!(found.unsettled.is_none());
+        assert!(found.unconverged.is_none());
         for (found, expected) in found.absorption[0].iter().zip(expected[0]) {
             assert!((found - expected).abs() < 0.01 * prior.1, "{prior:?}: {found} {expected}");
         }
@@ -208,7 +208,7 @@ fn smoothness_ties_bands_as_a_search_would() {
     for smoothness in [1.0, 30.0] {
         let found = by_solver(2, smoothness, 0.25, prior);
         let expected = by_search(2, smoothness, 0.25, prior);
-        assert!(found.unsettled.is_none());
+        assert!(found.unconverged.is_none());
         for (found, expected) in found.absorption.iter().zip(&expected) {
             for (found, expected) in found.iter().zip(expected) {
                 assert!((found - expected).abs() < 0.01 * prior.1, "{smoothness}: {found} {expected}");
