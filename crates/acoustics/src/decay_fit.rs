@@ -23,6 +23,8 @@ const FLOOR_BINS: usize = 24;
 const LEAST_BINS: usize = 16;
 /// Most iterations of Fisher scoring.
 const ITERATIONS: usize = 60;
+/// Gain in deviance below which the fit has converged.
+const NEGLIGIBLE_GAIN: f64 = 1e-4;
 /// Most slopes that are looked for.
 const MOST_SLOPES: usize = 3;
 /// Twice the gain in log-likelihood that one more slope (two parameters) must bring. By chance a single slope reaches 16
@@ -91,7 +93,7 @@ impl DecayFit {
     /// # Errors
     /// [`NoReading::NoOnset`] for silence, [`NoReading::TooShort`] for fewer than 16 steps or less than 8 independent values,
     /// [`NoReading::NoDecay`] where the level does not fall, [`NoReading::DynamicRange`] where it falls by less than 10 dB
-    /// before the noise or the end.
+    /// before the noise or the end, [`NoReading::NotConverged`] where the likelihood has no maximum that can be found.
     pub fn fit(energy: &[f64], step_s: f64, start_s: f64, bandwidth_hz: f64) -> Result<Self, NoReading> {
         let first = (start_s / step_s).round().max(0.0) as usize;
         let samples = energy.get(first..).unwrap_or(&[]);
@@ -118,6 +120,9 @@ impl DecayFit {
         }
         if !best.is_needed(&bins) {
             return Err(NoReading::NoDecay);
+        }
+        if !best.converged {
+            return Err(NoReading::NotConverged);
         }
         let dispersion = best.dispersion(&bins);
         let covariance = best.covariance(&bins, dispersion).ok_or(NoReading::NoDecay)?;
@@ -329,6 +334,8 @@ struct Model {
     bounds: Bounds,
     /// True if the noise is not to be fitted.
     noise_is_known: bool,
+    /// Whether the likelihood is at its maximum here.
+    converged: bool,
 }
 
 /// Logarithms of a noise that counts as none, and of the power from which no decay starts.
@@ -407,7 +414,7 @@ impl Model {
             derivatives[i * n..(i + 1) * n].iter_mut().for_each(|d| *d /= expected[i]);
             deviance += 2.0 * bin.shape * (bin.power / expected[i] + expected[i].ln());
         }
-        Self { parameters, expected, derivatives, deviance, bounds, noise_is_known: false }
+        Self { parameters, expected, derivatives, deviance, bounds, noise_is_known: false, converged: false }
     }
 
     /// True if the data speak for a decay against noise alone.
@@ -463,7 +470,8 @@ impl Model {
             if tried.deviance <= self.deviance {
                 let gain = self.deviance - tried.deviance;
                 self = tried;
-                if gain < 1e-4 {
+                if gain < NEGLIGIBLE_GAIN {
+                    self.converged = true;
                     break;
                 }
                 (score, information) = self.score(bins);
@@ -471,6 +479,9 @@ impl Model {
             } else {
                 damping = (8.0 * damping).max(1e-3);
                 if damping > 1e8 {
+                    // Rounding hides a gain that is small; a large one that cannot be had is a failure.
+                    let promised: f64 = step.iter().zip(&score).map(|(s, g)| s * g).sum();
+                    self.converged = promised * damping < NEGLIGIBLE_GAIN;
                     break;
                 }
             }
@@ -490,8 +501,10 @@ impl Model {
         }
         let tried = self.moved(start, bins).maximise(bins);
         let dispersion = dispersion.min(tried.dispersion(bins).max(1.0));
-        ((self.deviance - tried.deviance) / dispersion > needed && tried.is_physical(end_s, limits))
-            .then_some(tried)
+        ((self.deviance - tried.deviance) / dispersion > needed
+            && tried.converged
+            && tried.is_physical(end_s, limits))
+        .then_some(tried)
     }
 
     /// Rao's score test of one more slope of a given rate, over a range of rates: the largest statistic (chi-squared with
@@ -671,4 +684,36 @@ fn bisect(mut low: f64, mut high: f64, falling: impl Fn(f64) -> f64) -> f64 {
         }
     }
     0.5 * (low + high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_maximum_out_of_reach_does_not_count_as_found() {
+        // 60 dB in 0.5 s over a floor, in bins of 5 ms.
+        let (step_s, rate_per_s) = (5e-3, LN_MILLION / 0.5);
+        let power = |i: usize| (-rate_per_s * (i as f64 + 0.5) * step_s).exp() + 1e-4;
+        let bin = |i: usize| Bin {
+            from_s: i as f64 * step_s,
+            to_s: (i + 1) as f64 * step_s,
+            power: power(i),
+            shape: 20.0,
+        };
+        let bins: Vec<Bin> = (0..100).map(bin).collect();
+        let bounds = Bounds { least_noise: -40.0, most_power: 10.0 };
+        let from = |log_rate: f64, log_noise: f64| {
+            Model::at(vec![0.0, log_rate, log_noise], &bins, bounds).maximise(&bins)
+        };
+        let near = from(rate_per_s.ln() + 0.5, 1e-4f64.ln());
+        assert!(
+            near.converged && (near.parameters[1] - rate_per_s.ln()).abs() < 0.01,
+            "{:?}",
+            near.parameters
+        );
+        // No step is longer than 1, and there are 60 of them.
+        let far = from(rate_per_s.ln(), 100.0);
+        assert!(!far.converged, "{:?}", far.parameters);
+    }
 }

@@ -81,9 +81,12 @@ pub enum NoReading {
         /// The most that is an answer.
         largest: f64,
     },
-    /// The level does not fall, or the fit did not settle.
+    /// The level does not fall.
     #[error("the level does not decay")]
     NoDecay,
+    /// The fit of the decay has not converged.
+    #[error("the fit of the decay has not converged")]
+    NotConverged,
 }
 
 #[cfg(test)]

@@ -47,7 +47,7 @@
 //! - Between tracing and everything after it: [`PathSet`], [`Conditions`] (what may change without tracing again: materials,
 //!   air, [`Directivity`] and [`Orientation`] of source and receiver), [`EnergyResponse`] (energy, **not** to be convolved),
 //!   [`PathParameters`] with Monte-Carlo standard errors; [`EdgeDiffraction`].
-//! - Rooms: [`Scene`], [`Mesh`] (OBJ, glTF), [`Material`], [`material_library`], [`MeasuredRoom`], [`Source`], [`Receiver`].
+//! - Rooms: [`Scene`], [`Mesh`] (OBJ, glTF), [`Material`], [`material_library`], [`MeasuredRoom`], [`Materials`] (its tables, from file to file), [`Source`], [`Receiver`].
 //! - Seams: [`FeatureExtractor`], [`RoomEstimator`], [`Augment`], [`RayScene`], [`Propagator`], [`Objective`].
 //!
 //! # Does not

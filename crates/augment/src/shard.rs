@@ -207,6 +207,7 @@ fn kind(reason: &NoReading) -> &'static str {
         NoReading::FilterRinging { .. } => "filter ringing",
         NoReading::NoDecay => "no decay",
         NoReading::Uncertain { .. } => "too uncertain",
+        NoReading::NotConverged => "not converged",
         _ => "other",
     }
 }

@@ -86,3 +86,54 @@ impl MaterialFit {
         Ok(fit)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::AbsorptionPrior;
+    use sabine_acoustics::Bands;
+
+    /// A fit of one material in two octaves, of which some have not converged.
+    fn assembled(unconverged: [Option<Unconverged>; 2]) -> Result<MaterialFit, Error> {
+        let octaves = Bands::octaves(500.0, 1000.0).unwrap();
+        let priors = [AbsorptionPrior::uniform(octaves, 0.2, 0.1)];
+        let of_band: Vec<BandPrior> = (0..2).map(|b| BandPrior::new(&priors, b)).collect();
+        // What the curvature at an arbitrary point would give.
+        let spread = Spread {
+            standard_error: vec![vec![0.01]; 2],
+            remaining: vec![vec![0.01]; 2],
+            shows: vec![vec![true]; 2],
+            data: vec![true; 2],
+        };
+        let found: Vec<FoundBand<'_>> = (0..2)
+            .map(|place| FoundBand {
+                prior: &of_band[place],
+                absorption: &[0.2],
+                spread: &spread,
+                place,
+                unconverged: unconverged[place],
+            })
+            .collect();
+        let material = Material::uniform(octaves, 0.2, 0.1).unwrap();
+        MaterialFit::of_bands(&[material], &[], &found, &FitConfig::default())
+    }
+
+    #[test]
+    fn a_band_that_has_not_converged_is_no_result() {
+        let fit = assembled([None, Some(Unconverged::NoDescent)]).unwrap();
+        assert_eq!(fit.unconverged_hz(), [1000.0]);
+        assert!(fit.warnings[0].to_string().contains("not converged"), "{}", fit.warnings[0]);
+        // What was not fitted is known no better than before.
+        assert_eq!(fit.absorption_standard_error[0].values(), [0.01, 0.1]);
+    }
+
+    #[test]
+    fn a_fit_that_has_converged_nowhere_is_an_error() {
+        let moving = Unconverged::StillMoving { deviations: 0.4 };
+        let refused = assembled([Some(moving), Some(Unconverged::NoDescent)]);
+        assert!(
+            matches!(refused, Err(Error::NotConverged { bands: 2, reason }) if reason == moving),
+            "{refused:?}"
+        );
+    }
+}

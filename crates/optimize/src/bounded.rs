@@ -84,15 +84,18 @@ pub fn minimise(
         let stop = Stop::Converged;
         return Ok(Minimum { x: Vec::new(), cost, iterations: 0, stop, gradient_norm: 0.0 });
     }
+    let inside = |i: usize| start[i].clamp(lower[i], upper[i].max(lower[i]));
+    let at_start: Vec<f64> = (0..expected).map(inside).collect();
+    let cost = objective.value_and_gradient(&at_start, &mut vec![0.0; expected]);
+    if !cost.is_finite() {
+        return Err(Error::NotFinite { cost });
+    }
     let problem = Boxed { objective, lower: lower.to_vec(), upper: upper.to_vec() };
     let result = Executor::new(problem, Lbfgsb::new(), FirstOrderState::new(start.to_vec()))
         .max_iter(max_iterations as u64)
         .run()
         .map_err(|source| Error::Solver { source: Box::new(source) })?;
     let (x, cost) = (result.best_param().clone(), result.best_cost());
-    if !cost.is_finite() {
-        return Err(Error::NotFinite { cost });
-    }
     let stop = match result.report.termination {
         Termination::Converged(_) => Stop::Converged,
         Termination::Limit(_) => Stop::IterationLimit,
@@ -143,5 +146,40 @@ impl basin::Gradient for Boxed<'_> {
         let mut gradient = vec![0.0; x.len()];
         let cost = self.objective.value_and_gradient(x, &mut gradient);
         Ok((cost, gradient))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Falls steeply towards 1 and is infinite from there on.
+    struct Cliff;
+
+    impl Objective for Cliff {
+        fn dimension(&self) -> usize {
+            1
+        }
+
+        fn value_and_gradient(&self, x: &[f64], gradient: &mut [f64]) -> f64 {
+            gradient[0] = 1e4 * (x[0] - 0.9);
+            if x[0] < 1.0 { 0.5e4 * (x[0] - 0.9).powi(2) } else { f64::INFINITY }
+        }
+    }
+
+    #[test]
+    fn a_step_that_is_too_long_does_not_look_like_a_minimum() {
+        let failed = minimise(&Cliff, &[0.0], &[-1e3], &[1e3], 50).unwrap();
+        assert_eq!((failed.stop, failed.iterations), (Stop::NoDescent, 0));
+        assert!(failed.gradient_norm > 1.0 && !failed.is_within(1e-3));
+        let found = minimise(&Cliff, &[0.0], &[-0.5], &[0.95], 50).unwrap();
+        assert_eq!(found.stop, Stop::Converged);
+        assert!((found.x[0] - 0.9).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_start_without_a_finite_cost_is_refused() {
+        let refused = minimise(&Cliff, &[2.0], &[0.0], &[3.0], 50);
+        assert!(matches!(refused, Err(Error::NotFinite { cost }) if cost == f64::INFINITY), "{refused:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! Settings of a fit and what is known of the materials beforehand.
 
 use crate::Error;
-use sabine_acoustics::{Bands, PerBand};
+use sabine_acoustics::{Bands, MaterialPrior, MeasuredRoom, NamedMaterial, PerBand};
 
 /// Which slope of the simulated decay is made to meet the target.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -25,6 +25,25 @@ pub struct AbsorptionPrior {
 }
 
 impl AbsorptionPrior {
+    /// What a room's file states of each of its materials, in the order of the scene. A band takes the mean over the bands of the file
+    /// that lie in it, or else the nearest one's value, means and standard deviations alike.
+    ///
+    /// ```
+    /// use sabine_acoustics::{Bands, MeasuredRoom};
+    /// # let fixture = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/room");
+    /// let room = MeasuredRoom::read(fixture)?;
+    /// let priors = sabine_optimize::AbsorptionPrior::of_room(&room, Bands::T60);
+    /// assert_eq!(priors.len(), room.scene().materials().len());
+    /// # Ok::<(), sabine_acoustics::Error>(())
+    /// ```
+    pub fn of_room(room: &MeasuredRoom, bands: Bands) -> Vec<Self> {
+        let of = |(named, prior): (&NamedMaterial, &MaterialPrior)| Self {
+            mean: named.material.absorption().averaged(bands),
+            standard_deviation: prior.absorption_sd.averaged(bands),
+        };
+        room.scene().materials().iter().zip(room.priors()).map(of).collect()
+    }
+
     /// The same mean and standard deviation in every band.
     pub fn uniform(bands: Bands, mean: f64, standard_deviation: f64) -> Self {
         Self {

@@ -214,6 +214,12 @@ pub enum Warning {
         /// Why.
         reason: Unconverged,
     },
+    /// The measured decay is not what the paths explain with any absorption, so that only what lies above the end of the fitted range
+    /// and 10 dB below it was fitted: the late decay of an octave bends where its lower edge rings longer, or another room is coupled.
+    LateDecayLeftOut {
+        /// Nominal centre of the band, in Hz.
+        band_hz: f64,
+    },
     /// So few paths carry the decay that T60 is uncertain by more than 3 %: the fit follows their accidents, and other
     /// rays will decay otherwise, most likely longer.
     FewPaths {
@@ -280,6 +286,9 @@ impl Warning {
             Self::NotConverged { band_hz, reason } => {
                 format!("{band_hz} Hz: the fit has not converged, this is no result: {reason}")
             }
+            Self::LateDecayLeftOut { band_hz } => format!(
+                "{band_hz} Hz: the late decay is not what the simulation explains; only its first part was fitted"
+            ),
             Self::FewPaths { band_hz, relative_error } => format!(
                 "{band_hz} Hz: the rays leave T60 uncertain by {:.0} %; trace more of them",
                 100.0 * relative_error

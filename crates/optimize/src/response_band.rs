@@ -39,6 +39,8 @@ pub(crate) struct BandResponse<'a> {
 /// A measured bin and what falls into it.
 pub(crate) struct Window {
     pub energy: f64,
+    /// Level of the measured decay curve at its start, re that at the first, in dB.
+    pub level_db: f64,
     /// Independent values of the band that it holds.
     pub values: f64,
     /// Relative variance of its energy by the noise that was measured with it.
@@ -91,6 +93,7 @@ impl<'a> ResponseBand<'a> {
             }
         }
         let pulse = &decay.pulse;
+        let level_db = decay.level_db();
         let window = |(j, edges): (usize, &[f64])| {
             let (from, shares) = shares(edges, history, pulse);
             let paths = exact.iter().enumerate().map(|(place, &(i, _))| {
@@ -105,6 +108,7 @@ impl<'a> ResponseBand<'a> {
             let signal = decay.signal[j];
             Window {
                 energy: decay.energy[j],
+                level_db: level_db[j],
                 values: decay.values[j],
                 noise: (1.0 / (signal * signal) - 1.0) / decay.values[j],
                 from,
@@ -117,6 +121,20 @@ impl<'a> ResponseBand<'a> {
         let traces = vec![(history, weights)];
         self.responses.push(BandResponse { index, traces, exact, windows });
         true
+    }
+
+    /// Takes out what begins below a level of the decay curve, by response.
+    pub fn take_below(&mut self, level_db: f64) -> Vec<Vec<Window>> {
+        let take = |response: &mut BandResponse<'_>| {
+            let kept = response.windows.iter().take_while(|w| w.level_db >= level_db).count();
+            response.windows.split_off(kept)
+        };
+        self.responses.iter_mut().map(take).collect()
+    }
+
+    /// Puts back what was taken out.
+    pub fn put_back(&mut self, taken: Vec<Vec<Window>>) {
+        self.responses.iter_mut().zip(taken).for_each(|(response, windows)| response.windows.extend(windows));
     }
 
     pub fn is_empty(&self) -> bool {

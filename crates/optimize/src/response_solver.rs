@@ -2,7 +2,7 @@
 
 use crate::bounded::minimise;
 use crate::fit::Unconverged;
-use crate::response_band::{BandResponse, ResponseBand};
+use crate::response_band::{BandResponse, ResponseBand, Window};
 use crate::response_expansion::ResponseExpansion;
 use crate::uncertainty::Spread;
 use crate::unknowns::Unknowns;
@@ -20,6 +20,11 @@ const TOLERANCE: f64 = 0.005;
 const FIRST_REACH: f64 = 1.0;
 /// A reach below which no shorter step is tried.
 const MIN_REACH: f64 = 1e-6;
+/// Dispersion above which the late decay is left out for a trial, and how far below the range of the fit it begins, in dB.
+const MAX_DISPERSION: f64 = 2.0;
+const MARGIN_DB: f64 = 10.0;
+/// It stays out if the dispersion falls below this share.
+const BETTER: f64 = 2.0 / 3.0;
 /// Gain in log-probability that is not worth a step: it moves an answer by a thousandth of its standard error.
 const NEGLIGIBLE: f64 = 1e-5;
 /// A step is taken if the paths gain this share of what the expansion promised, and the next may be longer if they gain
@@ -39,8 +44,50 @@ pub(crate) struct Solved {
     pub dispersion: Vec<Option<f64>>,
     pub prior_cost: f64,
     pub iterations: usize,
+    /// Whether the late decay of each band was left out.
+    pub confined: Vec<bool>,
     /// Why it is no result, if the fit has not converged.
     pub unconverged: Option<Unconverged>,
+}
+
+/// Solves, and once more without the late decay of bands that the paths do not explain. Where that explains the rest better, the late
+/// decay stays out: as for the decay fit of `sabine-acoustics`, what lies far below the range of T30 must not decide where a decay
+/// bends.
+pub(crate) fn solve_where_explained(
+    bands: &mut [ResponseBand<'_>],
+    config: &FitConfig,
+) -> Result<Solved, Error> {
+    let first = solve(bands, config)?;
+    let level_db = config.range_db.1 - MARGIN_DB;
+    let take = |(band, dispersion): (&mut ResponseBand<'_>, &Option<f64>)| {
+        if dispersion.is_some_and(|d| d > MAX_DISPERSION) { band.take_below(level_db) } else { Vec::new() }
+    };
+    let taken: Vec<Vec<Vec<Window>>> = bands.iter_mut().zip(&first.dispersion).map(take).collect();
+    if taken.iter().flatten().all(Vec::is_empty) {
+        return Ok(first);
+    }
+    let second = solve(bands, config)?;
+    let explained = |b: usize| match (first.dispersion[b], second.dispersion[b]) {
+        (Some(before), Some(after)) => after < BETTER * before,
+        _ => false,
+    };
+    let some = |b: usize| taken[b].iter().any(|windows| !windows.is_empty());
+    let confined: Vec<bool> = (0..bands.len()).map(|b| some(b) && explained(b)).collect();
+    let all = (0..bands.len()).all(|b| confined[b] == some(b));
+    for ((band, taken), confined) in bands.iter_mut().zip(taken).zip(&confined) {
+        if !confined {
+            band.put_back(taken);
+        }
+    }
+    let iterations = first.iterations + second.iterations;
+    if all {
+        return Ok(Solved { confined, iterations, ..second });
+    }
+    if !confined.contains(&true) {
+        return Ok(Solved { iterations, ..first });
+    }
+    let third = solve(bands, config)?;
+    Ok(Solved { confined, iterations: iterations + third.iterations, ..third })
 }
 
 /// Minimises priors plus half the deviance over the dispersion.
@@ -85,7 +132,8 @@ pub(crate) fn solve(bands: &[ResponseBand<'_>], config: &FitConfig) -> Result<So
     let prior_cost = unknowns.prior_cost(&x, &mut vec![0.0; x.len()]);
     let dispersion = dispersion.iter().zip(&expansions).map(|(d, e)| (!e.bins.is_empty()).then_some(*d));
     let dispersion = dispersion.collect();
-    Ok(Solved { absorption, spread, gains_db, dispersion, prior_cost, iterations, unconverged })
+    let confined = vec![false; bands.len()];
+    Ok(Solved { absorption, spread, gains_db, dispersion, prior_cost, iterations, confined, unconverged })
 }
 
 /// What a descent came to.

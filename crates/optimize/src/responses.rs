@@ -1,11 +1,12 @@
 //! Fits the absorption of materials to measured responses.
 
 use crate::assembly::FoundBand;
+use crate::fit::Warning;
 use crate::history::{History, Trace, check_paths};
 use crate::measured_decay::MeasuredDecay;
 use crate::prediction::t60_of_traces;
 use crate::response_band::ResponseBand;
-use crate::response_solver::{Solved, solve};
+use crate::response_solver::{Solved, solve_where_explained};
 use crate::{AbsorptionPrior, Error, MaterialFit, MaterialFitter};
 use rayon::prelude::*;
 use sabine_acoustics::{Air, Material, Measurement, NoReading, Observer, PathSet, PerBand, TimeZero, report};
@@ -74,7 +75,7 @@ impl MaterialFitter {
         let latencies_s = latencies_s(pairs, &histories, measurement.time_zero);
         let exponents = air.energy_exponent_per_m(octaves);
         let mut left_out = Vec::new();
-        let bands = (0..octaves.len())
+        let mut bands = (0..octaves.len())
             .map(|b| {
                 let mut band = ResponseBand::new(priors, b, measurement.levels);
                 for (i, pair) in pairs.iter().enumerate() {
@@ -108,8 +109,10 @@ impl MaterialFitter {
 
         let together = if config.smoothness > 0.0 { bands.len() } else { 1 };
         report(observer, STAGE, 0, 1)?;
-        let solved: Vec<Solved> =
-            bands.par_chunks(together).map(|bands| solve(bands, config)).collect::<Result<_, Error>>()?;
+        let solved: Vec<Solved> = bands
+            .par_chunks_mut(together)
+            .map(|bands| solve_where_explained(bands, config))
+            .collect::<Result<_, Error>>()?;
         report(observer, STAGE, 1, 1)?;
 
         let group = |b: usize| (&solved[b / together], b % together);
@@ -127,6 +130,11 @@ impl MaterialFitter {
         let mut fit = MaterialFit::of_bands(materials, &histories, &found, config)?;
         fit.iterations = solved.iter().map(|s| s.iterations).sum();
         fit.cost = solved.iter().map(|s| s.prior_cost).sum();
+        for (b, band_hz) in octaves.iter_hz().enumerate() {
+            if group(b).0.confined[group(b).1] {
+                fit.warnings.push(Warning::LateDecayLeftOut { band_hz });
+            }
+        }
         let traces: Vec<Trace<'_>> =
             paths.iter().enumerate().map(|(pair, paths)| Trace { pair, paths, share: 1.0 }).collect();
         fit.predicted_t60_s = t60_of_traces(&traces, &fit.materials, air, config.bin_s, config.range_db)?;

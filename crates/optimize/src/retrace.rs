@@ -218,7 +218,7 @@ impl MaterialFitter {
             if last || settled {
                 report(observer, STAGE, config.max_rounds as u64, config.max_rounds as u64)?;
                 let read_t60_s = read.unwrap_or_else(|| verified.clone());
-                let not_verified = not_verified(&fit, &target, &read_t60_s, config.t60_error);
+                let not_verified = not_verified(&fit, &target, &read_t60_s, &verdicts, config.t60_error);
                 let fitted_paths = pool.into_shares();
                 let seconds = (clock.tracing_s, clock.fitting_s);
                 return Ok(RetracedFit {
@@ -364,6 +364,7 @@ fn not_verified(
     fit: &MaterialFit,
     target: &PerBand<Estimate>,
     read: &PerBand<Reading>,
+    verdicts: &[Option<Verdict>],
     t60_error: f64,
 ) -> Vec<NotVerified> {
     let mut found = Vec::new();
@@ -378,7 +379,8 @@ fn not_verified(
         let predicted = &fit.predicted_t60_s.values()[b];
         let relative_error = predicted.as_ref().map_or(f64::INFINITY, |t| t.standard_error / t.value);
         let off = read_s.as_ref().map_or(f64::INFINITY, |r| (r.value / target_s - 1.0).abs());
-        if off > MISSED || relative_error > WORTHWHILE * t60_error {
+        let contradicted = verdicts[b].as_ref().is_some_and(|v| v.contradicted);
+        if contradicted || off > MISSED || relative_error > WORTHWHILE * t60_error {
             found.push(NotVerified { band_hz, target_s, read_s: read_s.clone(), relative_error });
         }
     }

@@ -286,3 +286,74 @@ impl From<&MaterialTable> for FileTable {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FIXTURE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/room");
+
+    #[test]
+    fn what_a_fit_writes_a_room_reads() {
+        let room = MeasuredRoom::read(FIXTURE).unwrap();
+        let bands = Bands::octaves(250.0, 4000.0).unwrap();
+        // The last was held: its standard error is zero.
+        let count = room.scene().materials().len();
+        let table = |(k, named): (usize, &crate::NamedMaterial)| {
+            let absorption = PerBand::from_fn(bands, |b| (10 + k + b) as f64 / 100.0);
+            let material = named.material.resampled(bands).with_absorption(absorption).unwrap();
+            let sd = PerBand::uniform(bands, if k + 1 == count { 0.0 } else { 0.03 });
+            MaterialTable::new(named.name.clone(), &material, &sd).unwrap()
+        };
+        let tables = room.scene().materials().iter().enumerate().map(table).collect();
+        let materials = Materials::new(tables).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("materials.toml");
+        materials.write(&path).unwrap();
+        let other = room.with_materials_file(&path).unwrap();
+        assert_eq!(other.bands(), bands);
+        assert_eq!(other.materials(), materials);
+        let absorption = other.scene().materials()[0].material.absorption().clone();
+        assert_eq!(absorption.values(), [0.10, 0.11, 0.12, 0.13, 0.14]);
+        assert_eq!(other.priors()[0].absorption, Some(absorption));
+        assert_eq!(other.priors()[count - 1].absorption_sd.values(), [1e-4; 5]);
+        // The same text pasted into the room's own file.
+        let own = std::fs::read_to_string(Path::new(FIXTURE).join("room.toml")).unwrap();
+        let mut pasted: toml::Table = own.parse().unwrap();
+        pasted.extend(materials.to_toml().unwrap().parse::<toml::Table>().unwrap());
+        pasted.remove("responses");
+        std::fs::write(folder.path().join("room.toml"), pasted.to_string()).unwrap();
+        std::fs::copy(Path::new(FIXTURE).join("room.obj"), folder.path().join("room.obj")).unwrap();
+        assert_eq!(MeasuredRoom::read(folder.path()).unwrap().materials(), materials);
+    }
+
+    #[test]
+    fn materials_that_are_not_named_keep_their_tables() {
+        let room = MeasuredRoom::read(FIXTURE).unwrap();
+        let before = room.materials();
+        let own = before.tables()[0].clone();
+        let changed = MaterialTable { absorption_sd: PerBand::uniform(before.bands(), 0.5), ..own };
+        let other = room.with_materials(&Materials::new(vec![changed.clone()]).unwrap()).unwrap();
+        assert_eq!(other.materials().tables()[0], changed);
+        assert_eq!(other.materials().tables()[1..], before.tables()[1..]);
+    }
+
+    #[test]
+    fn a_material_of_another_room_is_named_with_the_file() {
+        let room = MeasuredRoom::read(FIXTURE).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("other.toml");
+        std::fs::write(&path, "bands.centres_hz = [500]\nmaterials.lava = { absorption = [0.3] }").unwrap();
+        let message = room.with_materials_file(&path).unwrap_err().to_string();
+        assert!(message.contains("other.toml") && message.contains("lava"), "{message}");
+        for (text, named) in [
+            ("bands.centres_hz = [500]\nmaterials.wall.absorption = [1.3]", "materials.wall.absorption"),
+            ("bands.centres_hz = [500]\nmaterials.wall.colour = [1.0]", "colour"),
+            ("bands.centres_hz = [500]\nmaterials = {}", "list of materials"),
+            ("bands.centres_hz = [500, 900]\nmaterials.wall = {}", "bands.centres_hz"),
+        ] {
+            let message = Materials::from_toml(text).unwrap_err().to_string();
+            assert!(message.contains("materials.toml") && message.contains(named), "{text}: {message}");
+        }
+    }
+}

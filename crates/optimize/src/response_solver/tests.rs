@@ -221,3 +221,53 @@ fn smoothness_ties_bands_as_a_search_would() {
         assert!(found.spread.standard_error[0][0] < alone.spread.standard_error[0][0]);
     }
 }
+
+/// One material, a path every millisecond that has met it three times more than the last, and a measured decay that this explains
+/// exactly with an absorption of 0.12.
+fn long_decay(levels: Levels, prior: (f64, f64)) -> Solved {
+    const TRUTH: f64 = 0.12;
+    let air = Air::default();
+    let speed_m_s = air.speed_of_sound_m_s();
+    let (bins, bin_s) = (30, 0.01);
+    let hits = |i: usize| 3 * i as i32;
+    let mut set = PathSet::new(1, bins as f64 * bin_s * speed_m_s);
+    let (mut chain, mut met) = (PathSet::DIRECT, 0);
+    let up = [0.0, 0.0, 1.0];
+    for i in 0..300usize {
+        while met < hits(i) {
+            chain = set.reflect(chain, 0, Reflection::Specular);
+            met += 1;
+        }
+        let length_m = (1e-3 * i as f64 + 5e-4) * speed_m_s;
+        let (tail, batch) = (PathSet::DIRECT, Some((i % 32) as u8));
+        set.push(Contribution { length_m, log_weight: 0.0, chain, tail, departure: up, arrival: up, batch });
+    }
+    let config = FitConfig::default();
+    let history = History::new(&set, &air, config.bin_s);
+    let energy = |j: usize| (10 * j..10 * j + 10).map(|i| (1.0 - TRUTH).powi(hits(i))).sum();
+    let decay = BinnedDecay {
+        edges_s: (0..=bins).map(|j| j as f64 * bin_s).collect(),
+        energy: (0..bins).map(energy).collect(),
+        values: vec![VALUES; bins],
+        signal: vec![1.0; bins],
+        pulse: Pulse::new(&[0.0, 0.0, 1.0, 0.0, 0.0], 2, 1e7),
+        tail: 0.0,
+    };
+    let priors = [AbsorptionPrior::uniform(OCTAVES, prior.0, prior.1)];
+    let mut band = ResponseBand::new(&priors, 0, levels);
+    let weights = vec![1.0; history.len()];
+    assert!(band.add(0, &history, weights, &decay, 0.0, 0.0));
+    solve(&[band], &config).unwrap()
+}
+
+#[test]
+fn a_first_step_to_where_the_cost_is_infinite_is_shortened() {
+    // From a prior that rings far too long the steepest descent leads to the upper bound, where e^1000 stands in the cost.
+    for levels in [Levels::Absolute, Levels::Common] {
+        let found = long_decay(levels, (0.02, 0.1));
+        assert_eq!(found.unconverged, None);
+        assert!(found.iterations > 0);
+        let absorption = found.absorption[0][0];
+        assert!((absorption - 0.12).abs() < 1e-3, "{levels:?}: {absorption}");
+    }
+}
