@@ -369,7 +369,7 @@ fn not_verified(
 ) -> Vec<NotVerified> {
     let mut found = Vec::new();
     let octaves: Bands = target.bands();
-    for b in 0..octaves.len() {
+    for (b, verdict) in verdicts.iter().enumerate() {
         let band_hz = octaves.nominal_hz(b);
         if !fit.is_reachable(band_hz) {
             continue;
@@ -379,7 +379,7 @@ fn not_verified(
         let predicted = &fit.predicted_t60_s.values()[b];
         let relative_error = predicted.as_ref().map_or(f64::INFINITY, |t| t.standard_error / t.value);
         let off = read_s.as_ref().map_or(f64::INFINITY, |r| (r.value / target_s - 1.0).abs());
-        let contradicted = verdicts[b].as_ref().is_some_and(|v| v.contradicted);
+        let contradicted = verdict.as_ref().is_some_and(|v| v.contradicted);
         if contradicted || off > MISSED || relative_error > WORTHWHILE * t60_error {
             found.push(NotVerified { band_hz, target_s, read_s: read_s.clone(), relative_error });
         }
