@@ -36,6 +36,13 @@ fn plaster_on_the_ceiling_shortens_the_decay_and_makes_it_clearer() {
         sound.samples()[late..].iter().map(|x| f64::from(*x).powi(2)).sum::<f64>()
     };
     assert!(energy("after.wav") < 0.7 * energy("before.wav"));
+    // The voices keep the difference of their levels: plaster makes the room quieter, late and in all.
+    assert!(energy("voice_after.wav") < energy("voice_before.wav"));
+    let peak = |file: &str| read_audio(out.join(file), Channel::Mono).unwrap().peak();
+    assert!(peak("voice_before.wav").max(peak("voice_after.wav")) > 0.9);
+    let page = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert_eq!(page.matches("data:audio/wav").count(), 3);
+    assert_eq!(page.matches("<svg class=\"chart\"").count(), 3);
 }
 
 #[test]

@@ -1,18 +1,23 @@
-//! What if this surface were another? Predicts T60, C50 and D50 before and after, and renders both.
+//! What if this surface were another? Predicts T60, C50 and D50 before and after, and renders a voice in both rooms.
 //!
 //! Without arguments it puts acoustic plaster on the ceiling of the built-in demo. The room is traced once: the change is heard on
 //! the same paths.
 
+mod report;
+
 use crate::bar::Bar;
+use crate::channel::channel;
 use crate::demo::Demo;
 use crate::failure::Failure;
 use crate::output::OutputFolder;
 use crate::room::RoomArguments;
 use clap::Args;
+use report::Voices;
 use sabine::acoustics::{
-    Bands, Material, PerBand, Propagator, Reading, SampleFormat, Signal, encode_wav, library_material,
-    material_library,
+    Bands, Channel, Material, PerBand, Propagator, Reading, SampleFormat, Signal, encode_wav,
+    library_material, material_library, read_audio, resample,
 };
+use sabine::eqfilter::convolve;
 use sabine::optimize::{PredictedChange, RoomPrediction};
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use serde::Serialize;
@@ -20,6 +25,11 @@ use std::path::PathBuf;
 
 /// Octaves of the prediction: 125 Hz to 8 kHz.
 const OCTAVES: Bands = Bands::T60;
+
+/// The voice is heard for so long at most, in seconds.
+const EXCERPT_S: f64 = 20.0;
+/// Highest magnitude of the louder of the two voices.
+const FULL_SCALE: f32 = 0.95;
 
 /// Replace a material of a room and predict what changes.
 #[derive(Args)]
@@ -41,6 +51,12 @@ pub struct Arguments {
     /// Receiver in the room file [default: its first]
     #[arg(long, value_name = "ID")]
     receiver: Option<String>,
+    /// Dry voice to hear in both rooms, its first 20 s (WAV) [default: the built-in demo]
+    #[arg(long, value_name = "F.wav")]
+    dry: Option<PathBuf>,
+    /// Channel of the voice if it has several, from 0, or `mean`
+    #[arg(long, value_name = "N|mean", value_parser = channel)]
+    channel: Option<Channel>,
     /// Rays to trace
     #[arg(long, default_value_t = 40_000)]
     rays: usize,
@@ -87,7 +103,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Ok(());
     }
     let mut out = OutputFolder::create(&arguments.out)?;
-    let (room, _) = arguments.room.read(&mut Demo::default())?;
+    let mut demo = Demo::default();
+    let (room, room_name) = arguments.room.read(&mut demo)?;
+    let dry_path = demo.or(arguments.dry.as_deref(), "speech/dry_guest.wav")?;
+    let dry = excerpt(&read_audio(&dry_path, arguments.channel.unwrap_or_default())?)?;
     let source = match &arguments.source {
         Some(id) => room.source(id)?,
         None => room.sources().first().ok_or("room.toml: sources: there is none")?,
@@ -128,17 +147,40 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     bar.finish();
     let change = PredictedChange::new(&paths, &before, &after, &air)?;
     let render = RenderConfig { seed: arguments.seed, ..RenderConfig::default() };
+    let renderer_rate_hz = render.sample_rate_hz;
     let renderer = PressureRenderer::new(render)?;
+    let mut voices = Vec::new();
     for (file, materials) in [("before.wav", &before), ("after.wav", &after)] {
         let response = Signal::from(renderer.render(&paths, materials, &air)?);
         out.write(file, &encode_wav(&response, SampleFormat::Float32)?)?;
+        voices.push(convolve(resample(&dry, response.sample_rate_hz())?.samples(), response.samples()));
     }
+    let [before, after] = in_one_scale(&voices, renderer_rate_hz)?;
+    out.write("voice_before.wav", &encode_wav(&before, SampleFormat::Int24)?)?;
+    out.write("voice_after.wav", &encode_wav(&after, SampleFormat::Int24)?)?;
     let summary = Summary::new(&arguments.material, name, &change);
     out.write("change.json", serde_json::to_string_pretty(&summary)?.as_bytes())?;
+    let voices = Voices { name: &demo.name(&dry_path), dry: &dry, before: &before, after: &after };
+    out.write("report.html", report::html(&summary, &room_name, &voices)?.as_bytes())?;
     out.finish()?;
     summary.print();
-    println!("listen to before.wav and after.wav in {}", arguments.out.display());
+    println!("{}", summary.sentence());
+    println!("listen to and look at {}", arguments.out.join("report.html").display());
     Ok(())
+}
+
+/// The beginning of a recording.
+fn excerpt(sound: &Signal) -> Result<Signal, Failure> {
+    let rate_hz = sound.sample_rate_hz();
+    let most = (EXCERPT_S * f64::from(rate_hz)) as usize;
+    Ok(Signal::new(sound.samples().iter().copied().take(most).collect(), rate_hz)?)
+}
+
+/// Two sounds scaled alike, so that the difference of their levels stays what it is.
+fn in_one_scale(sounds: &[Vec<f32>], rate_hz: u32) -> Result<[Signal; 2], Failure> {
+    let peak = sounds.iter().flatten().fold(f32::MIN_POSITIVE, |peak, s| peak.max(s.abs()));
+    let scaled = |i: usize| Signal::new(sounds[i].iter().map(|s| s * FULL_SCALE / peak).collect(), rate_hz);
+    Ok([scaled(0)?, scaled(1)?])
 }
 
 /// A material whose scattering lies half-way between those of two.
@@ -147,7 +189,45 @@ fn between(one: &Material, other: &Material) -> Result<Material, Failure> {
     Ok(Material::new(one.absorption().clone(), scattering)?)
 }
 
+impl Row {
+    /// As a heading.
+    fn title(&self) -> &'static str {
+        match self.quantity {
+            "T60 s" => "Reverberation time",
+            "C50 dB" => "Clarity (C50)",
+            _ => "Definition (D50)",
+        }
+    }
+
+    /// As the title of an axis.
+    fn axis(&self) -> &'static str {
+        match self.quantity {
+            "T60 s" => "T60 (s)",
+            "C50 dB" => "C50 (dB)",
+            _ => "D50",
+        }
+    }
+}
+
 impl Summary {
+    /// What changes, in one sentence: at mid frequencies, where it can be read.
+    fn sentence(&self) -> String {
+        let mut parts = Vec::new();
+        for hz in [500.0, 1000.0] {
+            let Some(band) = self.bands_hz.iter().position(|b| *b == hz) else { continue };
+            let t60 = &self.rows[0];
+            if let (Some(before), Some(after), Some(error)) =
+                (t60.before[band], t60.after[band], t60.difference_se[band])
+            {
+                parts.push(format!("from {before:.2} s to {after:.2} s (± {error:.2} s) at {hz} Hz"));
+            }
+        }
+        if parts.is_empty() {
+            return "The reverberation time cannot be read at 500 Hz and 1 kHz: trace more rays or a longer response.".into();
+        }
+        format!("The reverberation time goes {}.", parts.join(" and "))
+    }
+
     fn new(material: &str, replaced_by: String, change: &PredictedChange) -> Self {
         let row = |quantity, of: fn(&RoomPrediction) -> &PerBand<Reading>| {
             let column = |prediction: &RoomPrediction| {
