@@ -19,7 +19,7 @@ def histogram(label, columns, hertz, unit, ticks, goal, path):
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {total} {top + height + 46}" '
         'font-family="sans-serif" font-size="11">',
-        # The style of examples/src/chart.rs: Okabe and Ito's colours on paper that turns dark.
+        # The style of crates/cli/src/chart.rs: Okabe and Ito's colours on paper that turns dark.
         "<style>text{fill:#222;font-family:system-ui,sans-serif}.b{fill:none;stroke:#D55E00;stroke-width:1.5}.a{fill:#56B4E9}"
         ".g{stroke:#009E73;stroke-width:3}.x{stroke:#888}.paper{fill:#fff}"
         "@media(prefers-color-scheme:dark){.paper{fill:#161616}text{fill:#e4e4e4}.b{stroke:#ff8a3c}.a{fill:#0072B2}.x{stroke:#777}}</style>",

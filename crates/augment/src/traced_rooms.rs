@@ -21,7 +21,7 @@ const ATTEMPTS: u64 = 8;
 
 /// Draws polyhedral rooms and has them traced and rendered: a second source of responses besides measurements.
 ///
-/// Which tracer and which renderer is the caller's affair ([`Propagator`], [`RenderPaths`]); the example `augment_dataset`
+/// Which tracer and which renderer is the caller's affair ([`Propagator`], [`RenderPaths`]); the command `sabine augment`
 /// takes those of `sabine-propagate`. A response depends on seed, settings, tracer and renderer alone.
 ///
 /// ```no_run

@@ -2,7 +2,7 @@
 //!
 //! Each step has the command that does it, for those who do not program, and the code that does it. All code runs with the tests of
 //! this crate on the files in `fixtures/` of the repository; put your own in their place. Commands are run there
-//! (`cargo run --release --example NAME -- --help` says more).
+//! (`sabine COMMAND --help` says more; `cargo install --path crates/cli` installs it).
 //!
 //! ```text
 //!  1 a recording ──► 2 what the room does to sound ─┐
@@ -24,7 +24,7 @@
 //! ```
 //!
 //! # 2. Hear the room in it
-//! `estimate_speech -- recording.wav`. Reverberation time and equalisation per octave, each with a standard error: equalisation is
+//! `sabine estimate recording.wav`. Reverberation time and equalisation per octave, each with a standard error: equalisation is
 //! uncertain, low octaves more than high ones. [`Estimator`](crate::estimator::Estimator) hears 16 kHz.
 //! ```
 //! use sabine::acoustics::{Channel, read_audio, resample};
@@ -39,7 +39,7 @@
 //! assert!(t60.standard_error > 0.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-//! Have you an impulse response (a sweep, a balloon) instead of speech? Then measure, do not guess: `measure_response -- response.wav`.
+//! Have you an impulse response (a sweep, a balloon) instead of speech? Then measure, do not guess: `sabine measure response.wav`.
 //! ```
 //! use sabine::acoustics::{Bands, Channel, ImpulseResponse, RoomParameters, read_audio};
 //! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
@@ -70,7 +70,7 @@
 //! ```
 //!
 //! # 4. Simulate it
-//! `trace_room -- --room DIR --out DIR`. Paths are traced once; materials, air and directivity act on them afterwards.
+//! `sabine trace --room DIR --out DIR`. Paths are traced once; materials, air and directivity act on them afterwards.
 //! ```
 //! use sabine::acoustics::{Bands, DiffuseRoom, MeasuredRoom, PathParameters, Propagator};
 //! use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
@@ -108,7 +108,7 @@
 //! One reverberation time for each octave does not tell eight materials apart: read `not_determined` before you read an absorption.
 //!
 //! # 6. Place other sound there
-//! The matched response and its filter are good for any dry sound; `live_match` does it while somebody speaks, `walk_through` while somebody
+//! The matched response and its filter are good for any dry sound; `sabine live` does it while somebody speaks, `sabine walk` while somebody
 //! walks. For head responses turn on the feature `sofa`.
 //! ```
 //! use sabine::acoustics::{Bands, PerBand, Signal};
@@ -130,8 +130,8 @@
 //! ```
 //!
 //! # 7. Measure, and fit the materials to that
-//! Responses beside the model make it a *measured* room. `fit_materials -- --room DIR --responses --hold-out r3 --out DIR`, then
-//! `validate_room -- --room DIR` for what was not fitted. In code: calibrate a room, `docs/how-to/calibrate-a-room.md`.
+//! Responses beside the model make it a *measured* room. `sabine fit --room DIR --responses --hold-out r3 --out DIR`, then
+//! `sabine validate --room DIR` for what was not fitted. In code: calibrate a room, `docs/how-to/calibrate-a-room.md`.
 //! A folder can be written from Rust, too ([`NewRoom`](crate::acoustics::NewRoom)); the next step does.
 //!
 //! # 8. Why is my simulation wrong?
@@ -178,7 +178,7 @@
 //! What the catalogue lacks can be added, `docs/how-to/own-effect.md`. How a cause is weighed: explanation, `docs/explanation/diagnosis.md`.
 //!
 //! # 9. What would another material do?
-//! `replace_material -- --room DIR ...`: T60, C50 and D50 before and after with the uncertainty of their difference
+//! `sabine replace --room DIR ...`: T60, C50 and D50 before and after with the uncertainty of their difference
 //! ([`PredictedChange`](crate::optimize::PredictedChange)), and both to listen to.
 //!
 //! # Parts of your own

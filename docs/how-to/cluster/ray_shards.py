@@ -1,7 +1,7 @@
-"""Makes a data set with augment_dataset under Ray: one task for each of N workers, started anew where it fails.
+"""Makes a data set with sabine augment under Ray: one task for each of N workers, started anew where it fails.
 
 usage: ray_shards.py WORKERS PROGRAM [ARGUMENT ...]
-    ray_shards.py 8 ./augment_dataset --speech SPEECH --rir RIR --out /shared/set --count 94500
+    ray_shards.py 8 ./sabine augment --speech SPEECH --rir RIR --out /shared/set --count 94500
 
 Joins the cluster that RAY_ADDRESS names, else starts one on this machine. The folder given as --out must be the same one on
 every machine (NFS, Lustre, ...). `--resume` and `--worker I/N` are added here: what a dead worker has finished is kept.

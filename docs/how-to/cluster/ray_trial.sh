@@ -1,8 +1,8 @@
 #!/bin/bash
 # Does a set made under Ray, one of whose two workers is killed half-way, equal the set made at once?
 #
-# usage: ray_trial.sh PYTHON PROGRAM FOLDER [ARGUMENT ...]
-#   ray_trial.sh python3 ./augment_dataset /tmp/trial --speech SPEECH --rir RIR --count 1536 --shard-size 128 --rooms 12
+# usage: ray_trial.sh PYTHON SABINE FOLDER [ARGUMENT ...]
+#   ray_trial.sh python3 ./sabine /tmp/trial --speech SPEECH --rir RIR --count 1536 --shard-size 128 --rooms 12
 # PYTHON must have ray. FOLDER is made; it receives the sets `alone` and `ray`, and the log of Ray.
 set -euo pipefail
 python=$1 program=$2 folder=$3
@@ -10,13 +10,13 @@ shift 3
 here=$(dirname "$0")
 mkdir "$folder"
 
-"$program" --out "$folder/alone" "$@" >"$folder/alone.log" 2>&1
+"$program" augment --out "$folder/alone" "$@" >"$folder/alone.log" 2>&1
 
 # A program that leaves its number and becomes augment_dataset.
 cat >"$folder/noted" <<END
 #!/bin/bash
 echo "\$\$ \$*" >>"$folder/processes"
-exec "$program" "\$@"
+exec "$program" augment "\$@"
 END
 chmod +x "$folder/noted"
 "$python" "$here/ray_shards.py" 2 "$folder/noted" --out "$folder/ray" "$@" >"$folder/ray.log" 2>&1 &

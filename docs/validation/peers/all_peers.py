@@ -1,8 +1,7 @@
 #!/usr/bin/env python3
 """Sabine and its peers on the same work, in one run on one machine: speed, error and memory. Prints docs/validation/peers.md's tables.
 
-    cargo build --release -p sabine-examples -p sabine-features -p sabine-eqfilter -p sabine-estimator \\
-        --example trace_room --example measure_response --example fit_materials --bench against_peers
+    cargo build --release -p sabine-cli -p sabine-features -p sabine-eqfilter -p sabine-estimator --bins --bench against_peers
     pip install numpy scipy librosa soundfile pyrato pyroomacoustics misuka acoustic-spaces onnx onnxruntime safetensors
     python docs/validation/peers/all_peers.py [log_mel] [fir] [network] [decay] [box] [fit]
 
@@ -179,7 +178,7 @@ def box_sabine(folder):
         f"scattering = {[box.SCATTERING] * 7}\n[[sources]]\nid = 's'\nposition_m = {place(box.SOURCE_M)}\n"
         f"[[receivers]]\nid = 'r'\nposition_m = {place(box.RECEIVERS_M[0])}\n")
     out = Path(folder, "parameters.json")
-    command = [TARGET / "examples/trace_room", "--room", folder, "--rays", "10000", "--threads", "1", "--json", out]
+    command = [TARGET / "sabine", "trace", "--room", folder, "--rays", "10000", "--threads", "1", "--json", out]
     done = spent(command)
     return done and ({"t30_s": json.loads(out.read_text())["t30_s"][-7:]}, done[1], done[2])
 
@@ -398,10 +397,10 @@ def decay(folder):
             soundfile.write(Path(folder, f"{t60_s}_{seed}.wav"), samples, 48_000, subtype="FLOAT")
             truths.append(t60_s)
     wavs, result = sorted(Path(folder).glob("*.wav")), Path(folder, "ours.json")
-    program = TARGET / "examples/measure_response"
+    program = TARGET / "sabine"
 
     def sabine():
-        done = spent([program, *wavs, "--json", result])
+        done = spent([program, "measure", *wavs, "--json", result])
         if done is None:
             return None
         entries = json.loads(result.read_text())

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Full-band T60 of noisy decays: this project and pyrato (Chu and Lundeby, T30) on the same files in one run.
 
-    cargo build --release --example measure_response
-    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python3 docs/validation/peers/decay_peers.py [MEASURE_RESPONSE]
+    cargo build --release -p sabine-cli
+    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python3 docs/validation/peers/decay_peers.py [SABINE]
 
 Needs numpy, soundfile and pyrato. White noise under exponential envelopes, T = 0.2, 0.5, 1 and 2 s, eight seeds each, on white noise 60,
 45 or 30 dB below the start, 48 kHz. Prints the mean absolute error, how many were answered, and the median time for one response; ours
@@ -23,7 +23,7 @@ import pyrato
 import soundfile
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "..")
-OURS = sys.argv[1] if len(sys.argv) > 1 else os.path.join(ROOT, "target/release/examples/measure_response")
+OURS = sys.argv[1] if len(sys.argv) > 1 else os.path.join(ROOT, "target/release/sabine")
 RATE, TIMES, SEEDS = 48000, (0.2, 0.5, 1.0, 2.0), 8
 
 
@@ -57,7 +57,7 @@ def main():
                     truths.append(t60_s)
                     theirs.append(by_pyrato(samples.astype(float)))
             results = os.path.join(folder, "ours.json")
-            subprocess.run([OURS, *files, "--json", results], check=True, stdout=subprocess.DEVNULL)
+            subprocess.run([OURS, "measure", *files, "--json", results], check=True, stdout=subprocess.DEVNULL)
             with open(results, encoding="utf-8") as file:
                 ours = [
                     (entry["full_band"]["t60_s"], entry["seconds"]["full_band"]) for entry in json.load(file)

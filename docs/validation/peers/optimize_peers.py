@@ -1,6 +1,6 @@
 """Absorption fitted by Sabine and by its peers to the same simulated room, in one run. Prints the table of docs/validation/optimize.md.
 
-    cargo build --release -p sabine-examples --example fit_materials
+    cargo build --release -p sabine-cli
     pip install numpy acoustic-spaces misuka
     python docs/validation/peers/optimize_peers.py [one|three] [sabine] [acoustic_spaces] [misuka]
 
@@ -213,7 +213,7 @@ def sabine(case, folder, truth):
         responses(folder, THREE)
         toml += "".join(f'[[responses]]\nsource = "s"\nreceiver = "r{i}"\nfile = "r{i}.wav"\n' for i in range(2))
     Path(folder, "room.toml").write_text(toml)
-    command = [str(ROOT / "target/release/examples/fit_materials"), "--room", folder, "--out", str(Path(folder, "out")), "--rays", "20000"]
+    command = [str(ROOT / "target/release/sabine"), "fit", "--room", folder, "--out", str(Path(folder, "out")), "--rays", "20000"]
     if case == "one":
         t30 = parameters(truth[0], direct_s(RECEIVERS_M[0]))[0]
         command += ["--t60", ",".join(f"{t:.5f}" for t in t30[1:])]

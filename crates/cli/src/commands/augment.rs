@@ -18,7 +18,7 @@ use std::time::Instant;
 
 /// Speech x rooms x noise -> clips of log-mel features with labels, in shards.
 #[derive(Args)]
-#[command(name = "augment_dataset", about)]
+
 pub struct Arguments {
     /// Folder of speech, one speaker a file-name prefix (`103-1240-0000.flac`, `p225_003.wav`).
     #[arg(long)]

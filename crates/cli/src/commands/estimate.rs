@@ -1,6 +1,6 @@
 //! Estimates reverberation time and equalisation from recordings of speech.
 //!
-//! `estimate_speech FILE... [--json F]`
+//! `sabine estimate FILE... [--json F]`
 
 use crate::channel::channel;
 use crate::failure::Failure;

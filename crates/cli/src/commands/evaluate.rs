@@ -1,9 +1,9 @@
 //! Tables of the estimator's errors on a data set, as Markdown; and of errors against the length of recordings.
 //!
 //! ```text
-//! evaluate_estimator --data DIR [--weights F] [--partition test]
-//! evaluate_estimator --data DIR --partition test --write DIR2 --speech DIR --rir DIR --noise DIR
-//! evaluate_estimator --recordings DIR2 [--weights F] [--calibrate F2]
+//! sabine evaluate --data DIR [--weights F] [--partition test]
+//! sabine evaluate --data DIR --partition test --write DIR2 --speech DIR --rir DIR --noise DIR
+//! sabine evaluate --recordings DIR2 [--weights F] [--calibrate F2]
 //! ```
 //!
 //! The second form makes recordings of 30 s in the rooms of a part of the data set, with its speakers one after another and

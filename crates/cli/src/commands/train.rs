@@ -1,6 +1,6 @@
 //! Trains the estimator of reverberation time and equalisation on a data set.
 //!
-//! `train_estimator --data DIR --out DIR [--resume]` writes `model.safetensors`, `history.json`, `curve.svg` and, after every
+//! `sabine train --data DIR --out DIR [--resume]` writes `model.safetensors`, `history.json`, `curve.svg` and, after every
 //! epoch, a checkpoint to go on from.
 
 use crate::chart::{Chart, Look, Scale, Series};

@@ -1,6 +1,6 @@
 //! Compares a simulated room with measured room means, octave by octave, in just-noticeable differences.
 //!
-//! `validate_room --room DIR [--fit]` traces every pair of source and receiver and prints a table in Markdown.
+//! `sabine validate --room DIR [--fit]` traces every pair of source and receiver and prints a table in Markdown.
 
 use crate::bar::Bar;
 use crate::failure::Failure;

@@ -1,4 +1,4 @@
-//! `fit_materials` as a user runs it: what it writes, and what it says of bad input.
+//! `sabine fit` as a user runs it: what it writes, and what it says of bad input.
 
 use crate::sabine;
 use serde_json::Value;

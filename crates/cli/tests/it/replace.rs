@@ -1,4 +1,4 @@
-//! `replace_material` as a user runs it: what it predicts and writes, and what it says of bad input.
+//! `sabine replace` as a user runs it: what it predicts and writes, and what it says of bad input.
 
 use crate::sabine;
 use sabine::acoustics::{Channel, read_audio};

@@ -1,4 +1,4 @@
-//! `trace_room` as a user runs it: what it writes, that threads change nothing, and what it says of bad input.
+//! `sabine trace` as a user runs it: what it writes, that threads change nothing, and what it says of bad input.
 
 use crate::sabine;
 use sabine::acoustics::{Bands, Channel, ImpulseResponse, RoomParameters, read_audio};

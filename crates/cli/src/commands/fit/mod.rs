@@ -69,7 +69,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Folder for the results
-    #[arg(long, value_name = "DIR", default_value = "out/fit_materials")]
+    #[arg(long, value_name = "DIR", default_value = "out/fit")]
     out: PathBuf,
     /// File for the numbers [default: fit.json in the folder]
     #[arg(long, value_name = "F")]

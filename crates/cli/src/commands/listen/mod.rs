@@ -69,7 +69,7 @@ struct MakeArguments {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Folder for the results
-    #[arg(long, value_name = "DIR", default_value = "out/listening_test")]
+    #[arg(long, value_name = "DIR", default_value = "out/listen")]
     out: PathBuf,
 }
 

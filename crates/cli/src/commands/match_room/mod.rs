@@ -52,7 +52,7 @@ pub struct Arguments {
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     wave_below: Option<f64>,
     /// Folder for the results
-    #[arg(long, value_name = "DIR", default_value = "out/match_room")]
+    #[arg(long, value_name = "DIR", default_value = "out/match")]
     out: PathBuf,
 }
 

@@ -67,7 +67,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Folder for the results
-    #[arg(long, value_name = "DIR", default_value = "out/replace_material")]
+    #[arg(long, value_name = "DIR", default_value = "out/replace")]
     out: PathBuf,
 }
 
