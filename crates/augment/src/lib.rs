@@ -7,7 +7,7 @@
 //! - [`T60Augment`], [`DrrAugment`], [`EqAugment`]: another reverberation time, distance, equalisation (Bryan 2020; Tang et
 //!   al. 2020). Each is a [`sabine_acoustics::Augment`]; a [`Chain`] of them is one, too. [`AugmentedResponse`] keeps the
 //!   labels with the response.
-//! - [`SyntheticRooms`]: responses of rooms that never were, some hundreds a second.
+//! - [`SyntheticRooms`]: synthetic room impulse responses, some hundreds a second.
 //! - [`TracedRooms`]: responses of random polyhedral rooms ([`PolyhedralRoom`]: slanted walls, L-shapes, screens, furniture,
 //!   surfaces of the material library), traced by a [`sabine_acoustics::Propagator`] that the caller brings.
 //! - [`EqStatistics`]: how the equalisation of real responses spreads.

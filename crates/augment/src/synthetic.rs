@@ -1,4 +1,4 @@
-//! Responses of rooms that never were.
+//! Synthetic room impulse responses.
 
 use crate::band_split::BandSplit;
 use crate::error::{Error, check, check_span};

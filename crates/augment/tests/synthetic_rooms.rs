@@ -1,4 +1,4 @@
-//! Are the rooms that never were plausible?
+//! Are the synthetic rooms plausible?
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
 use sabine_augment::{Error, Labels, SyntheticRoomConfig, SyntheticRooms};

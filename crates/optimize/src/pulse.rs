@@ -1,4 +1,4 @@
-//! What an octave filter makes of an instant.
+//! Impulse response of an octave filter.
 
 use std::f64::consts::FRAC_2_PI;
 

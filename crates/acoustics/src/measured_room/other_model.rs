@@ -1,4 +1,4 @@
-//! A measured room that is believed to be another than its file says.
+//! The same measurement with another room model.
 
 use super::MeasuredRoom;
 use crate::{Air, Error, MaterialPrior, PerBand, Receiver, Scene, Source};
