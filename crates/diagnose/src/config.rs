@@ -75,10 +75,9 @@ impl DiagnoseConfig {
         Ok(())
     }
 
-    pub(crate) fn tracer(&self, duration_s: f64) -> TracerConfig {
+    pub(crate) fn tracer(&self) -> TracerConfig {
         TracerConfig {
             rays: self.rays,
-            duration_s,
             seed: self.seed,
             image_order: self.image_order,
             cuboid_paths: CUBOID_PATHS,

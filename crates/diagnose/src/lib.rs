@@ -91,6 +91,7 @@ pub use report::diagnosis::{
     Isolability, LackOfFit, ResidualCell, Verdict,
 };
 pub use report::next_measurement::{NextMeasurement, discriminating_measurement};
+pub use simulate::scene_tracer::{EachScene, PreparedTracer, SceneTracer};
 pub use simulate::views::{ArrivalView, BandView};
 pub use survey::planes::Plane;
 pub use survey::{Place, Survey, SurveyedResponse};

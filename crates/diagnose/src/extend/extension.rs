@@ -4,8 +4,8 @@ use crate::effect::{Nuisance, Observable};
 use crate::effects::{SourceDirectivity, TransducerResponse};
 use crate::extend::extended_model::{CoupledDecay, ExtendedModel};
 use crate::extend::panels;
+use crate::infer::baseline::Baseline;
 use crate::infer::search::{Search, State};
-use crate::infer::workbench::Workbench;
 use crate::report::found_parameters::{parameters, place_of};
 use crate::simulate::traced_pair::scattering_more;
 
@@ -14,8 +14,8 @@ const DIRECTED: (f64, f64) = (0.0, 0.9);
 
 /// The overlay of the named causes over the room file. Effects that do not come with this crate leave it as it is: only their
 /// name is kept.
-pub(crate) fn extended_model(bench: &Workbench, search: &Search<'_>, state: &State) -> ExtendedModel {
-    let survey = &bench.survey;
+pub(crate) fn extended_model(baseline: &Baseline, search: &Search<'_>, state: &State) -> ExtendedModel {
+    let survey = baseline.survey();
     let bands = survey.bands;
     let count = bands.len();
     let per_band = |value: &dyn Fn(usize) -> f64| (0..count).map(value).collect::<Vec<f64>>();
@@ -25,7 +25,9 @@ pub(crate) fn extended_model(bench: &Workbench, search: &Search<'_>, state: &Sta
             .materials
             .iter()
             .enumerate()
-            .map(|(m, name)| (name.clone(), state.energy.values[bench.decay_layout().material(m)].to_vec()))
+            .map(|(m, name)| {
+                (name.clone(), state.energy.values[baseline.decay_layout().material(m)].to_vec())
+            })
             .collect(),
         ..ExtendedModel::default()
     };
@@ -60,18 +62,18 @@ pub(crate) fn extended_model(bench: &Workbench, search: &Search<'_>, state: &Sta
                 model.scattering = survey
                     .materials
                     .iter()
-                    .zip(&bench.materials)
+                    .zip(&baseline.simulation.materials)
                     .map(|(name, m)| (name.clone(), scattered(m)))
                     .collect();
             }
             "background_noise" => {
-                model.noise_per_s = per_band(&|b| level_per_s(bench, b) * 10f64.powf(values[b] / 10.0));
+                model.noise_per_s = per_band(&|b| level_per_s(baseline, b) * 10f64.powf(values[b] / 10.0));
             }
             "coupled_volume" => {
                 let receivers = survey.receivers.len() as f64;
                 model.coupled = Some(CoupledDecay {
                     energy_per_s: per_band(&|b| {
-                        level_per_s(bench, b) * 10f64.powf((values[0] + values[1] * octaves(b)) / 10.0)
+                        level_per_s(baseline, b) * 10f64.powf((values[0] + values[1] * octaves(b)) / 10.0)
                     }),
                     decay_time_s: per_band(&|b| {
                         (values[2] * (values[3] * octaves(b)).exp()).clamp(0.1, 20.0)
@@ -120,7 +122,7 @@ pub(crate) fn extended_model(bench: &Workbench, search: &Search<'_>, state: &Sta
                 }
                 for (nuisance, _) in case.relaxes() {
                     if let Nuisance::ResponseGain(r) = nuisance {
-                        let gain_db = state.energy.values[bench.decay_layout().gain(r)];
+                        let gain_db = state.energy.values[baseline.decay_layout().gain(r)];
                         model.response_gain_db.insert(survey.responses[r].name.clone(), gain_db);
                     }
                 }
@@ -132,6 +134,6 @@ pub(crate) fn extended_model(bench: &Workbench, search: &Search<'_>, state: &Sta
 }
 
 /// Energy per second to which levels of added sound refer.
-fn level_per_s(bench: &Workbench, band: usize) -> f64 {
-    bench.reference[band] / bench.states[0][band].bins.width_s
+fn level_per_s(baseline: &Baseline, band: usize) -> f64 {
+    baseline.simulation.reference[band] / baseline.simulation.states[0][band].bins.width_s
 }

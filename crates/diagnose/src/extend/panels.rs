@@ -23,9 +23,9 @@ fn rectangle(centre: [f64; 3], axes: [[f64; 3]; 2], half_m: [f64; 2]) -> [[f64; 
 
 /// The panel that a fit has found: it spans the places at which it was seen to reflect, and a little more.
 pub(crate) fn panel(search: &Search<'_>, state: &State, values: &[f64]) -> Option<ThinPanel> {
-    let bench = search.bench;
-    let survey = &bench.survey;
-    let data = bench.arrival_data();
+    let baseline = search.baseline;
+    let survey = baseline.survey();
+    let data = baseline.arrival_data();
     let cases = search.cases_of(&state.chosen, Observable::Arrivals);
     let model = arrivals::at_fit(&data, &cases, &search.used);
     let first = survey.sources[survey.responses.first()?.source].position_m;
@@ -40,7 +40,7 @@ pub(crate) fn panel(search: &Search<'_>, state: &State, values: &[f64]) -> Optio
         let seen = model
             .added_s(&state.arrivals.values, pair)
             .iter()
-            .any(|t| bench.measured[pair].peaks_s.iter().any(|p| (p - t).abs() < NEAR_S));
+            .any(|t| baseline.observations.measured[pair].peaks_s.iter().any(|p| (p - t).abs() < NEAR_S));
         if seen {
             for (extent, axis) in reach.iter_mut().zip(axes) {
                 let x: f64 = (0..3).map(|k| axis[k] * (way.place_m[k] - middle[k])).sum();

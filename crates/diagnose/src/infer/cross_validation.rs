@@ -2,13 +2,14 @@
 
 use crate::effect::{Case, Observable};
 use crate::error::Error;
+use crate::infer::baseline::Baseline;
 use crate::infer::direct_evidence;
 use crate::infer::direct_evidence::Fitted;
 use crate::infer::prediction::{Compared, Errors, compare, decay_db};
 use crate::infer::search::{Search, State};
-use crate::infer::workbench::Workbench;
 use crate::likelihood::decay::WarmStart;
 use crate::likelihood::laplace::LaplaceFit;
+use crate::likelihood::polarity;
 use crate::report::diagnosis::{DecayCurves, HeldOut, HeldOutGain};
 use crate::statistics;
 use rayon::prelude::*;
@@ -28,34 +29,34 @@ pub(crate) struct Folds {
 
 impl Folds {
     /// Receivers that no fit sees.
-    pub fn never_fitted(bench: &Workbench, held: &[usize]) -> Self {
+    pub fn never_fitted(baseline: &Baseline, held: &[usize]) -> Self {
         let groups = held.iter().map(|&r| vec![r]).collect();
-        Self::new(bench, groups, &|_| bench.fitted.clone(), true)
+        Self::new(baseline, groups, &|_| baseline.observations.fitted.clone(), true)
     }
 
     /// Groups of the receivers that are fitted, each left out in turn; none with fewer than two.
-    pub fn in_turn(bench: &Workbench) -> Self {
-        let responses = &bench.survey.responses;
-        let fitted = responses.iter().zip(&bench.fitted).filter(|(_, fitted)| **fitted);
+    pub fn in_turn(baseline: &Baseline) -> Self {
+        let responses = &baseline.survey().responses;
+        let fitted = responses.iter().zip(&baseline.observations.fitted).filter(|(_, fitted)| **fitted);
         let mut receivers: Vec<usize> = fitted.map(|(r, _)| r.receiver).collect();
         receivers.sort_unstable();
         receivers.dedup();
         let count = if receivers.len() < 2 { 0 } else { receivers.len().min(FOLDS) };
         let groups = (0..count).map(|g| receivers.iter().copied().skip(g).step_by(count).collect()).collect();
         let rest = |group: &[usize]| {
-            let used = responses.iter().zip(&bench.fitted);
+            let used = responses.iter().zip(&baseline.observations.fitted);
             used.map(|(r, fitted)| *fitted && !group.contains(&r.receiver)).collect()
         };
-        Self::new(bench, groups, &rest, false)
+        Self::new(baseline, groups, &rest, false)
     }
 
     fn new(
-        bench: &Workbench,
+        baseline: &Baseline,
         groups: Vec<Vec<usize>>,
         used: &dyn Fn(&[usize]) -> Vec<bool>,
         never_fitted: bool,
     ) -> Self {
-        let responses = &bench.survey.responses;
+        let responses = &baseline.survey().responses;
         let pairs = |group: &[usize]| {
             (0..responses.len()).filter(|&p| group.contains(&responses[p].receiver)).collect()
         };
@@ -91,11 +92,11 @@ pub(crate) fn predict(
     folds: &Folds,
     observer: &dyn Observer,
 ) -> Result<Predicted, Error> {
-    let bench = search.bench;
+    let baseline = search.baseline;
     if folds.splits.is_empty() {
         return Ok(Predicted::default());
     }
-    let free = bench.free_discrepancy();
+    let free = baseline.free_discrepancy();
     let total = folds.splits.len() as u64;
     let done = std::sync::atomic::AtomicU64::new(0);
     let splits: Vec<SplitGain> = folds
@@ -114,11 +115,11 @@ pub(crate) fn predict(
                     let arrivals = search.cases_of(chosen, Observable::Arrivals);
                     let firsts: &[usize] = if *chosen == *state.chosen { &state.energy_firsts } else { &[] };
                     let before = WarmStart { values: &state.energy.values, firsts };
-                    let (fitted, firsts) = bench.fit_energy(&cases, used, Some(before))?;
-                    let with = bench.fit_energy(&cases, &whole, Some(before))?.0;
+                    let (fitted, firsts) = baseline.fit_energy(&cases, used, Some(before))?;
+                    let with = baseline.fit_energy(&cases, &whole, Some(before))?.0;
                     let energy = with.log_evidence - fitted.log_evidence;
-                    let all_times = bench.fit_arrivals(&arrivals, &whole)?.0;
-                    let seen_times = bench.fit_arrivals(&arrivals, used)?.0;
+                    let all_times = baseline.fit_arrivals(&arrivals, &whole)?.0;
+                    let seen_times = baseline.fit_arrivals(&arrivals, used)?.0;
                     let times = all_times.log_evidence - seen_times.log_evidence;
                     let single = |energy: &LaplaceFit, arrivals: &LaplaceFit, used: &[bool]| {
                         let fitted = Fitted { energy, energy_firsts: &firsts, arrivals };
@@ -127,10 +128,11 @@ pub(crate) fn predict(
                     let isolated_reflections =
                         single(&with, &all_times, &whole) - single(&fitted, &seen_times, used);
                     let all = search.all_cases(chosen);
-                    let signs = bench.polarity(&all, &whole) - bench.polarity(&all, used);
+                    let signs = polarity::log_likelihood(&baseline.observations.measured, &all, &whole)
+                        - polarity::log_likelihood(&baseline.observations.measured, &all, used);
                     Ok((
                         energy + times + signs + isolated_reflections,
-                        compare(bench, &cases, &fitted.values, pairs),
+                        compare(baseline, &cases, &fitted.values, pairs),
                     ))
                 };
             let (base, before) = predictive(&[], None)?;
@@ -164,14 +166,14 @@ pub(crate) fn predict(
     let mean = |gain: &dyn Fn(&SplitGain) -> f64| splits.iter().map(gain).sum::<f64>() / bins;
     let interval = |gain: &dyn Fn(&SplitGain) -> f64| {
         let gains: Vec<(f64, f64)> = splits.iter().map(|s| (gain(s), s.bins)).collect();
-        statistics::bootstrap(&gains, bench.config.seed)
+        statistics::bootstrap(&gains, baseline.config.seed)
     };
     let errors: Vec<Errors> = (0..3)
         .map(|k| Errors::of(&splits.iter().flat_map(|s| s.predicted[k].iter().cloned()).collect::<Vec<_>>()))
         .collect();
     let three = |value: fn(&Errors) -> f64| [value(&errors[0]), value(&errors[1]), value(&errors[2])];
     let held_out = HeldOut {
-        receivers: folds.receivers.iter().map(|&r| bench.survey.receivers[r].id.clone()).collect(),
+        receivers: folds.receivers.iter().map(|&r| baseline.survey().receivers[r].id.clone()).collect(),
         never_fitted: folds.never_fitted,
         db_rmse: three(|e| e.db_rmse),
         t20_jnd: three(|e| e.t20_jnd),
@@ -194,13 +196,13 @@ pub(crate) fn predict(
         })
         .collect();
     let decays =
-        splits.iter().flat_map(|s| decay_curves(bench, &s.predicted[0], &s.predicted[1], true)).collect();
+        splits.iter().flat_map(|s| decay_curves(baseline, &s.predicted[0], &s.predicted[1], true)).collect();
     Ok(Predicted { held_out: Some(held_out), gains, decays })
 }
 
 /// Curves of what was measured, and predicted before and after.
 pub(crate) fn decay_curves(
-    bench: &Workbench,
+    baseline: &Baseline,
     before: &[Compared],
     after: &[Compared],
     held_out: bool,
@@ -211,8 +213,8 @@ pub(crate) fn decay_curves(
         .map(|(b, a)| {
             let total = b.measured.iter().sum::<f64>().max(1e-300);
             DecayCurves {
-                response: bench.survey.responses[b.pair].name.clone(),
-                band_hz: bench.survey.bands.nominal_hz(b.band),
+                response: baseline.survey().responses[b.pair].name.clone(),
+                band_hz: baseline.survey().bands.nominal_hz(b.band),
                 time_s: b.times_s.clone(),
                 measured_db: decay_db(&b.measured, total),
                 before_db: decay_db(&b.predicted, total),

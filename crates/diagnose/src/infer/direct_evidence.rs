@@ -1,9 +1,9 @@
-//! Observable of causes that neither decays nor arrival times can weigh: from single reflections, and from before the direct sound.
+//! Evidence of causes that neither decays nor arrival times can weigh: from single reflections, and from before the direct sound.
 
 use crate::effect::AuxiliaryEvidence;
 use crate::effect::{Case, Observable};
+use crate::infer::baseline::Baseline;
 use crate::infer::search::Search;
-use crate::infer::workbench::Workbench;
 use crate::likelihood::arrivals;
 use crate::likelihood::laplace::LaplaceFit;
 use crate::likelihood::reflection_gates::ReflectionGate;
@@ -19,28 +19,29 @@ pub(crate) struct Fitted<'a> {
 
 /// Gates under the chosen causes.
 fn gates(search: &Search<'_>, chosen: &[usize], fitted: Fitted<'_>) -> Vec<ReflectionGate> {
-    let bench = search.bench;
+    let baseline = search.baseline;
     let cases = search.cases_of(chosen, Observable::Decay);
     let values: Vec<Vec<f64>> = cases
         .iter()
         .zip(fitted.energy_firsts)
         .map(|(case, &first)| {
-            let count = case.parameters(&bench.survey).len();
+            let count = case.parameters(baseline.survey()).len();
             fitted.energy.values[first..first + count].to_vec()
         })
         .collect();
     // What is weighed by the gates themselves must not act on them beforehand.
     let (cases, values): (Vec<&dyn Case>, Vec<Vec<f64>>) =
         cases.into_iter().zip(values).filter(|(c, _)| !c.weighs_reflections()).unzip();
-    let data = bench.arrival_data();
+    let data = baseline.arrival_data();
     let of_times = search.cases_of(chosen, Observable::Arrivals);
     let model = arrivals::at_fit(&data, &of_times, &search.used);
-    let shift_s = shifts(bench, &model, &fitted.arrivals.values);
-    crate::likelihood::reflection_gates::gates(bench, &cases, &values, &fitted.energy.values, &shift_s)
+    let shift_s = shifts(baseline, &model, &fitted.arrivals.values);
+    crate::likelihood::reflection_gates::gates(baseline, &cases, &values, &fitted.energy.values, &shift_s)
 }
 
-fn shifts(bench: &Workbench, model: &arrivals::ArrivalModel<'_>, values: &[f64]) -> Vec<Vec<f64>> {
-    bench
+fn shifts(baseline: &Baseline, model: &arrivals::ArrivalModel<'_>, values: &[f64]) -> Vec<Vec<f64>> {
+    baseline
+        .simulation
         .isolated_reflections
         .iter()
         .enumerate()
@@ -50,15 +51,16 @@ fn shifts(bench: &Workbench, model: &arrivals::ArrivalModel<'_>, values: &[f64])
         .collect()
 }
 
-/// Observable of each chosen cause from what comes before the direct sound, or from single reflections, of the responses that are used.
+/// Evidence of each chosen cause from what comes before the direct sound, or from single reflections, of the responses that are used.
 pub(crate) fn own(
     search: &Search<'_>,
     chosen: &[usize],
     fitted: Fitted<'_>,
     used: &[bool],
 ) -> Vec<(usize, AuxiliaryEvidence)> {
-    let pre_arrival =
-        |c: usize| Some((c, search.candidates[c].case.pre_arrival(&search.bench.pre_arrival, used)?));
+    let pre_arrival = |c: usize| {
+        Some((c, search.candidates[c].case.pre_arrival(&search.baseline.observations.pre_arrival, used)?))
+    };
     let mut found: Vec<(usize, AuxiliaryEvidence)> = chosen.iter().copied().filter_map(pre_arrival).collect();
     let weighing: Vec<usize> =
         chosen.iter().copied().filter(|&c| search.candidates[c].case.weighs_reflections()).collect();
@@ -75,7 +77,7 @@ pub(crate) fn own(
     found.extend(weighing.into_iter().filter_map(|c| {
         let order = of_energy.iter().position(|&o| o == c)?;
         let first = *fitted.energy_firsts.get(order)?;
-        let count = search.candidates[c].case.parameters(&search.bench.survey).len();
+        let count = search.candidates[c].case.parameters(search.baseline.survey()).len();
         let own: Vec<(f64, f64)> =
             (first..first + count).map(|i| (fitted.energy.values[i], fitted.energy.sd(i))).collect();
         Some((c, search.candidates[c].case.among_reflections(&own, &gates)?))

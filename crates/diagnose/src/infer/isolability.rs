@@ -2,8 +2,8 @@
 
 use crate::effect::{Case, Nuisance, Observable};
 use crate::error::Error;
+use crate::infer::baseline::Baseline;
 use crate::infer::search::Candidate;
-use crate::infer::workbench::Workbench;
 use crate::likelihood::arrivals;
 use crate::likelihood::decay::EnergyModel;
 use crate::likelihood::laplace::{Model, Slopes};
@@ -16,7 +16,7 @@ const INDISTINGUISHABLE_COSINE: f64 = 0.95;
 
 /// The angle between each two effects that bear on the same data.
 pub(crate) fn isolability(
-    bench: &Workbench,
+    baseline: &Baseline,
     candidates: &[Candidate<'_>],
 ) -> Result<Vec<Isolability>, Error> {
     let mut found = Vec::new();
@@ -30,7 +30,7 @@ pub(crate) fn isolability(
         }
         for (i, a) in own.iter().enumerate() {
             for b in &own[i + 1..] {
-                let Some(cosine) = cosine(bench, evidence, a.case, b.case) else { continue };
+                let Some(cosine) = cosine(baseline, evidence, a.case, b.case) else { continue };
                 found.push(Isolability {
                     effects: [a.id.to_owned(), b.id.to_owned()],
                     cosine,
@@ -51,14 +51,14 @@ struct Direction {
     own: Vec<usize>,
 }
 
-fn cosine(bench: &Workbench, evidence: Observable, a: &dyn Case, b: &dyn Case) -> Option<f64> {
-    let used = vec![true; bench.pairs.len()];
+fn cosine(baseline: &Baseline, evidence: Observable, a: &dyn Case, b: &dyn Case) -> Option<f64> {
+    let used = vec![true; baseline.pairs()];
     let cases = [a, b];
     let (slopes, priors, directions) = if evidence == Observable::Decay {
-        let data = bench.energy_data();
+        let data = baseline.energy_data();
         let model = EnergyModel::new(&data, &cases, &used);
         let mut values = model.start(None);
-        for (m, material) in bench.absorption.iter().enumerate() {
+        for (m, material) in baseline.simulation.absorption.iter().enumerate() {
             for (band, a) in material.iter().enumerate() {
                 values[model.layout.absorption(m, band)] = *a;
             }
@@ -66,10 +66,10 @@ fn cosine(bench: &Workbench, evidence: Observable, a: &dyn Case, b: &dyn Case) -
         let place = |nuisance: Nuisance| model.layout.nuisance(nuisance);
         let firsts: Vec<(usize, usize)> =
             (0..2).map(|order| first_of(&model.terms, order)).collect::<Option<_>>()?;
-        let directions = directions(bench, &cases, &firsts, &mut values, place);
+        let directions = directions(baseline, &cases, &firsts, &mut values, place);
         (expected(&model, &values), model.priors().to_vec(), directions)
     } else {
-        let data = bench.arrival_data();
+        let data = baseline.arrival_data();
         let model = arrivals::at_fit(&data, &cases, &used);
         let mut values: Vec<f64> = model.priors().iter().map(|p| p.mean).collect();
         let place = |nuisance: Nuisance| model.layout.nuisance(nuisance);
@@ -77,7 +77,7 @@ fn cosine(bench: &Workbench, evidence: Observable, a: &dyn Case, b: &dyn Case) -
             (0..2).map(|order| first_of(&model.terms, order)).collect::<Option<_>>()?;
         // Arrivals belong where they are: the information is taken without the effects.
         let neutral = values.clone();
-        let directions = directions(bench, &cases, &firsts, &mut values, place);
+        let directions = directions(baseline, &cases, &firsts, &mut values, place);
         (expected(&model, &neutral), model.priors().to_vec(), directions)
     };
     let [first, second] = &directions[..] else { return None };
@@ -111,7 +111,7 @@ fn first_of(
 }
 
 fn directions(
-    bench: &Workbench,
+    baseline: &Baseline,
     cases: &[&dyn Case],
     firsts: &[(usize, usize)],
     values: &mut [f64],
@@ -123,7 +123,7 @@ fn directions(
         .map(|(case, &(first, count))| {
             let mut along = DVector::zeros(values.len());
             let mut own: Vec<usize> = (first..first + count).collect();
-            for (i, p) in case.parameters(&bench.survey).iter().enumerate() {
+            for (i, p) in case.parameters(baseline.survey()).iter().enumerate() {
                 along[first + i] = p.typical - p.neutral;
                 values[first + i] = p.typical;
             }

@@ -2,7 +2,7 @@
 
 use crate::effect::Case;
 use crate::error::Error;
-use crate::infer::workbench::Workbench;
+use crate::infer::baseline::Baseline;
 use crate::likelihood::decay::{BinResidual, WarmStart};
 use crate::observe::observed_response::Measured;
 use crate::statistics::{median, poisson_tail, upper_tail};
@@ -17,51 +17,52 @@ const ODD_SD: f64 = 4.5;
 const ODD_BY_CHANCE: f64 = 1.5;
 
 /// The two ways in which a fit can lack.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Lack {
     /// Probability of as much by chance.
     pub p_value: f64,
-    /// Observable for a smooth discrepancy, in nats.
+    /// Evidence for a smooth discrepancy, in nats.
     pub discrepancy_nats: f64,
 }
 
 /// Tests a fitted model: against a smooth discrepancy that all positions share, calibrated on measurements simulated from
 /// the model itself; and for single odd bins.
 pub(crate) fn test(
-    bench: &Workbench,
+    baseline: &Baseline,
     cases: &[&dyn Case],
     fitted: WarmStart<'_>,
     used: &[bool],
 ) -> Result<Lack, Error> {
-    let free = bench.free_discrepancy();
+    let free = baseline.free_discrepancy();
     let gain = |measured: &[Measured]| -> Result<(f64, f64), Error> {
-        let base = bench.fit_energy_to(measured, cases, used, Some(fitted))?;
+        let base = baseline.fit_energy_to(measured, cases, used, Some(fitted))?;
         let mut all = cases.to_vec();
         all.push(&free as &dyn Case);
-        let more = bench.fit_energy_to(measured, &all, used, Some(fitted))?;
+        let more = baseline.fit_energy_to(measured, &all, used, Some(fitted))?;
         Ok((more.log_likelihood - base.log_likelihood, more.log_evidence - base.log_evidence))
     };
-    let (found, discrepancy_nats) = gain(&bench.measured)?;
-    let simulated: Vec<f64> = (0..bench.config.simulations as u64)
+    let (found, discrepancy_nats) = gain(&baseline.observations.measured)?;
+    let simulated: Vec<f64> = (0..baseline.config.simulations as u64)
         .into_par_iter()
-        .map(|i| Ok(gain(&simulate(bench, cases, fitted.values, i))?.0))
+        .map(|i| Ok(gain(&simulate(baseline, cases, fitted.values, i))?.0))
         .collect::<Result<_, Error>>()?;
     let smooth = upper_tail(found, &simulated);
     let pairs: Vec<usize> = (0..used.len()).filter(|&p| used[p]).collect();
-    let residuals = bench.residuals(cases, fitted.values, &pairs);
-    let odd = odd_bins(&residuals, bench.survey.bands.len());
+    let residuals = baseline.residuals(cases, fitted.values, &pairs);
+    let odd = odd_bins(&residuals, baseline.survey().bands.len());
     let p_odd = poisson_tail(odd, ODD_BY_CHANCE);
     Ok(Lack { p_value: (2.0 * smooth.min(p_odd)).min(1.0), discrepancy_nats })
 }
 
 /// A measurement as the fitted model expects it.
-fn simulate(bench: &Workbench, cases: &[&dyn Case], values: &[f64], number: u64) -> Vec<Measured> {
+fn simulate(baseline: &Baseline, cases: &[&dyn Case], values: &[f64], number: u64) -> Vec<Measured> {
     let mut random =
-        Pcg64Mcg::seed_from_u64(bench.config.seed ^ (number + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
-    let all: Vec<usize> = (0..bench.pairs.len()).collect();
-    let mut measured = bench.measured.clone();
-    let assignment = bench.assignment(cases);
-    for r in bench.residuals(cases, values, &all) {
-        let shape = 1.0 / (r.variance * bench.dispersion[r.band]);
+        Pcg64Mcg::seed_from_u64(baseline.config.seed ^ (number + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+    let all: Vec<usize> = (0..baseline.pairs()).collect();
+    let mut measured = baseline.observations.measured.clone();
+    let assignment = baseline.assignment(cases);
+    for r in baseline.residuals(cases, values, &all) {
+        let shape = 1.0 / (r.variance * baseline.dispersion[r.band]);
         let mean = r.ln_predicted.exp();
         let drawn = Gamma::new(shape, mean / shape).map_or(mean, |g| g.sample(&mut random));
         if let Some(energies) = &mut measured[assignment[r.pair]].energies[r.band] {

@@ -1,5 +1,7 @@
 //! Which causes the observations support.
 
+pub(crate) mod baseline;
+pub(crate) mod confirmation;
 pub(crate) mod cross_validation;
 pub(crate) mod direct_evidence;
 pub(crate) mod isolability;
@@ -7,4 +9,3 @@ pub(crate) mod lack_of_fit;
 pub(crate) mod prediction;
 pub(crate) mod search;
 pub(crate) mod selection;
-pub(crate) mod workbench;

@@ -1,7 +1,7 @@
 //! Positions that a fit has not seen, predicted and compared.
 
 use crate::effect::Case;
-use crate::infer::workbench::Workbench;
+use crate::infer::baseline::Baseline;
 use crate::likelihood::decay::EnergyModel;
 use sabine_acoustics::Levels;
 
@@ -17,25 +17,25 @@ pub(crate) struct Compared {
 
 /// All bands of some pairs under fitted values. Where the gain of a response means nothing, the predicted sum is that measured.
 pub(crate) fn compare(
-    bench: &Workbench,
+    baseline: &Baseline,
     cases: &[&dyn Case],
     values: &[f64],
     pairs: &[usize],
 ) -> Vec<Compared> {
-    let used = vec![true; bench.pairs.len()];
-    let data = bench.energy_data();
+    let used = vec![true; baseline.pairs()];
+    let data = baseline.energy_data();
     let model = EnergyModel::new(&data, cases, &used);
     let mut found = Vec::new();
     for &pair in pairs {
-        for band in 0..bench.survey.bands.len() {
+        for band in 0..baseline.survey().bands.len() {
             let Some(energies) = model.compared(pair, band) else { continue };
             let mut predicted: Vec<f64> =
                 model.predicted(values, pair, band, energies.len()).iter().map(|l| l.exp()).collect();
-            if bench.survey.measurement.levels == Levels::PerResponse {
+            if baseline.survey().measurement.levels == Levels::PerResponse {
                 let gain = energies.iter().sum::<f64>() / predicted.iter().sum::<f64>().max(1e-300);
                 predicted.iter_mut().for_each(|p| *p *= gain);
             }
-            let bins = bench.states[pair][band].bins;
+            let bins = baseline.simulation.states[pair][band].bins;
             found.push(Compared {
                 pair,
                 band,

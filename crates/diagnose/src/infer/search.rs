@@ -3,11 +3,12 @@
 use crate::effect::AuxiliaryEvidence;
 use crate::effect::{Case, Effect, Nuisance, Observable};
 use crate::error::Error;
+use crate::infer::baseline::Baseline;
 use crate::infer::direct_evidence;
 use crate::infer::direct_evidence::Fitted;
-use crate::infer::workbench::Workbench;
 use crate::likelihood::decay::WarmStart;
 use crate::likelihood::laplace::LaplaceFit;
+use crate::likelihood::polarity;
 use rayon::prelude::*;
 use sabine_acoustics::{Observer, report};
 
@@ -29,7 +30,7 @@ pub(crate) struct Candidate<'a> {
 #[derive(Clone, Debug)]
 pub(crate) struct Score {
     pub candidate: usize,
-    /// Observable that it adds, in nats.
+    /// Evidence that it adds, in nats.
     pub nats: f64,
     /// Its size in units of its standard deviation, everything else left free.
     pub d_prime: f64,
@@ -64,7 +65,7 @@ impl State {
 }
 
 pub(crate) struct Search<'a> {
-    pub bench: &'a Workbench,
+    pub baseline: &'a Baseline,
     pub candidates: Vec<Candidate<'a>>,
     /// Number of effects, for the correction for how many were tried.
     pub effects: usize,
@@ -85,14 +86,14 @@ pub(crate) struct EffectScore {
 
 impl<'a> Search<'a> {
     pub fn new(
-        bench: &'a Workbench,
+        baseline: &'a Baseline,
         cases: &'a [(usize, &'static str, Box<dyn Case>)],
         effects: usize,
         used: Vec<bool>,
     ) -> Self {
         let candidates =
             cases.iter().map(|(effect, id, case)| Candidate { effect: *effect, id, case: &**case }).collect();
-        Self { bench, candidates, effects, used }
+        Self { baseline, candidates, effects, used }
     }
 
     pub fn cases_of(&self, chosen: &[usize], part: Observable) -> Vec<&'a dyn Case> {
@@ -102,10 +103,14 @@ impl<'a> Search<'a> {
     pub fn state(&self, chosen: &[usize], near: Option<&State>) -> Result<State, Error> {
         let before = near.map(|s| WarmStart { values: &s.energy.values, firsts: &[] });
         let cases = self.cases_of(chosen, Observable::Decay);
-        let (energy, energy_firsts) = self.bench.fit_energy(&cases, &self.used, before)?;
+        let (energy, energy_firsts) = self.baseline.fit_energy(&cases, &self.used, before)?;
         let cases = self.cases_of(chosen, Observable::Arrivals);
-        let (arrivals, arrival_firsts) = self.bench.fit_arrivals(&cases, &self.used)?;
-        let polarity = self.bench.polarity(&self.all_cases(chosen), &self.used);
+        let (arrivals, arrival_firsts) = self.baseline.fit_arrivals(&cases, &self.used)?;
+        let polarity = polarity::log_likelihood(
+            &self.baseline.observations.measured,
+            &self.all_cases(chosen),
+            &self.used,
+        );
         let fitted = Fitted { energy: &energy, energy_firsts: &energy_firsts, arrivals: &arrivals };
         let own = direct_evidence::own(self, chosen, fitted, &self.used);
         Ok(State { chosen: chosen.to_vec(), energy, arrivals, polarity, own, energy_firsts, arrival_firsts })
@@ -126,14 +131,18 @@ impl<'a> Search<'a> {
         if evidence.concerns(Observable::Decay) && !turned {
             let cases = self.cases_of(&next.chosen, Observable::Decay);
             (next.energy, next.energy_firsts) =
-                self.bench.fit_energy(&cases, &self.used, Some(state.before()))?;
+                self.baseline.fit_energy(&cases, &self.used, Some(state.before()))?;
         }
         if evidence.concerns(Observable::Arrivals) && !turned {
             let cases = self.cases_of(&next.chosen, Observable::Arrivals);
-            (next.arrivals, next.arrival_firsts) = self.bench.fit_arrivals(&cases, &self.used)?;
+            (next.arrivals, next.arrival_firsts) = self.baseline.fit_arrivals(&cases, &self.used)?;
         }
         if turned {
-            next.polarity = self.bench.polarity(&self.all_cases(&next.chosen), &self.used);
+            next.polarity = polarity::log_likelihood(
+                &self.baseline.observations.measured,
+                &self.all_cases(&next.chosen),
+                &self.used,
+            );
         }
         let fitted =
             Fitted { energy: &next.energy, energy_firsts: &next.energy_firsts, arrivals: &next.arrivals };
@@ -143,7 +152,7 @@ impl<'a> Search<'a> {
 
     /// Candidates worth a full fit: all but the many exchanges that do not even help the direct sounds.
     fn worthwhile(&self, state: &State) -> Result<Vec<usize>, Error> {
-        let data = self.bench.arrival_data();
+        let data = self.baseline.arrival_data();
         let by_pair = |chosen: &[usize], values: &[f64]| -> f64 {
             let cases = self.cases_of(chosen, Observable::Arrivals);
             crate::likelihood::arrivals::at_fit(&data, &cases, &self.used)
@@ -178,7 +187,7 @@ impl<'a> Search<'a> {
         Ok(kept)
     }
 
-    /// Observable that every candidate adds.
+    /// Evidence that every candidate adds.
     pub fn scores(&self, state: &State, observer: &dyn Observer) -> Result<Vec<Score>, Error> {
         let worthwhile = self.worthwhile(state)?;
         let done = std::sync::atomic::AtomicU64::new(0);
@@ -210,16 +219,16 @@ impl<'a> Search<'a> {
             .relaxes()
             .iter()
             .map(|(nuisance, _)| match nuisance {
-                Nuisance::Absorption(_) => self.bench.survey.bands.len(),
+                Nuisance::Absorption(_) => self.baseline.survey().bands.len(),
                 Nuisance::SourcePosition(_) | Nuisance::ReceiverPosition(_) => 3,
                 Nuisance::ResponseGain(_) => 1,
             })
             .sum();
-        let free = case.parameters(&self.bench.survey).len() + widened;
+        let free = case.parameters(self.baseline.survey()).len() + widened;
         (2.0 * (likelihood(next) - likelihood(state)) - free as f64).max(0.0).sqrt()
     }
 
-    /// Observable by effect, the strongest first. An effect with many cases pays for their number.
+    /// Evidence by effect, the strongest first. An effect with many cases pays for their number.
     pub fn by_effect(&self, scores: &[Score]) -> Vec<EffectScore> {
         let mut found: Vec<EffectScore> = Vec::new();
         for effect in 0..self.effects {
@@ -242,7 +251,7 @@ impl<'a> Search<'a> {
 
     /// What must be reached for a name.
     pub fn threshold(&self) -> f64 {
-        self.bench.config.naming_nats + (self.effects.max(1) as f64).ln()
+        self.baseline.config.naming_nats + (self.effects.max(1) as f64).ln()
     }
 
     fn price(&self, candidate: usize) -> f64 {

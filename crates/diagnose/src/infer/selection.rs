@@ -1,11 +1,11 @@
 //! The search for causes, one name after the other.
 
-use crate::diagnoser::Diagnoser;
 use crate::effect::{Case, Nuisance, Observable};
 use crate::error::Error;
+use crate::infer::baseline::Baseline;
 use crate::infer::search::{EffectScore, Search};
-use crate::infer::workbench::Workbench;
 use crate::report::found_parameters::place_of;
+use crate::simulate::simulation::Retracing;
 use sabine_acoustics::Observer;
 
 /// What the search found.
@@ -35,100 +35,98 @@ impl Selection {
     }
 }
 
-impl Diagnoser {
-    /// Greedy naming, the dispersion estimated anew after each name, and a backward check.
-    pub(crate) fn name(
-        &self,
-        bench: &mut Workbench,
-        cases: &[(usize, &'static str, Box<dyn Case>)],
-        used: &[bool],
-        observer: &dyn Observer,
-    ) -> Result<Selection, Error> {
-        let mut named = Selection::default();
-        while named.chosen.len() < self.config.most_causes {
-            let (ranked, rivals, threshold) = {
-                let search = Search::new(bench, cases, self.effects.len(), used.to_vec());
-                let base = search.state(&[], None)?;
-                let state = search.state(&named.chosen, Some(&base))?;
-                let ranked: Vec<EffectScore> = search
-                    .by_effect(&search.scores(&state, observer)?)
-                    .into_iter()
-                    .filter(|s| {
-                        named.chosen.iter().all(|&c| {
-                            search.candidates[c].effect != s.effect
-                                || search.candidates[c].case.subject().is_some()
-                        })
+/// Greedy naming, the dispersion estimated anew after each name, and a backward check.
+pub(crate) fn select(
+    baseline: &mut Baseline,
+    cases: &[(usize, &'static str, Box<dyn Case>)],
+    effects: usize,
+    used: &[bool],
+    observer: &dyn Observer,
+) -> Result<Selection, Error> {
+    let mut named = Selection::default();
+    while named.chosen.len() < baseline.config.most_causes {
+        let (ranked, rivals, threshold) = {
+            let search = Search::new(baseline, cases, effects, used.to_vec());
+            let base = search.state(&[], None)?;
+            let state = search.state(&named.chosen, Some(&base))?;
+            let ranked: Vec<EffectScore> = search
+                .by_effect(&search.scores(&state, observer)?)
+                .into_iter()
+                .filter(|s| {
+                    named.chosen.iter().all(|&c| {
+                        search.candidates[c].effect != s.effect
+                            || search.candidates[c].case.subject().is_some()
                     })
-                    .collect();
-                let threshold = search.threshold();
-                let named_now = ranked.first().is_some_and(|best| best.nats >= threshold);
-                let rivals = if named_now { search.rivals(&state, &ranked)? } else { Vec::new() };
-                (ranked, rivals, threshold)
-            };
-            if named.first.is_empty() {
-                named.first.clone_from(&ranked);
-            }
-            let Some(best) = ranked.first().filter(|b| b.nats >= threshold) else {
-                named.last = Some((named.chosen.clone(), ranked));
-                break;
-            };
-            let strongest = best.nats.max(0.0);
-            let sum: f64 = ranked.iter().map(|r| (r.nats - strongest).exp()).sum::<f64>()
-                + (threshold - self.config.naming_nats - strongest).exp();
-            named.probabilities.push((best.best, (best.nats - strongest).exp() / sum));
-            named.chosen.push(best.best);
-            if !rivals.is_empty() {
-                named.rivals = std::iter::once(best.id).chain(rivals.iter().map(|r| r.id)).collect();
-                break;
-            }
-            let (moved, warmer_k, resized, absorption) = {
-                let search = Search::new(bench, cases, self.effects.len(), used.to_vec());
-                let state = search.state(&named.chosen, None)?;
-                let layout = bench.arrival_layout();
-                let moved: Vec<(Nuisance, [f64; 3])> = cases[best.best]
-                    .2
-                    .relaxes()
-                    .into_iter()
-                    .filter_map(|(place, _)| {
-                        let first = layout.nuisance(place)?.start;
-                        Some((place, std::array::from_fn(|k| state.arrivals.values[first + k])))
-                    })
-                    .collect();
-                let (maximum, first) = place_of(&search, &state, best.best);
-                let case = &cases[best.best].2;
-                let own = maximum.values.get(first..first + case.parameters(&bench.survey).len());
-                let warmer_k = own.map_or(0.0, |values| case.warmer_by_k(values, &bench.survey));
-                let resized = own.and_then(|values| case.resized(values));
-                (moved, warmer_k, resized, state.energy.values)
-            };
-            // With the cause at work the materials are others: what is compared, and with which spread, follows them.
-            if cases[best.best].2.observable().concerns(Observable::Decay) {
-                bench.expand_about(&absorption)?;
-            }
-            if warmer_k != 0.0 {
-                bench.warm(warmer_k)?;
-            }
-            if let Some(dimensions) = resized {
-                bench.resize(&dimensions)?;
-            }
-            for (place, offset_m) in moved {
-                bench.move_place(place, offset_m)?;
-            }
-            let chosen: Vec<&dyn Case> = named
-                .chosen
-                .iter()
-                .map(|&c| &*cases[c].2)
-                .filter(|c| c.observable().concerns(Observable::Decay))
+                })
                 .collect();
-            bench.calibrate_dispersion(&chosen, used)?;
+            let threshold = search.threshold();
+            let named_now = ranked.first().is_some_and(|best| best.nats >= threshold);
+            let rivals = if named_now { search.rivals(&state, &ranked)? } else { Vec::new() };
+            (ranked, rivals, threshold)
+        };
+        if named.first.is_empty() {
+            named.first.clone_from(&ranked);
         }
-        let search = Search::new(bench, cases, self.effects.len(), used.to_vec());
-        let state = search.backward(search.state(&named.chosen, None)?)?;
-        if named.chosen.last() != state.chosen.last() {
-            // The set stands for a cause that has turned out to be superfluous.
-            named.rivals.clear();
+        let Some(best) = ranked.first().filter(|b| b.nats >= threshold) else {
+            named.last = Some((named.chosen.clone(), ranked));
+            break;
+        };
+        let strongest = best.nats.max(0.0);
+        let sum: f64 = ranked.iter().map(|r| (r.nats - strongest).exp()).sum::<f64>()
+            + (threshold - baseline.config.naming_nats - strongest).exp();
+        named.probabilities.push((best.best, (best.nats - strongest).exp() / sum));
+        named.chosen.push(best.best);
+        if !rivals.is_empty() {
+            named.rivals = std::iter::once(best.id).chain(rivals.iter().map(|r| r.id)).collect();
+            break;
         }
-        named.chosen = state.chosen;
-        Ok(named)
+        let (moved, warmer_k, resized, absorption) = {
+            let search = Search::new(baseline, cases, effects, used.to_vec());
+            let state = search.state(&named.chosen, None)?;
+            let layout = baseline.arrival_layout();
+            let moved: Vec<(Nuisance, [f64; 3])> = cases[best.best]
+                .2
+                .relaxes()
+                .into_iter()
+                .filter_map(|(place, _)| {
+                    let first = layout.nuisance(place)?.start;
+                    Some((place, std::array::from_fn(|k| state.arrivals.values[first + k])))
+                })
+                .collect();
+            let (maximum, first) = place_of(&search, &state, best.best);
+            let case = &cases[best.best].2;
+            let own = maximum.values.get(first..first + case.parameters(baseline.survey()).len());
+            let warmer_k = own.map_or(0.0, |values| case.warmer_by_k(values, baseline.survey()));
+            let resized = own.and_then(|values| case.resized(values));
+            (moved, warmer_k, resized, state.energy.values)
+        };
+        // With the cause at work the materials are others: what is compared, and with which spread, follows them.
+        if cases[best.best].2.observable().concerns(Observable::Decay) {
+            baseline.expand_about(&absorption)?;
+        }
+        if warmer_k != 0.0 {
+            baseline.retrace(&Retracing::Warmer(warmer_k))?;
+        }
+        if let Some(dimensions) = resized {
+            baseline.retrace(&Retracing::Dimensions(dimensions))?;
+        }
+        for (place, offset_m) in moved {
+            baseline.retrace(&Retracing::Position(place, offset_m))?;
+        }
+        let chosen: Vec<&dyn Case> = named
+            .chosen
+            .iter()
+            .map(|&c| &*cases[c].2)
+            .filter(|c| c.observable().concerns(Observable::Decay))
+            .collect();
+        baseline.calibrate_dispersion(&chosen, used)?;
     }
+    let search = Search::new(baseline, cases, effects, used.to_vec());
+    let state = search.backward(search.state(&named.chosen, None)?)?;
+    if named.chosen.last() != state.chosen.last() {
+        // The set stands for a cause that has turned out to be superfluous.
+        named.rivals.clear();
+    }
+    named.chosen = state.chosen;
+    Ok(named)
 }

@@ -32,8 +32,6 @@ const STEP: f64 = 1e-4;
 const EARLY_BINS: usize = 8;
 /// Pairs whose likelihood one thread sums.
 const PAIRS_AT_ONCE: usize = 3;
-/// Bounds of absorption.
-pub(crate) const ABSORPTION: (f64, f64) = (0.002, 0.98);
 
 /// What all energy models of one diagnosis share.
 pub(crate) struct EnergyData<'a> {

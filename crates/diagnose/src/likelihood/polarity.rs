@@ -1,7 +1,7 @@
 //! Signs of the direct sounds.
 
 use crate::effect::Case;
-use crate::infer::workbench::Workbench;
+use crate::observe::observed_response::Measured;
 use crate::statistics::median;
 
 /// Likeness of direct pulses about its typical value: one standard deviation.
@@ -9,61 +9,58 @@ const LIKENESS_SD: f64 = 0.2;
 /// Share of pulses whose likeness says nothing.
 const ODD_PULSE_SHARE: f64 = 1e-6;
 
-impl Workbench {
-    /// Log-likelihood of the signs of the direct sounds.
-    pub fn polarity(&self, cases: &[&dyn Case], used: &[bool]) -> f64 {
-        let likeness = self.signs();
-        let fitted = likeness.iter().zip(used).filter(|(_, used)| **used);
-        let typical = median(fitted.filter_map(|(x, _)| x.map(f64::abs)).collect());
-        likeness
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| used[*i])
-            .filter_map(|(i, x)| {
-                let turned = cases.iter().filter(|c| c.inverted() == Some(i)).count() % 2 == 1;
-                let off = (if turned { -x.as_ref()? } else { *x.as_ref()? }) - typical;
-                let density =
-                    (-0.5 * (off / LIKENESS_SD).powi(2)).exp() / (LIKENESS_SD * std::f64::consts::TAU.sqrt());
-                Some(((1.0 - ODD_PULSE_SHARE) * density + ODD_PULSE_SHARE * 0.5).ln())
-            })
-            .sum()
-    }
+/// Log-likelihood of the signs of the direct sounds.
+pub(crate) fn log_likelihood(measured: &[Measured], cases: &[&dyn Case], used: &[bool]) -> f64 {
+    let likeness = signs(measured);
+    let fitted = likeness.iter().zip(used).filter(|(_, used)| **used);
+    let typical = median(fitted.filter_map(|(x, _)| x.map(f64::abs)).collect());
+    likeness
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| used[*i])
+        .filter_map(|(i, x)| {
+            let turned = cases.iter().filter(|c| c.inverted() == Some(i)).count() % 2 == 1;
+            let off = (if turned { -x.as_ref()? } else { *x.as_ref()? }) - typical;
+            let density =
+                (-0.5 * (off / LIKENESS_SD).powi(2)).exp() / (LIKENESS_SD * std::f64::consts::TAU.sqrt());
+            Some(((1.0 - ODD_PULSE_SHARE) * density + ODD_PULSE_SHARE * 0.5).ln())
+        })
+        .sum()
+}
 
-    /// Likeness of each direct pulse to the others, positive for the sign of the majority.
-    fn signs(&self) -> Vec<Option<f64>> {
-        let n = self.measured.len();
-        if n < 3 {
-            return vec![None; n];
-        }
-        let likeness: Vec<Vec<f64>> = self
-            .measured
-            .iter()
-            .map(|a| self.measured.iter().map(|b| a.pulse_likeness(b).unwrap_or(0.0)).collect())
-            .collect();
-        // Signs that agree best: the leading eigenvector by repeated multiplication, from the one most like all others.
-        let first = (0..n)
-            .max_by(|&a, &b| {
-                let sum = |i: usize| likeness[i].iter().map(|x| x.abs()).sum::<f64>();
-                sum(a).total_cmp(&sum(b))
-            })
-            .unwrap_or(0);
-        let mut signs: Vec<f64> = likeness[first].clone();
-        for _ in 0..50 {
-            let next: Vec<f64> =
-                likeness.iter().map(|row| row.iter().zip(&signs).map(|(a, b)| a * b).sum()).collect();
-            let norm = next.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-12);
-            signs = next.into_iter().map(|x| x / norm).collect();
-        }
-        let positive = signs.iter().filter(|s| **s > 0.0).count();
-        let majority = if 2 * positive >= n { 1.0 } else { -1.0 };
-        (0..n)
-            .map(|i| {
-                let others: Vec<f64> = (0..n)
-                    .filter(|&j| j != i && likeness[i][j] != 0.0)
-                    .map(|j| likeness[i][j] * (majority * signs[j]).signum())
-                    .collect();
-                (!others.is_empty()).then(|| median(others))
-            })
-            .collect()
+/// Likeness of each direct pulse to the others, positive for the sign of the majority.
+fn signs(measured: &[Measured]) -> Vec<Option<f64>> {
+    let n = measured.len();
+    if n < 3 {
+        return vec![None; n];
     }
+    let likeness: Vec<Vec<f64>> = measured
+        .iter()
+        .map(|a| measured.iter().map(|b| a.pulse_likeness(b).unwrap_or(0.0)).collect())
+        .collect();
+    // Signs that agree best: the leading eigenvector by repeated multiplication, from the one most like all others.
+    let first = (0..n)
+        .max_by(|&a, &b| {
+            let sum = |i: usize| likeness[i].iter().map(|x| x.abs()).sum::<f64>();
+            sum(a).total_cmp(&sum(b))
+        })
+        .unwrap_or(0);
+    let mut signs: Vec<f64> = likeness[first].clone();
+    for _ in 0..50 {
+        let next: Vec<f64> =
+            likeness.iter().map(|row| row.iter().zip(&signs).map(|(a, b)| a * b).sum()).collect();
+        let norm = next.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-12);
+        signs = next.into_iter().map(|x| x / norm).collect();
+    }
+    let positive = signs.iter().filter(|s| **s > 0.0).count();
+    let majority = if 2 * positive >= n { 1.0 } else { -1.0 };
+    (0..n)
+        .map(|i| {
+            let others: Vec<f64> = (0..n)
+                .filter(|&j| j != i && likeness[i][j] != 0.0)
+                .map(|j| likeness[i][j] * (majority * signs[j]).signum())
+                .collect();
+            (!others.is_empty()).then(|| median(others))
+        })
+        .collect()
 }

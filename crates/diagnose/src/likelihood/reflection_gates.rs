@@ -4,7 +4,7 @@
 //! of pulses with random signs, as for the time bins. Both are relative to the direct sound, gated in the same way.
 
 use crate::effect::{Case, Stage};
-use crate::infer::workbench::Workbench;
+use crate::infer::baseline::Baseline;
 use crate::observe::band_pulse::BandPulse;
 use crate::observe::early_energy::is_fast;
 use crate::simulate::reflection_reweighting::HitChanges;
@@ -57,23 +57,24 @@ fn meeting(source: [f64; 3], receiver: [f64; 3], single: &IsolatedReflection) ->
 /// Gates of all first-order reflections of the pairs that count, under fitted absorption and the causes at work. `shift_s` is how much later
 /// than predicted the direct sound and each single of a pair come by the fit of the arrival times.
 pub(crate) fn gates(
-    bench: &Workbench,
+    baseline: &Baseline,
     cases: &[&dyn Case],
     values: &[Vec<f64>],
     absorption: &[f64],
     shift_s: &[Vec<f64>],
 ) -> Vec<ReflectionGate> {
-    let survey = &bench.survey;
+    let survey = baseline.survey();
     let bands = survey.bands.len();
-    let assignment = bench.assignment(cases);
+    let assignment = baseline.assignment(cases);
     let mut found = Vec::new();
-    for (pair, (isolated_reflections, states)) in bench.isolated_reflections.iter().enumerate() {
+    for (pair, (isolated_reflections, states)) in baseline.simulation.isolated_reflections.iter().enumerate()
+    {
         if isolated_reflections.first().is_none_or(|s| s.order > 0)
             || shift_s[pair].len() != isolated_reflections.len()
         {
             continue;
         }
-        let measured = &bench.measured[assignment[pair]];
+        let measured = &baseline.observations.measured[assignment[pair]];
         let response = &survey.responses[pair];
         let source = survey.sources[response.source].position_m;
         let receiver = survey.receivers[response.receiver].position_m;
@@ -91,12 +92,12 @@ pub(crate) fn gates(
                     response: assignment[pair],
                     band,
                     state,
-                    direct_s: bench.direct_s[pair],
-                    reference: bench.reference[band],
+                    direct_s: baseline.simulation.direct_s[pair],
+                    reference: baseline.simulation.reference[band],
                     gain: 1.0,
                     hit_changes: &hit_changes,
                 };
-                let mut ln = fitted(state, bench, absorption, band);
+                let mut ln = fitted(state, baseline, absorption, band);
                 for (case, own) in cases.iter().zip(values).filter(|(c, _)| c.stage() == Stage::Room) {
                     case.energy(own, &view, &mut ln);
                 }
@@ -126,7 +127,7 @@ pub(crate) fn gates(
             let Some(plane) = plane else { continue };
             let (mut there, mut gone, mut told) = (0.0, 0.0, 0usize);
             for (band, energies) in energies.iter().enumerate().filter(|(_, e)| !e.is_empty()) {
-                let kernel = &bench.kernels[band];
+                let kernel = &baseline.observations.pulses[band];
                 let half_s = HALF_BANDWIDTH_TIMES / kernel.bandwidth_hz;
                 let at_direct = measured.early.gate(band, direct_s, half_s);
                 let at_own = measured.early.gate(band, times[own], half_s);
@@ -159,10 +160,13 @@ pub(crate) fn gates(
 }
 
 /// Logarithms of the isolated reflections' energies at fitted absorption.
-fn fitted(state: &BandState, bench: &Workbench, absorption: &[f64], band: usize) -> Vec<f64> {
-    let (materials, layout) = (bench.absorption.len(), bench.decay_layout());
+fn fitted(state: &BandState, baseline: &Baseline, absorption: &[f64], band: usize) -> Vec<f64> {
+    let (materials, layout) = (baseline.simulation.absorption.len(), baseline.decay_layout());
     let change: Vec<f64> = (0..materials)
-        .map(|m| ((1.0 - absorption[layout.absorption(m, band)]) / (1.0 - bench.absorption[m][band])).ln())
+        .map(|m| {
+            ((1.0 - absorption[layout.absorption(m, band)]) / (1.0 - baseline.simulation.absorption[m][band]))
+                .ln()
+        })
         .collect();
     let one = |(i, l): (usize, &f64)| {
         let hits = &state.group_hits[i * materials..(i + 1) * materials];

@@ -2,6 +2,8 @@
 
 use sabine_acoustics::{Bands, Error, FilterBank};
 
+/// Width of the cells in which sampled paths are gathered, in seconds.
+pub(crate) const CELL_S: f64 = 1e-3;
 /// Ringing to either side that is kept, in units of one over the bandwidth: what is left out is below -50 dB.
 const REACH_BANDWIDTH_TIMES: f64 = 6.0;
 

@@ -39,7 +39,7 @@ pub struct LackOfFit {
     pub p_value: f64,
     /// The same once the named causes are at work.
     pub p_value_explained: f64,
-    /// Observable for a smooth unnamed discrepancy beside the baseline, in nats.
+    /// Evidence for a smooth unnamed discrepancy beside the baseline, in nats.
     pub discrepancy_nats: f64,
     /// The same beside the named causes.
     pub discrepancy_nats_explained: f64,
@@ -91,7 +91,7 @@ pub struct Cause {
     pub explanation: String,
     /// Posterior probability against its absence and all other effects, when it was named.
     pub probability: f64,
-    /// Observable for it beside the other causes, in nats, before correction for the number tried.
+    /// Evidence for it beside the other causes, in nats, before correction for the number tried.
     pub nats: f64,
     /// Its parameters.
     pub parameters: Vec<FoundParameter>,
@@ -107,7 +107,7 @@ pub struct CandidateScore {
     pub effect: String,
     /// Its best case.
     pub subject: Option<String>,
-    /// Observable beside the baseline, corrected for the number of its cases, in nats.
+    /// Evidence beside the baseline, corrected for the number of its cases, in nats.
     pub nats: f64,
     /// Size found beside the baseline in units of its standard deviation, materials and everything else left free (d').
     pub d_prime: f64,

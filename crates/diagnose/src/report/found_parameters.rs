@@ -13,7 +13,7 @@ const TOLD_SHARE: f64 = 0.8;
 
 /// Fitted parameters of a chosen candidate, what it frees among what every fit leaves open included.
 pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -> Vec<FoundParameter> {
-    let bench = search.bench;
+    let baseline = search.baseline;
     let case = search.candidates[candidate].case;
     let mut found = Vec::new();
     let mut push = |name: String, value: f64, sd: f64, bounds: (f64, f64), unit: &str| {
@@ -30,29 +30,29 @@ pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -
         return own.map(|(_, own)| own.parameters.clone()).unwrap_or_default();
     }
     let (maximum, first) = place_of(search, state, candidate);
-    for (i, p) in case.parameters(&bench.survey).into_iter().enumerate() {
+    for (i, p) in case.parameters(baseline.survey()).into_iter().enumerate() {
         push(p.name, maximum.values[first + i], maximum.sd(first + i), p.bounds, p.unit);
     }
-    let bands = bench.survey.bands;
+    let bands = baseline.survey().bands;
     let open = (f64::NEG_INFINITY, f64::INFINITY);
     for (nuisance, _) in case.relaxes() {
         match nuisance {
             Nuisance::Absorption(m) => {
                 for b in 0..bands.len() {
-                    let i = bench.decay_layout().absorption(m, b);
+                    let i = baseline.decay_layout().absorption(m, b);
                     let name = format!("absorption_{}_hz", bands.nominal_hz(b));
                     push(name, state.energy.values[i], state.energy.sd(i), (0.0, 1.0), "");
                 }
             }
             Nuisance::SourcePosition(_) | Nuisance::ReceiverPosition(_) => {
-                let own = bench.arrival_layout().nuisance(nuisance).unwrap_or(0..0);
+                let own = baseline.arrival_layout().nuisance(nuisance).unwrap_or(0..0);
                 for (i, axis) in own.zip(["x", "y", "z"]) {
                     let (value, sd) = (state.arrivals.values[i], state.arrivals.sd(i));
                     push(format!("offset_{axis}"), value, sd, open, "m");
                 }
             }
             Nuisance::ResponseGain(r) => {
-                let i = bench.decay_layout().gain(r);
+                let i = baseline.decay_layout().gain(r);
                 push("gain".into(), state.energy.values[i], state.energy.sd(i), open, "dB");
             }
         }
@@ -70,7 +70,7 @@ pub(crate) fn at_bounds(search: &Search<'_>, state: &State, candidate: usize) ->
         return Vec::new();
     }
     let (maximum, first) = place_of(search, state, candidate);
-    let told = case.parameters(&search.bench.survey).into_iter().enumerate().filter(|(i, p)| {
+    let told = case.parameters(search.baseline.survey()).into_iter().enumerate().filter(|(i, p)| {
         let value = maximum.values[first + i];
         let at_end = (value <= p.bounds.0 || value >= p.bounds.1) && value != p.neutral;
         at_end && maximum.sd(first + i) < TOLD_SHARE * p.prior_sd

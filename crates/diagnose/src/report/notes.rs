@@ -1,11 +1,11 @@
 //! What must be said beside the verdict.
 
-use crate::infer::workbench::Workbench;
+use crate::infer::baseline::Baseline;
 use crate::report::diagnosis::Verdict;
 
 /// What the words depend on.
 pub(crate) struct Circumstances<'a> {
-    pub bench: &'a Workbench,
+    pub baseline: &'a Baseline,
     pub verdict: Verdict,
     /// Whether positions could be held out.
     pub held_out: bool,
@@ -25,11 +25,11 @@ pub(crate) struct Circumstances<'a> {
 }
 
 pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
-    let mut notes = about.bench.notes.clone();
-    if about.bench.survey.air_assumed {
+    let mut notes = about.baseline.observations.notes.clone();
+    if about.baseline.survey().air_assumed {
         notes.push("The room file states no climate: 20 degrees and 50 % humidity were assumed.".into());
     }
-    if about.bench.survey.responses.len() == 1 {
+    if about.baseline.survey().responses.len() == 1 {
         notes.push(
             "One response only: what is the same at every position cannot be told from what is not.".into(),
         );
@@ -61,7 +61,7 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
             parameters.join(" and ")
         ));
     }
-    if about.bench.arrivals.iter().any(Vec::is_empty) {
+    if about.baseline.simulation.arrivals.iter().any(Vec::is_empty) {
         notes.push("Where the direct line is blocked, arrival times are not compared.".into());
     }
     if about.scattered && about.verdict == Verdict::Unexplained {

@@ -1,29 +1,29 @@
 //! Where measured and predicted energies differ.
 
 use crate::effect::Case;
+use crate::infer::baseline::{Baseline, dispersion};
 use crate::infer::search::State;
-use crate::infer::workbench::{Workbench, dispersion};
 use crate::report::diagnosis::ResidualCell;
 
 /// Residuals of the fitted responses by octave and bin, their mean over responses, and the dispersion under the causes.
 pub(crate) fn residual_map(
-    bench: &Workbench,
+    baseline: &Baseline,
     base: &State,
     cases: &[&dyn Case],
     state: &State,
 ) -> (Vec<ResidualCell>, Vec<f64>) {
-    let all: Vec<usize> = (0..bench.pairs.len()).filter(|&p| bench.fitted[p]).collect();
-    let before = bench.residuals(&[], &base.energy.values, &all);
-    let after = bench.residuals(cases, &state.energy.values, &all);
+    let all: Vec<usize> = (0..baseline.pairs()).filter(|&p| baseline.observations.fitted[p]).collect();
+    let before = baseline.residuals(&[], &base.energy.values, &all);
+    let after = baseline.residuals(cases, &state.energy.values, &all);
     let db = |ln: f64| ln * 10.0 / std::f64::consts::LN_10;
     let mut cells = Vec::new();
     let mut means: std::collections::BTreeMap<(usize, usize), (f64, f64, f64, f64)> =
         std::collections::BTreeMap::new();
     for (b, a) in before.iter().zip(&after) {
-        let bins = bench.states[b.pair][b.band].bins;
+        let bins = baseline.simulation.states[b.pair][b.band].bins;
         cells.push(ResidualCell {
-            response: Some(bench.survey.responses[b.pair].name.clone()),
-            band_hz: bench.survey.bands.nominal_hz(b.band),
+            response: Some(baseline.survey().responses[b.pair].name.clone()),
+            band_hz: baseline.survey().bands.nominal_hz(b.band),
             time_s: bins.centre_s(b.bin),
             before_db: db(b.ln_ratio),
             after_db: db(a.ln_ratio),
@@ -36,15 +36,17 @@ pub(crate) fn residual_map(
         mean.3 += 1.0;
     }
     for ((band, bin), (b, a, variance, n)) in means {
-        let Some(pair) = all.iter().copied().find(|&p| bench.ends[p][band] > bin) else { continue };
+        let Some(pair) = all.iter().copied().find(|&p| baseline.simulation.ends[p][band] > bin) else {
+            continue;
+        };
         cells.push(ResidualCell {
             response: None,
-            band_hz: bench.survey.bands.nominal_hz(band),
-            time_s: bench.states[pair][band].bins.centre_s(bin),
+            band_hz: baseline.survey().bands.nominal_hz(band),
+            time_s: baseline.simulation.states[pair][band].bins.centre_s(bin),
             before_db: db((b / n).max(1e-9).ln()),
             after_db: db((a / n).max(1e-9).ln()),
             expected_sd_db: db((variance / n / n).sqrt()),
         });
     }
-    (cells, dispersion(&after, bench.survey.bands.len()))
+    (cells, dispersion(&after, baseline.survey().bands.len()))
 }

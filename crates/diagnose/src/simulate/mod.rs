@@ -3,6 +3,8 @@
 pub(crate) mod edges;
 pub(crate) mod hit_groups;
 pub(crate) mod reflection_reweighting;
+pub(crate) mod scene_tracer;
+pub(crate) mod simulation;
 pub(crate) mod traced_pair;
 pub(crate) mod traced_room;
 pub(crate) mod views;

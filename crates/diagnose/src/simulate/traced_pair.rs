@@ -10,15 +10,13 @@ pub(crate) use isolated_reflections::IsolatedReflection;
 use local_reaction::LOCAL_GRID;
 pub(crate) use scattering::scattering_more;
 
-use crate::observe::band_pulse::BandPulse;
+use crate::observe::band_pulse::{BandPulse, CELL_S};
 use crate::observe::time_bins::Bins;
 use crate::simulate::hit_groups;
 use rayon::prelude::*;
 use sabine_acoustics::{Air, Conditions, Error, Material, PathSet};
 use std::collections::BTreeMap;
 
-/// Width of the cells in which sampled paths are gathered, in seconds.
-pub(crate) const CELL_S: f64 = 1e-3;
 /// Extra scattering at which energies are tabulated.
 pub(crate) const SCATTERING_GRID: [f64; 8] = [-1.0, -0.5, 0.0, 0.1, 0.25, 0.45, 0.7, 0.95];
 /// Place of none in the grid.

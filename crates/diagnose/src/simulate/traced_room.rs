@@ -1,14 +1,13 @@
 //! The measured room traced: one set of paths for each response, good for any material.
 
-use crate::config::DiagnoseConfig;
 use crate::error::Error;
 use crate::observe::observed_response::Measured;
 use crate::simulate::edges::Edges;
+use crate::simulate::scene_tracer::PreparedTracer;
 use crate::simulate::traced_pair::{TracedPair, scattering_more};
 use crate::survey::Survey;
 use rayon::prelude::*;
 use sabine_acoustics::{Material, MeasuredRoom, Observer, PerBand, Scene, report};
-use sabine_propagate::{PathTracer, PreparedScene};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Extra scattering of the bands of the traced scene, in turn: its paths then serve any scattering.
@@ -42,14 +41,12 @@ pub(crate) fn traced_s(survey: &Survey, measured: &[Measured], range_db: f64) ->
     longest.min(MAX_TRACED_S)
 }
 
-/// The scene with scattering spread over the bands, and its tracer.
-pub(crate) fn prepare(
+/// The scene with scattering spread over the bands.
+pub(crate) fn traced_scene(
     room: &MeasuredRoom,
     survey: &Survey,
     materials: &[Material],
-    config: &DiagnoseConfig,
-    traced_s: f64,
-) -> Result<(Scene, PathTracer, PreparedScene), Error> {
+) -> Result<Scene, Error> {
     let bands = survey.bands;
     let spread: Vec<Material> = materials
         .iter()
@@ -62,23 +59,22 @@ pub(crate) fn prepare(
             Material::new(absorption, scattering)
         })
         .collect::<Result<_, sabine_acoustics::Error>>()?;
-    let scene: Scene = room.scene().with_materials(spread)?;
-    // The pairs differ in length by metres: the longest direct path sets the duration.
-    let slowest = survey.responses.iter().map(|r| r.air.speed_of_sound_m_s()).fold(f64::INFINITY, f64::min);
-    let diagonal: f64 = (0..3).map(|k| (survey.box_m[1][k] - survey.box_m[0][k]).powi(2)).sum::<f64>().sqrt();
-    let tracer = PathTracer::new(config.tracer(traced_s + diagonal / slowest + 0.05))?;
-    let prepared = tracer.prepare(&scene)?;
-    if !config.allow_leaks {
-        prepared.check_leaks(&scene, room.sources()[survey.responses[0].source].position_m)?;
-    }
-    Ok((scene, tracer, prepared))
+    Ok(room.scene().with_materials(spread)?)
 }
 
+/// How long paths must be followed after the emission: the pairs differ in length by metres, the longest direct path sets the duration.
+pub(crate) fn traced_until_s(survey: &Survey, traced_s: f64) -> f64 {
+    let slowest = survey.responses.iter().map(|r| r.air.speed_of_sound_m_s()).fold(f64::INFINITY, f64::min);
+    let diagonal: f64 = (0..3).map(|k| (survey.box_m[1][k] - survey.box_m[0][k]).powi(2)).sum::<f64>().sqrt();
+    traced_s + diagonal / slowest + 0.05
+}
+
+/// Traces all pairs.
 pub(crate) fn trace(
     room: &MeasuredRoom,
     survey: &Survey,
     materials: &[Material],
-    (tracer, prepared, edges): (&PathTracer, &PreparedScene, Option<&Edges>),
+    (tracer, edges): (&dyn PreparedTracer, Option<&Edges>),
     observer: &dyn Observer,
 ) -> Result<Vec<TracedPair>, Error> {
     let (done, total) = (AtomicU64::new(0), survey.responses.len() as u64);
@@ -88,7 +84,7 @@ pub(crate) fn trace(
         .map(|response| {
             report(observer, "tracing", done.fetch_add(1, Ordering::Relaxed), total)?;
             let (source, receiver) = (&room.sources()[response.source], &room.receivers()[response.receiver]);
-            let paths = tracer.trace_prepared(prepared, source, receiver, &response.air, &())?;
+            let paths = tracer.trace(source, receiver, &response.air)?;
             let places_m = [source.position_m, receiver.position_m];
             let diffracted = Edges::paths(edges, places_m, paths.max_length_m());
             Ok(TracedPair::new(paths, diffracted, response.air, materials)?)

@@ -1,7 +1,7 @@
 //! What it changes if surfaces scatter more or less, and how far chance has a say in it.
 
-use super::{BandState, CELL_S, NO_EXTRA, NOTHING, SCATTERING_GRID, TracedPair};
-use crate::observe::band_pulse::BandPulse;
+use super::{BandState, NO_EXTRA, NOTHING, SCATTERING_GRID, TracedPair};
+use crate::observe::band_pulse::{BandPulse, CELL_S};
 use crate::observe::time_bins::Bins;
 use sabine_acoustics::{Bands, Conditions, Error, Material, PathSet, PerBand};
 

@@ -1,11 +1,11 @@
 //! What the wave equation says of the lowest bands, in the bins in which they are measured.
 
-use super::Workbench;
+use super::Simulation;
 use crate::error::Error;
-use crate::observe::band_pulse::BandPulse;
+use crate::observe::band_pulse::{BandPulse, CELL_S};
 use crate::observe::observed_response;
 use crate::observe::time_bins::Bins;
-use crate::simulate::traced_pair::CELL_S;
+use crate::survey::Survey;
 use sabine_acoustics::{Air, FilterBank, Material, Receiver, Scene};
 use sabine_propagate::wave::{WaveConfig, WaveRoom, WaveSolver};
 
@@ -30,13 +30,14 @@ const MAX_UPDATES: f64 = 2e10;
 const MAX_CHANGE: f64 = 5.0;
 
 /// How many of the lowest bands lie below the Schroeder frequency, T by Eyring's formula; the lowest counts if it reaches below.
-pub(super) fn bands_of_modes(scene: &Scene, materials: &[Material], air: &Air) -> usize {
-    let Some(bands) = materials.first().map(Material::bands) else { return 0 };
+pub(crate) fn bands_of_modes(scene: &Scene, air: &Air) -> usize {
+    let materials: Vec<&Material> = scene.materials().iter().map(|m| &m.material).collect();
+    let Some(bands) = materials.first().map(|m| m.bands()) else { return 0 };
     let areas = scene.material_areas_m2();
     let (surface, volume_m3) = (areas.iter().sum::<f64>(), scene.volume_m3().abs());
     let schroeder_hz = |band: usize| {
         let absorbed: f64 =
-            areas.iter().zip(materials).map(|(area, m)| area * m.absorption().values()[band]).sum();
+            areas.iter().zip(&materials).map(|(area, m)| area * m.absorption().values()[band]).sum();
         let mean = (absorbed / surface).clamp(1e-3, 0.99);
         let t60_s = 24.0 * std::f64::consts::LN_10 / air.speed_of_sound_m_s() * volume_m3
             / (-surface * (1.0 - mean).ln());
@@ -56,45 +57,30 @@ struct Plan {
     updates: f64,
 }
 
-impl Workbench {
-    /// Solves the wave equation for every source at the materials of the expansion, and tabulates by how much its energies differ from
-    /// those of the paths. What keeps the solver from it becomes a note, and the table stays empty.
-    pub(super) fn tabulate_waves(&mut self, materials: &[Material]) -> Result<(), Error> {
-        let count = self.survey.bands_of_modes;
-        if count == 0 {
-            return Ok(());
-        }
-        let started = std::time::Instant::now();
-        let plan = self.plan(count);
+impl Simulation {
+    /// Solves the wave equation in the `count` lowest bands for every source at the materials of the expansion, and tabulates by how much
+    /// its energies differ from those of the paths. The tables stay empty where there is a reason, which is returned.
+    pub fn tabulate_waves(&mut self, count: usize, survey: &Survey) -> Result<Option<String>, Error> {
+        let materials = self.expanded_materials()?;
+        let plan = self.plan(count, survey);
         if plan.updates > MAX_UPDATES {
-            self.survey.bands_of_modes = 0;
-            let updates = plan.updates;
-            self.notes.push(format!(
-                "Standing waves are not looked for: {updates:.0e} steps of voxels would be too many."
-            ));
-            return Ok(());
+            return Ok(Some(format!("{:.0e} steps of voxels would be too many", plan.updates)));
         }
-        let tables = self.wave_energies(count, plan, materials);
-        *self.seconds.entry("waves").or_default() += started.elapsed().as_secs_f64();
-        match tables {
+        match self.wave_energies(count, plan, &materials, survey) {
             Ok(tables) => {
                 for (states, energies) in self.states.iter_mut().zip(tables) {
                     for (state, energies) in states.iter_mut().zip(energies) {
                         state.compare_with_waves(&energies);
                     }
                 }
-                Ok(())
+                Ok(None)
             }
-            Err(error) => {
-                self.survey.bands_of_modes = 0;
-                self.notes.push(format!("Standing waves are not looked for: {error}."));
-                Ok(())
-            }
+            Err(error) => Ok(Some(error.to_string())),
         }
     }
 
     /// What is to be solved, and what it takes.
-    fn plan(&self, count: usize) -> Plan {
+    fn plan(&self, count: usize, survey: &Survey) -> Plan {
         let scene = self.resized.as_ref().unwrap_or(&self.scene);
         let corner = |fold: fn(f64, f64) -> f64, from: f64, k: usize| {
             scene.vertices().iter().map(|v| v[k]).fold(from, fold)
@@ -108,8 +94,7 @@ impl Workbench {
         let slowest_m_s = self.speed_m_s.iter().copied().fold(f64::INFINITY, f64::min);
         let least_s = PERIODS * 2.0 * longest_m / slowest_m_s;
         let config = WaveConfig {
-            limit_hz: LET_IN.powf(1.0 / self.survey.bands.per_octave() as f64)
-                * self.survey.bands.exact_hz(count - 1),
+            limit_hz: LET_IN.powf(1.0 / survey.bands.per_octave() as f64) * survey.bands.exact_hz(count - 1),
             points_per_wavelength: POINTS_PER_WAVELENGTH,
             duration_s: (0..self.pairs.len()).map(compared_s).fold(least_s, f64::max),
             sample_rate_hz: RATE_HZ,
@@ -118,7 +103,7 @@ impl Workbench {
         let mut solutions: Vec<Vec<usize>> = Vec::new();
         for pair in 0..self.pairs.len() {
             // One solution serves all receivers of a source in the same air.
-            let source = |p: usize| self.survey.responses[p].source;
+            let source = |p: usize| survey.responses[p].source;
             let alike = |other: &&mut Vec<usize>| {
                 source(other[0]) == source(pair) && self.pairs[other[0]].air == self.pairs[pair].air
             };
@@ -140,8 +125,9 @@ impl Workbench {
         count: usize,
         plan: Plan,
         materials: &[Material],
+        survey: &Survey,
     ) -> Result<Vec<Vec<Vec<f64>>>, sabine_propagate::Error> {
-        let bands = self.survey.bands;
+        let bands = survey.bands;
         let low = bands.part(0..count);
         let bank = FilterBank::new(low, RATE_HZ)?;
         let kernels = BandPulse::all(low, RATE_HZ, CELL_S)?;
@@ -149,11 +135,11 @@ impl Workbench {
         let scene = self.resized.as_ref().unwrap_or(&self.scene);
         let mut found = vec![Vec::new(); self.pairs.len()];
         for now in plan.solutions {
-            let (source, air) = (self.survey.responses[now[0]].source, self.pairs[now[0]].air);
+            let (source, air) = (survey.responses[now[0]].source, self.pairs[now[0]].air);
             let place = &self.sources[source];
             let room: WaveRoom = solver.prepare(scene, place, &air)?;
             let hearing: Vec<Receiver> =
-                now.iter().map(|&p| self.receivers[self.survey.responses[p].receiver].clone()).collect();
+                now.iter().map(|&p| self.receivers[survey.responses[p].receiver].clone()).collect();
             let responses = solver.solve(&room, materials, place, &hearing, &air, &())?;
             for (&pair, response) in now.iter().zip(&responses) {
                 let samples: Vec<f32> = response.samples().iter().map(|&s| s as f32).collect();

@@ -1,0 +1,270 @@
+//! Everything that a diagnosis compares, and fits of any set of causes to it.
+
+use crate::config::DiagnoseConfig;
+use crate::effect::Case;
+use crate::error::Error;
+use crate::likelihood::arrivals::{self, ArrivalData};
+use crate::likelihood::decay::{self, BinResidual, EnergyData, EnergyModel, WarmStart};
+use crate::likelihood::discrepancy::FreeDiscrepancy;
+use crate::likelihood::laplace::{LaplaceFit, Prior};
+use crate::likelihood::parameters::{ArrivalLayout, DecayLayout};
+use crate::observe::observations::Observations;
+use crate::observe::observed_response::Measured;
+use crate::simulate::scene_tracer::SceneTracer;
+use crate::simulate::simulation::{ABSORPTION, Retracing, Simulation, bands_of_modes};
+use crate::simulate::traced_pair::TracedPair;
+use crate::survey::Survey;
+use sabine_acoustics::{MaterialPrior, MeasuredRoom, Observer, report};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Rounds of expansion and fit of the baseline.
+const ROUNDS: usize = 4;
+/// Change of absorption (share of its prior's standard deviation) below which no further round is needed.
+const TOLERANCE: f64 = 0.1;
+
+/// Observations and simulation with what the fit of the baseline needs: absorption, gains, latencies and places within what is known of
+/// them, and no cause.
+pub(crate) struct Baseline {
+    pub observations: Observations,
+    pub simulation: Simulation,
+    pub config: DiagnoseConfig,
+    /// What is known of the absorption, `[material][band]`.
+    pub priors: Vec<Vec<Prior>>,
+    /// Factor by which variances exceed what is expected, by band.
+    pub dispersion: Vec<f64>,
+    pub seconds: BTreeMap<&'static str, f64>,
+}
+
+impl Baseline {
+    /// Reads and traces everything, and fits the baseline to all responses but those of the receivers `held`.
+    pub fn new(
+        room: &MeasuredRoom,
+        held: &[usize],
+        config: &DiagnoseConfig,
+        tracer: &Arc<dyn SceneTracer>,
+        observer: &dyn Observer,
+    ) -> Result<Self, Error> {
+        let started = Instant::now();
+        config.check()?;
+        let mut observations = Observations::read(room, held, observer)?;
+        if config.wave_solutions {
+            observations.survey.bands_of_modes = bands_of_modes(room.scene(), &room.air());
+        }
+        let simulation = Simulation::trace(room, &observations, tracer, config, observer)?;
+        let pairs = &simulation.pairs;
+        let in_sight: Vec<bool> = pairs.iter().map(TracedPair::has_direct).collect();
+        observations.align(&in_sight, &simulation.direct_s);
+        observations.survey.diffracted = (0..pairs.len()).filter(|&p| pairs[p].is_diffracted()).collect();
+        let mut baseline = Self {
+            priors: room.priors().iter().map(absorption_priors).collect(),
+            dispersion: vec![1.0; room.bands().len()],
+            config: config.clone(),
+            observations,
+            simulation,
+            seconds: BTreeMap::from([("trace", started.elapsed().as_secs_f64())]),
+        };
+        baseline.expand(false)?;
+        baseline.simulation.predict_arrivals()?;
+        baseline.fit(observer)?;
+        Ok(baseline)
+    }
+
+    pub fn survey(&self) -> &Survey {
+        &self.observations.survey
+    }
+
+    /// Number of pairs, and of responses.
+    pub fn pairs(&self) -> usize {
+        self.simulation.pairs.len()
+    }
+
+    /// Expands the simulation about its absorption; with tables and wave solutions, where wanted.
+    fn expand(&mut self, tables: bool) -> Result<(), Error> {
+        self.simulation.expand(&self.observations, tables)?;
+        if !tables || self.survey().bands_of_modes == 0 {
+            return Ok(());
+        }
+        let started = Instant::now();
+        if let Some(reason) = self
+            .simulation
+            .tabulate_waves(self.observations.survey.bands_of_modes, &self.observations.survey)?
+        {
+            self.observations.survey.bands_of_modes = 0;
+            self.observations.notes.push(format!("Standing waves are not looked for: {reason}."));
+        }
+        *self.seconds.entry("waves").or_default() += started.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// Takes changes of the model into the simulation, and expands it anew.
+    pub fn retrace(&mut self, change: &Retracing) -> Result<(), Error> {
+        self.simulation.apply(change, &self.observations.survey)?;
+        self.expand(true)
+    }
+
+    /// Expands about fitted absorption.
+    pub fn expand_about(&mut self, values: &[f64]) -> Result<(), Error> {
+        let layout = self.decay_layout();
+        for (m, material) in self.simulation.absorption.iter_mut().enumerate() {
+            material.copy_from_slice(&values[layout.material(m)]);
+        }
+        self.expand(true)
+    }
+
+    /// Fits the baseline, expanding about it anew until it stays.
+    fn fit(&mut self, observer: &dyn Observer) -> Result<(), Error> {
+        let started = Instant::now();
+        let used = self.observations.fitted.clone();
+        for round in 0..ROUNDS {
+            report(observer, "baseline", round as u64, ROUNDS as u64)?;
+            let found = self.fit_energy(&[], &used, None)?;
+            let layout = self.decay_layout();
+            let mut moved = 0.0f64;
+            for (m, material) in self.simulation.absorption.iter_mut().enumerate() {
+                for (b, a) in material.iter_mut().enumerate() {
+                    let next = found.0.values[layout.absorption(m, b)];
+                    moved = moved.max((next - *a).abs() / self.priors[m][b].sd.min(0.1));
+                    *a = next;
+                }
+            }
+            let last = moved < TOLERANCE || round + 1 == ROUNDS;
+            self.expand(last)?;
+            if last {
+                break;
+            }
+        }
+        if self.simulation.ends.iter().flatten().all(|&e| e == 0) {
+            return Err(Error::NothingToCompare { responses: self.pairs() });
+        }
+        self.seconds.insert("baseline", started.elapsed().as_secs_f64());
+        Ok(())
+    }
+
+    pub fn decay_layout(&self) -> DecayLayout {
+        DecayLayout::of(self.survey())
+    }
+
+    pub fn arrival_layout(&self) -> ArrivalLayout {
+        ArrivalLayout::of(self.survey())
+    }
+
+    pub fn energy_data(&self) -> EnergyData<'_> {
+        EnergyData {
+            survey: self.survey(),
+            measured: &self.observations.measured,
+            states: &self.simulation.states,
+            ends: &self.simulation.ends,
+            direct_s: &self.simulation.direct_s,
+            reference: &self.simulation.reference,
+            absorption: &self.simulation.absorption,
+            priors: &self.priors,
+            gain_sd_db: self.config.gain_sd_db,
+            dispersion: &self.dispersion,
+        }
+    }
+
+    pub fn arrival_data(&self) -> ArrivalData<'_> {
+        ArrivalData {
+            survey: self.survey(),
+            measured: &self.observations.measured,
+            arrivals: &self.simulation.arrivals,
+            speed_m_s: &self.simulation.speed_m_s,
+            position_sd_m: self.config.position_sd_m,
+        }
+    }
+
+    /// Fits decays under the causes that bear on them.
+    pub fn fit_energy(
+        &self,
+        cases: &[&dyn Case],
+        used: &[bool],
+        before: Option<WarmStart<'_>>,
+    ) -> Result<(LaplaceFit, Vec<usize>), Error> {
+        decay::fit(&self.energy_data(), cases, used, before)
+    }
+
+    pub fn fit_arrivals(
+        &self,
+        cases: &[&dyn Case],
+        used: &[bool],
+    ) -> Result<(LaplaceFit, Vec<usize>), Error> {
+        arrivals::fit(&self.arrival_data(), cases, used)
+    }
+
+    pub fn free_discrepancy(&self) -> FreeDiscrepancy {
+        let end_s = (0..self.survey().bands.len()).map(|b| self.simulation.compared_s(b)).collect();
+        FreeDiscrepancy { end_s }
+    }
+
+    /// Fits decays to energies other than those measured.
+    pub fn fit_energy_to(
+        &self,
+        measured: &[Measured],
+        cases: &[&dyn Case],
+        used: &[bool],
+        before: Option<WarmStart<'_>>,
+    ) -> Result<LaplaceFit, Error> {
+        let data = EnergyData { measured, ..self.energy_data() };
+        Ok(decay::fit(&data, cases, used, before)?.0)
+    }
+
+    /// Which response holds which pair.
+    pub fn assignment(&self, cases: &[&dyn Case]) -> Vec<usize> {
+        let mut assignment: Vec<usize> = (0..self.pairs()).collect();
+        for (a, b) in cases.iter().filter_map(|c| c.exchanged()) {
+            assignment.swap(a, b);
+        }
+        assignment
+    }
+
+    /// Bins of the given pairs under fitted values.
+    pub fn residuals(&self, cases: &[&dyn Case], values: &[f64], pairs: &[usize]) -> Vec<BinResidual> {
+        let used = vec![true; self.pairs()];
+        let data = self.energy_data();
+        EnergyModel::new(&data, cases, &used).residuals(values, pairs.iter().copied())
+    }
+
+    /// Sets the dispersion of each band to what the bins still scatter once anything smooth has been taken out.
+    pub fn calibrate_dispersion(&mut self, cases: &[&dyn Case], used: &[bool]) -> Result<(), Error> {
+        let free = self.free_discrepancy();
+        let mut all = cases.to_vec();
+        all.push(&free);
+        let (found, _) = self.fit_energy(&all, used, None)?;
+        let pairs: Vec<usize> = (0..used.len()).filter(|&p| used[p]).collect();
+        let residuals = self.residuals(&all, &found.values, &pairs);
+        self.dispersion =
+            dispersion(&residuals, self.survey().bands.len()).iter().map(|d| d.max(1.0)).collect();
+        Ok(())
+    }
+}
+
+/// Mean squared standardised residual of each band; what a bin measures above the prediction counts up to e^5 times.
+pub(crate) fn dispersion(residuals: &[BinResidual], bands: usize) -> Vec<f64> {
+    (0..bands)
+        .map(|band| {
+            let own: Vec<f64> = residuals
+                .iter()
+                .filter(|r| r.band == band)
+                .map(|r| (r.ln_ratio.min(5.0).exp() - 1.0).powi(2) / r.variance)
+                .collect();
+            if own.is_empty() { 1.0 } else { own.iter().sum::<f64>() / own.len() as f64 }
+        })
+        .collect()
+}
+
+fn absorption_priors(prior: &MaterialPrior) -> Vec<Prior> {
+    let bands = prior.absorption_sd.bands();
+    (0..bands.len())
+        .map(|b| {
+            let mean = prior.absorption.as_ref().map(|a| a.values()[b]);
+            Prior {
+                mean: mean.unwrap_or(MaterialPrior::UNKNOWN_ABSORPTION),
+                sd: prior.absorption_sd.values()[b],
+                low: ABSORPTION.0,
+                high: ABSORPTION.1,
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,194 @@
+//! Puts a diagnosis together from what was found.
+
+use crate::effect::{Effect, Observable};
+use crate::error::Error;
+use crate::extend::extension;
+use crate::infer::baseline::Baseline;
+use crate::infer::confirmation::Confirmation;
+use crate::infer::cross_validation::decay_curves;
+use crate::infer::isolability::isolability;
+use crate::infer::prediction::compare;
+use crate::infer::search::{EffectScore, Search, State};
+use crate::infer::selection::Selection;
+use crate::report::diagnosis::{CandidateScore, Cause, Diagnosis, FittedMaterial, LackOfFit, Verdict};
+use crate::report::found_parameters::{at_bounds, parameters};
+use crate::report::next_measurement::discriminating_measurement;
+use crate::report::notes::{Circumstances, notes};
+use crate::report::residual_map::residual_map;
+use sabine_acoustics::Observer;
+use std::time::Instant;
+
+/// Dispersion from which an unexplained misfit looks like another room.
+const WARN_DISPERSION: f64 = 3.0;
+
+/// The whole answer. `first_dispersion` is that of the baseline before any cause was named.
+pub(crate) fn compose(
+    effects: &[Box<dyn Effect>],
+    search: &Search<'_>,
+    found: &Selection,
+    confirmed: Confirmation,
+    first_dispersion: &[f64],
+    observer: &dyn Observer,
+) -> Result<Diagnosis, Error> {
+    let started = Instant::now();
+    let baseline = search.baseline;
+    let Confirmation { base, state, verdict, lack_before, lack_after, .. } = &confirmed;
+    let causes = causes(effects, search, found, &confirmed)?;
+    let alternatives: Vec<String> = match verdict {
+        Verdict::Ambiguous => found.rivals.iter().map(|r| (*r).to_owned()).collect(),
+        _ => Vec::new(),
+    };
+    let isolability = isolability(baseline, &search.candidates)?;
+    let candidates = candidate_scores(search, state, found, observer)?;
+    let cases_now = search.cases_of(&state.chosen, Observable::Decay);
+    let (residuals, dispersion) = residual_map(baseline, base, &cases_now, state);
+    let decays = if confirmed.predicted.held_out.is_some() {
+        confirmed.predicted.decays.clone()
+    } else {
+        let all: Vec<usize> = (0..baseline.pairs()).collect();
+        let before = compare(baseline, &[], &base.energy.values, &all);
+        let after = compare(baseline, &cases_now, &state.energy.values, &all);
+        decay_curves(baseline, &before, &after, false)
+    };
+    let model = extension::extended_model(baseline, search, state);
+    let notes = notes_on(search, &confirmed, first_dispersion);
+    let mut seconds: Vec<(String, f64)> =
+        baseline.seconds.iter().map(|(stage, s)| ((*stage).to_owned(), *s)).collect();
+    seconds.push(("lack of fit".into(), confirmed.testing_s));
+    seconds.push(("prediction".into(), confirmed.predicting_s));
+    seconds.push(("report".into(), started.elapsed().as_secs_f64()));
+    let common_gain = baseline.decay_layout().common_gain();
+    Ok(Diagnosis {
+        verdict: *verdict,
+        lack_of_fit: LackOfFit {
+            p_value: lack_before.p_value,
+            p_value_explained: lack_after.p_value,
+            discrepancy_nats: lack_before.discrepancy_nats,
+            discrepancy_nats_explained: lack_after.discrepancy_nats,
+            dispersion,
+        },
+        causes,
+        would_decide: words_that_decide(&alternatives),
+        alternatives,
+        candidates,
+        isolability,
+        materials: fitted_materials(baseline, base, state),
+        held_out: confirmed.predicted.held_out.clone(),
+        bands: baseline.survey().bands,
+        residuals,
+        decays,
+        common_gain_db: common_gain.map(|index| state.energy.values[index]),
+        notes,
+        model,
+        seconds,
+    })
+}
+
+fn causes(
+    effects: &[Box<dyn Effect>],
+    search: &Search<'_>,
+    found: &Selection,
+    confirmed: &Confirmation,
+) -> Result<Vec<Cause>, Error> {
+    let state = &confirmed.state;
+    let one = |(place, &candidate): (usize, &usize)| {
+        let own = &search.candidates[candidate];
+        Ok(Cause {
+            effect: own.id.to_owned(),
+            subject: own.case.subject(),
+            explanation: effects[own.effect].explanation().to_owned(),
+            probability: found.probability(candidate),
+            nats: without(search, state, candidate)?,
+            parameters: parameters(search, state, candidate),
+            held_out_gain: confirmed.predicted.gains.get(place).cloned(),
+        })
+    };
+    state.chosen.iter().enumerate().map(one).collect()
+}
+
+fn notes_on(search: &Search<'_>, confirmed: &Confirmation, first_dispersion: &[f64]) -> Vec<String> {
+    let Confirmation { base, state, .. } = confirmed;
+    let at_bounds: Vec<(&str, Vec<String>)> = state
+        .chosen
+        .iter()
+        .map(|&c| (search.candidates[c].id, at_bounds(search, state, c)))
+        .filter(|(_, parameters)| !parameters.is_empty())
+        .collect();
+    notes(&Circumstances {
+        baseline: search.baseline,
+        verdict: confirmed.verdict,
+        held_out: confirmed.predicted.held_out.is_some(),
+        converged: base.energy.converged && state.energy.converged && state.arrivals.converged,
+        misfit_left: confirmed.lack_after.p_value < search.baseline.config.significance,
+        hopeless: confirmed.hopeless,
+        scattered: first_dispersion.iter().any(|d| *d > WARN_DISPERSION),
+        unseated: &confirmed.unseated,
+        unconfirmed: &confirmed.unconfirmed,
+        at_bounds: &at_bounds,
+    })
+}
+
+fn candidate_scores(
+    search: &Search<'_>,
+    state: &State,
+    found: &Selection,
+    observer: &dyn Observer,
+) -> Result<Vec<CandidateScore>, Error> {
+    let beside = match &found.last {
+        _ if state.chosen.is_empty() => None,
+        Some((chosen, scores)) if *chosen == state.chosen => Some(scores.clone()),
+        _ => Some(search.by_effect(&search.scores(state, observer)?)),
+    };
+    let one = |s: &EffectScore| {
+        let chosen = state.chosen.iter().any(|&c| search.candidates[c].effect == s.effect);
+        let nats_beside_causes = match (&beside, chosen) {
+            (Some(all), false) => all.iter().find(|o| o.effect == s.effect).map(|o| o.nats),
+            _ => None,
+        };
+        CandidateScore {
+            effect: s.id.to_owned(),
+            subject: search.candidates[s.best].case.subject(),
+            nats: s.nats,
+            d_prime: s.d_prime,
+            nats_beside_causes,
+        }
+    };
+    Ok(found.first.iter().map(one).collect())
+}
+
+/// Evidence that a chosen candidate adds to the others.
+fn without(search: &Search<'_>, state: &State, candidate: usize) -> Result<f64, Error> {
+    let rest: Vec<usize> = state.chosen.iter().copied().filter(|&c| c != candidate).collect();
+    Ok(state.log_evidence() - search.state(&rest, Some(state))?.log_evidence())
+}
+
+/// What would tell each two of the alternatives apart.
+fn words_that_decide(alternatives: &[String]) -> Vec<String> {
+    let mut words: Vec<String> = Vec::new();
+    for (i, a) in alternatives.iter().enumerate() {
+        for b in &alternatives[i + 1..] {
+            let word = discriminating_measurement(a, b).to_string();
+            if !words.contains(&word) {
+                words.push(word);
+            }
+        }
+    }
+    words
+}
+
+fn fitted_materials(baseline: &Baseline, base: &State, state: &State) -> Vec<(String, FittedMaterial)> {
+    (0..baseline.survey().materials.len())
+        .map(|m| {
+            let bands = baseline.survey().bands.len();
+            let layout = baseline.decay_layout();
+            let column = |values: &[f64]| values[layout.material(m)].to_vec();
+            let fitted = FittedMaterial {
+                stated: baseline.priors[m].iter().map(|p| p.mean).collect(),
+                absorption_before: column(&base.energy.values),
+                absorption: column(&state.energy.values),
+                absorption_sd: (0..bands).map(|b| state.energy.sd(layout.absorption(m, b))).collect(),
+            };
+            (baseline.survey().materials[m].clone(), fitted)
+        })
+        .collect()
+}

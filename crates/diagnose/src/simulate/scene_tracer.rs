@@ -1,0 +1,90 @@
+//! What a diagnosis asks of a tracer.
+
+use crate::error::Error;
+use sabine_acoustics::{Air, PathSet, Propagator, Receiver, Scene, Source};
+use sabine_propagate::{PathTracer, PreparedScene, TracerConfig};
+
+/// A tracer that a diagnosis can use: it prepares a scene once and then traces many pairs in it.
+///
+/// [`SceneTracer`] and [`PreparedTracer`] have two implementations here: the path tracer of `sabine-propagate`, which is the default, and
+/// [`EachScene`], which takes any [`Propagator`].
+pub trait SceneTracer: Send + Sync {
+    /// Prepares a scene whose paths must be followed for `duration_s` seconds after the emission.
+    ///
+    /// # Errors
+    /// For a scene that cannot be traced.
+    fn prepare(&self, scene: &Scene, duration_s: f64) -> Result<Box<dyn PreparedTracer>, Error>;
+}
+
+/// A scene that is ready to be traced.
+pub trait PreparedTracer: Send + Sync {
+    /// Looks for what makes the scene unfit, such as a mesh that leaks; `source_m` is a place in the room. Called once, for the scene as
+    /// stated.
+    ///
+    /// # Errors
+    /// For an unfit scene. The default finds nothing.
+    fn check(&self, source_m: [f64; 3]) -> Result<(), Error> {
+        let _ = source_m;
+        Ok(())
+    }
+
+    /// All paths of one pair. Paths must be good for any absorption, and carry what [`PathSet`] says that they carry.
+    ///
+    /// # Errors
+    /// For a source or receiver that cannot be traced.
+    fn trace(&self, source: &Source, receiver: &Receiver, air: &Air) -> Result<PathSet, Error>;
+}
+
+/// The path tracer of `sabine-propagate`.
+#[derive(Clone, Debug)]
+pub(crate) struct Rays {
+    /// Its settings, but for the duration.
+    pub config: TracerConfig,
+}
+
+struct PreparedRays {
+    tracer: PathTracer,
+    prepared: PreparedScene,
+    /// The scene, if it is to be checked for leaks.
+    scene: Option<Scene>,
+}
+
+impl SceneTracer for Rays {
+    fn prepare(&self, scene: &Scene, duration_s: f64) -> Result<Box<dyn PreparedTracer>, Error> {
+        let tracer = PathTracer::new(TracerConfig { duration_s, ..self.config.clone() })?;
+        let prepared = tracer.prepare(scene)?;
+        let scene = (!self.config.allow_leaks).then(|| scene.clone());
+        Ok(Box::new(PreparedRays { tracer, prepared, scene }))
+    }
+}
+
+impl PreparedTracer for PreparedRays {
+    fn check(&self, source_m: [f64; 3]) -> Result<(), Error> {
+        Ok(self.scene.as_ref().map_or(Ok(()), |scene| self.prepared.check_leaks(scene, source_m))?)
+    }
+
+    fn trace(&self, source: &Source, receiver: &Receiver, air: &Air) -> Result<PathSet, Error> {
+        Ok(self.tracer.trace_prepared(&self.prepared, source, receiver, air, &())?)
+    }
+}
+
+/// Any [`Propagator`], which looks at the scene anew for each pair. Its own duration holds: it must reach as far as decays are compared.
+#[derive(Clone, Debug)]
+pub struct EachScene<P>(pub P);
+
+struct WithScene<P> {
+    propagator: P,
+    scene: Scene,
+}
+
+impl<P: Propagator + Clone + 'static> SceneTracer for EachScene<P> {
+    fn prepare(&self, scene: &Scene, _: f64) -> Result<Box<dyn PreparedTracer>, Error> {
+        Ok(Box::new(WithScene { propagator: self.0.clone(), scene: scene.clone() }))
+    }
+}
+
+impl<P: Propagator> PreparedTracer for WithScene<P> {
+    fn trace(&self, source: &Source, receiver: &Receiver, air: &Air) -> Result<PathSet, Error> {
+        Ok(self.propagator.trace(&self.scene, source, receiver, air, &())?)
+    }
+}

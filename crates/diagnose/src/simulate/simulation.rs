@@ -1,0 +1,176 @@
+//! What the simulated room predicts, expanded about a set of absorptions.
+
+mod retracing;
+mod waves;
+
+pub(crate) use retracing::Retracing;
+pub(crate) use waves::bands_of_modes;
+
+use crate::config::DiagnoseConfig;
+use crate::error::Error;
+use crate::observe::observations::Observations;
+use crate::observe::observed_response::PEAKS_S;
+use crate::simulate::edges::Edges;
+use crate::simulate::scene_tracer::{PreparedTracer, SceneTracer};
+use crate::simulate::traced_pair::{Arrival, BandState, IsolatedReflection, TracedPair};
+use crate::simulate::traced_room::{trace, traced_s, traced_scene, traced_until_s};
+use rayon::prelude::*;
+use sabine_acoustics::{Material, MeasuredRoom, Observer, PerBand, Receiver, Scene, Source};
+use std::sync::Arc;
+
+/// Early time over which the reference energy is the mean, in seconds after the direct sound.
+const REFERENCE_S: f64 = 0.05;
+/// Exact paths are kept as arrivals for this much longer than peaks are looked for.
+const ARRIVALS_MARGIN: f64 = 1.2;
+/// Bounds of absorption.
+pub(crate) const ABSORPTION: (f64, f64) = (0.002, 0.98);
+
+/// The room traced for every response, and the energies that follow at the materials of the expansion.
+pub(crate) struct Simulation {
+    /// Materials as stated.
+    pub materials: Vec<Material>,
+    pub pairs: Vec<TracedPair>,
+    /// Absorption of the expansion, `[material][band]`.
+    pub absorption: Vec<Vec<f64>>,
+    /// Predictions, `[pair][band]`.
+    pub states: Vec<Vec<BandState>>,
+    /// First bin that the compared range leaves out, `[pair][band]`.
+    pub ends: Vec<Vec<usize>>,
+    /// Early exact paths of each pair, and their energies by band.
+    pub isolated_reflections: Vec<(Vec<IsolatedReflection>, Vec<BandState>)>,
+    pub direct_s: Vec<f64>,
+    pub speed_m_s: Vec<f64>,
+    pub arrivals: Vec<Vec<Arrival>>,
+    pub reference: Vec<f64>,
+    range_db: f64,
+    traced_s: f64,
+    /// Paths are followed until so long after the emission.
+    traced_until_s: f64,
+    /// Kelvin by which the air was found to be warmer than stated.
+    warmer_k: f64,
+    /// What is traced: the mesh, with scattering spread over the bands.
+    scene: Scene,
+    /// The same at the size that was found.
+    resized: Option<Scene>,
+    tracer: Arc<dyn SceneTracer>,
+    prepared: Box<dyn PreparedTracer>,
+    edges: Option<Edges>,
+    sources: Vec<Source>,
+    receivers: Vec<Receiver>,
+}
+
+impl Simulation {
+    /// Traces every pair of the observations.
+    pub fn trace(
+        room: &MeasuredRoom,
+        observations: &Observations,
+        tracer: &Arc<dyn SceneTracer>,
+        config: &DiagnoseConfig,
+        observer: &dyn Observer,
+    ) -> Result<Self, Error> {
+        let survey = &observations.survey;
+        let materials: Vec<Material> = room.scene().materials().iter().map(|m| m.material.clone()).collect();
+        let traced_s = traced_s(survey, &observations.measured, config.range_db);
+        let traced_until_s = traced_until_s(survey, traced_s);
+        let scene = traced_scene(room, survey, &materials)?;
+        let source_m = room.sources()[survey.responses[0].source].position_m;
+        let prepared = tracer.prepare(&scene, traced_until_s)?;
+        prepared.check(source_m)?;
+        let edges = Edges::find(&scene)?;
+        let pairs = trace(room, survey, &materials, (&*prepared, edges.as_ref()), observer)?;
+        let clamped = |m: &Material| {
+            m.absorption().values().iter().map(|a| a.clamp(ABSORPTION.0, ABSORPTION.1)).collect()
+        };
+        Ok(Self {
+            absorption: materials.iter().map(clamped).collect(),
+            direct_s: pairs.iter().map(|p| p.direct_s).collect(),
+            speed_m_s: pairs.iter().map(|p| p.speed_m_s).collect(),
+            materials,
+            pairs,
+            states: Vec::new(),
+            ends: Vec::new(),
+            isolated_reflections: Vec::new(),
+            arrivals: Vec::new(),
+            reference: Vec::new(),
+            range_db: config.range_db,
+            traced_s,
+            traced_until_s,
+            warmer_k: 0.0,
+            scene,
+            resized: None,
+            tracer: Arc::clone(tracer),
+            prepared,
+            edges,
+            sources: room.sources().to_vec(),
+            receivers: room.receivers().to_vec(),
+        })
+    }
+
+    /// Materials of the expansion.
+    pub fn expanded_materials(&self) -> Result<Vec<Material>, Error> {
+        let one = |(m, a): (&Material, &Vec<f64>)| {
+            m.with_absorption(PerBand::from_fn(m.absorption().bands(), |b| a[b]))
+        };
+        Ok(self.materials.iter().zip(&self.absorption).map(one).collect::<Result<_, _>>()?)
+    }
+
+    /// Energies of all bins at the present absorption; tables of scattering and angle, and early reflections one by one, too, where
+    /// wanted.
+    pub fn expand(&mut self, observations: &Observations, tables: bool) -> Result<(), Error> {
+        let materials = self.expanded_materials()?;
+        let one = |pair: &TracedPair| pair.expand(&materials, &observations.pulses, self.traced_s, tables);
+        self.states = self.pairs.par_iter().map(one).collect::<Result<_, _>>()?;
+        if tables {
+            let one = |pair: &TracedPair| pair.isolated_reflections(&materials, PEAKS_S);
+            self.isolated_reflections = self.pairs.par_iter().map(one).collect::<Result<_, _>>()?;
+        }
+        self.ends =
+            self.states.iter().map(|s| s.iter().map(|b| range_end(b, self.range_db)).collect()).collect();
+        self.reference = (0..observations.survey.bands.len())
+            .map(|band| {
+                let early: Vec<f64> = self
+                    .states
+                    .iter()
+                    .flat_map(|s| {
+                        let count = s[band].bins.count(REFERENCE_S).clamp(1, s[band].ln_energy.len().max(1));
+                        s[band].ln_energy.iter().take(count).map(|l| l.exp())
+                    })
+                    .collect();
+                (early.iter().sum::<f64>() / early.len().max(1) as f64).max(1e-30)
+            })
+            .collect();
+        Ok(())
+    }
+
+    /// Predicts the arrivals of all pairs; none where the direct line is blocked.
+    pub fn predict_arrivals(&mut self) -> Result<(), Error> {
+        let materials = self.expanded_materials()?;
+        for pair in &self.pairs {
+            let found = pair.arrivals(&materials, PEAKS_S * ARRIVALS_MARGIN)?;
+            self.arrivals.push(if pair.has_direct() { found } else { Vec::new() });
+        }
+        Ok(())
+    }
+
+    /// End of the compared time of each band over all pairs, in seconds after the direct sound.
+    pub fn compared_s(&self, band: usize) -> f64 {
+        (0..self.pairs.len())
+            .map(|p| self.states[p][band].bins.edge_s(self.ends[p][band]))
+            .fold(0.02, f64::max)
+    }
+}
+
+/// First bin that the compared range leaves out.
+fn range_end(state: &BandState, range_db: f64) -> usize {
+    let energies: Vec<f64> = state.ln_energy.iter().map(|l| l.exp()).collect();
+    let total: f64 = energies.iter().sum();
+    let floor = total * 10f64.powf(-range_db / 10.0);
+    let mut left = total;
+    for (bin, e) in energies.iter().enumerate() {
+        if left < floor {
+            return bin;
+        }
+        left -= e;
+    }
+    energies.len()
+}
