@@ -110,10 +110,10 @@ impl Bands {
     ///
     /// # Errors
     /// [`Error::UnknownBand`] for a centre that is not nominal, [`Error::BandOrder`] if they do not rise octave by octave
-    /// or third by third, or there are none.
+    /// or third by third, [`Error::Empty`] if there are none.
     pub fn from_centres_hz(centres_hz: &[f64]) -> Result<Self, Error> {
         let (Some(&first_hz), Some(&last_hz)) = (centres_hz.first(), centres_hz.last()) else {
-            return Err(Error::BandOrder { first_hz: f64::NAN, last_hz: f64::NAN });
+            return Err(Error::Empty { what: "the list of centres" });
         };
         for &centre_hz in centres_hz {
             // Every nominal octave centre is one of a third octave, too.
@@ -361,7 +361,7 @@ mod tests {
         assert!(matches!(Bands::from_centres_hz(&[125.0, 500.0]), Err(Error::BandOrder { .. })));
         assert!(matches!(Bands::from_centres_hz(&[500.0, 250.0]), Err(Error::BandOrder { .. })));
         assert!(matches!(Bands::from_centres_hz(&[130.0]), Err(Error::UnknownBand { .. })));
-        assert!(matches!(Bands::from_centres_hz(&[]), Err(Error::BandOrder { .. })));
+        assert!(matches!(Bands::from_centres_hz(&[]), Err(Error::Empty { .. })));
     }
 
     #[test]

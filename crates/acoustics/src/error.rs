@@ -1,7 +1,7 @@
 //! What can go wrong with vocabulary values and measures.
 
-use crate::Bands;
-use std::path::PathBuf;
+use crate::{Bands, Engineering, NoReading};
+use std::path::{Path, PathBuf};
 
 /// Errors of this crate; each names the offending field, and the file where there is one.
 #[derive(Debug, thiserror::Error)]
@@ -40,7 +40,7 @@ pub enum Error {
         right: Bands,
     },
     /// A number outside its physical range, or not finite.
-    #[error("{field} is {value}; it must be {range}")]
+    #[error("{field} is {}; it must be {range}", Engineering(*value))]
     OutOfRange {
         /// What the number stands for, with its unit.
         field: &'static str,
@@ -146,12 +146,60 @@ pub enum Error {
         found: usize,
     },
     /// TOML that cannot be read: a slip in its grammar, an unknown or missing key, or a value of the wrong type.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: line {line}: {}{}", path.display(), if field.is_empty() { String::new() } else { format!("{field}: ") }, source.message().trim_end())]
     Toml {
         /// The file.
         path: PathBuf,
+        /// The line, counted from 1.
+        line: usize,
+        /// The table and the key of that line, as far as they can be read: `materials.wall.absorption`.
+        field: String,
         /// Where and what.
         source: Box<toml::de::Error>,
+    },
+    /// A file that another one names, but that does not lie below the folder that may be read.
+    #[error("{} lies outside the folder {}; it is read only with `allow_outside`", named.display(), folder.display())]
+    OutsideFolder {
+        /// The file that is named.
+        named: PathBuf,
+        /// The folder below which it must lie.
+        folder: PathBuf,
+    },
+    /// A material whose absorption is given twice.
+    #[error("`library` and `absorption` both give this material's absorption; keep one of them")]
+    TwoTables,
+    /// A source or receiver that lies outside the mesh as it is read, whereas all lie inside if another axis points up.
+    #[error(
+        "{position_m:?} m is outside the mesh, which reaches from {low_m:.2?} to {high_m:.2?} m; if its {up_axis} axis pointed up, the mesh would hold every source and receiver: add up_axis = \"{up_axis}\" to [room]"
+    )]
+    TurnedMesh {
+        /// The position in metres.
+        position_m: [f64; 3],
+        /// The lowest coordinates of the mesh in metres.
+        low_m: [f64; 3],
+        /// The highest coordinates of the mesh in metres.
+        high_m: [f64; 3],
+        /// The axis that would have to point up.
+        up_axis: crate::UpAxis,
+    },
+    /// Sound without a single sample that differs from zero.
+    #[error("silent: every sample is zero")]
+    Silent,
+    /// A response in which no direct sound can be found.
+    #[error("no direct sound: {source}")]
+    NoDirectSound {
+        /// Why.
+        source: NoReading,
+    },
+    /// A recording where an impulse response was expected.
+    #[error(
+        "no impulse response: its level falls by {fall_db} dB and rises again {rises} times, as speech or music does"
+    )]
+    NotAResponse {
+        /// How often the level rises again.
+        rises: usize,
+        /// How far it falls and rises each time, in dB.
+        fall_db: f64,
     },
     /// A line of an OBJ file that cannot be understood.
     #[error("cannot read `{text}` as {expected}")]
@@ -265,10 +313,38 @@ pub enum Error {
         direct_s: f64,
     },
     /// A material that the library does not hold.
-    #[error("the material library has no `{name}`")]
+    #[error("the material library has no `{name}`; the nearest names are {}", nearest.join(", "))]
     UnknownMaterial {
         /// The name asked for.
         name: String,
+        /// The names of the library that are most like it, the nearest first.
+        nearest: Vec<&'static str>,
+    },
+    /// A floor plan that crosses or touches itself.
+    #[error("wall {first} and wall {second} cross or touch each other")]
+    CrossedPlan {
+        /// The wall from this corner to the next, counted from 1.
+        first: usize,
+        /// The other wall.
+        second: usize,
+    },
+    /// A position that is not in the room.
+    #[error("`{id}` at {position_m:?} m is not inside the room, or nearer than {margin_m} m to a surface")]
+    OutsidePlan {
+        /// Identifier of the source or receiver.
+        id: String,
+        /// The position in metres.
+        position_m: [f64; 3],
+        /// The least distance from floor, ceiling and walls, in metres.
+        margin_m: f64,
+    },
+    /// A line of a text file that is not what it should be.
+    #[error("cannot read `{text}` as {expected}")]
+    TextLine {
+        /// What was expected.
+        expected: &'static str,
+        /// The line.
+        text: String,
     },
     /// An implementation of one of the traits failed.
     #[error("{what}: {source}")]
@@ -284,6 +360,13 @@ impl Error {
     /// Names the file and the field in which this error arose.
     pub(crate) fn in_file(self, path: impl Into<PathBuf>, field: impl Into<String>) -> Self {
         Self::InFile { path: path.into(), field: field.into(), source: Box::new(self) }
+    }
+
+    /// Says where in the text of a TOML file something is wrong.
+    pub fn toml(path: impl AsRef<Path>, text: &str, source: toml::de::Error) -> Self {
+        let at = source.span().map_or(0, |span| span.start.min(text.len()));
+        let (line, field) = crate::toml_field::line_and_field(text, at);
+        Self::Toml { path: path.as_ref().to_owned(), line, field, source: Box::new(source) }
     }
 
     /// Wraps the error of a trait's implementation.

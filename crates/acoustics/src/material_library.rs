@@ -67,7 +67,40 @@ pub fn material_library() -> &'static [LibraryMaterial] {
 /// # Errors
 /// [`Error::UnknownMaterial`] if there is none.
 pub fn library_material(name: &str) -> Result<&'static LibraryMaterial, Error> {
-    LIBRARY.iter().find(|m| m.name == name).ok_or_else(|| Error::UnknownMaterial { name: name.to_owned() })
+    let unknown = || Error::UnknownMaterial { name: name.to_owned(), nearest: nearest(name) };
+    LIBRARY.iter().find(|m| m.name == name).ok_or_else(unknown)
+}
+
+/// The three names that are most like another: those that share its words, then those that take the fewest changes.
+fn nearest(name: &str) -> Vec<&'static str> {
+    let name = name.to_lowercase();
+    let words = |text: &str| text.split(['_', '-', ' ']).map(str::to_owned).collect::<Vec<_>>();
+    let asked: Vec<String> = words(&name).into_iter().filter(|word| word.len() > 2).collect();
+    let rank = |other: &str| {
+        let shared =
+            words(other).iter().filter(|word| asked.iter().any(|a| word.contains(a.as_str()))).count();
+        (std::cmp::Reverse(shared), changes(&name, other))
+    };
+    let mut names: Vec<&str> = LIBRARY.iter().map(|m| m.name).collect();
+    names.sort_by_key(|other| rank(other));
+    names.truncate(3);
+    names
+}
+
+/// Letters to insert, remove or replace to turn one word into another (Levenshtein 1966).
+fn changes(from: &str, to: &str) -> usize {
+    let to: Vec<char> = to.chars().collect();
+    // What can be asked for has no limit, what is compared has one.
+    let mut row: Vec<usize> = (0..=to.len()).collect();
+    for (i, a) in from.chars().take(100).enumerate() {
+        let mut diagonal = std::mem::replace(&mut row[0], i + 1);
+        for (j, &b) in to.iter().enumerate() {
+            let replaced = diagonal + usize::from(a != b);
+            diagonal = row[j + 1];
+            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[to.len()]
 }
 
 const VORLAENDER: &str = "Vorländer 2008, annex";
@@ -141,6 +174,21 @@ mod tests {
             assert!(!surface.source.is_empty() && !surface.description.is_empty());
         }
         assert!(matches!(library_material("unobtainium"), Err(Error::UnknownMaterial { .. })));
+    }
+
+    #[test]
+    fn a_name_that_is_not_there_brings_the_nearest() {
+        for (asked, first) in [
+            ("carpt_thin", "carpet_thin"),
+            ("Carpet_Thin", "carpet_thin"),
+            ("parquet", "parquet_on_concrete"),
+            ("thick curtain", "curtain_light"),
+            ("brick-painted", "brick_painted"),
+        ] {
+            assert_eq!(nearest(asked)[0], first, "{asked}: {:?}", nearest(asked));
+            assert!(library_material(asked).unwrap_err().to_string().contains(first));
+        }
+        assert_eq!((changes("kitten", "sitting"), changes("", "ab"), changes("ab", "ab")), (3, 2, 0));
     }
 
     #[test]

@@ -1,15 +1,25 @@
 //! A room as it was measured: mesh, materials as far as they are known, places and responses, from a folder.
 
+mod drawn_room;
 mod file;
 pub(crate) mod materials;
+mod notes;
 mod other_model;
+mod response_check;
+mod turned;
 mod write;
 
+pub use drawn_room::DrawnRoom;
+pub use notes::RoomNote;
 pub use write::{NewResponse, NewRoom};
 
 use crate::audio::{Channel, probe_wav, read_audio};
 use crate::error::check_range;
-use crate::{Air, Bands, Error, ImpulseResponse, Material, Mesh, PerBand, Receiver, Scene, Source};
+use crate::inside_folder::check_inside;
+use crate::{
+    Air, Bands, Error, ImpulseResponse, Material, Mesh, MeshOptions, PerBand, Receiver, Scene, Source,
+    UpAxis, library_material,
+};
 use file::{AirTable, MaterialTable, PlaceTable, ResponseTable, RoomFile};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashSet};
@@ -92,6 +102,19 @@ pub struct ResponseEntry {
     pub duration_s: f64,
 }
 
+/// How [`MeasuredRoom::read_with`] reads a room.
+///
+/// ```
+/// use sabine_acoustics::ReadOptions;
+/// // Only files below the room's folder are read, unless asked.
+/// assert!(!ReadOptions::default().allow_outside);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// Read a mesh, its buffers and responses that lie outside the room's folder, too: only for rooms that you trust.
+    pub allow_outside: bool,
+}
+
 /// A room on disk: `room.toml`, its mesh and its responses, checked.
 ///
 /// ```
@@ -117,6 +140,8 @@ pub struct MeasuredRoom {
     file: PathBuf,
     scene: Scene,
     faces_without_area: usize,
+    up_axis: UpAxis,
+    named_as_in_library: Vec<String>,
     priors: Vec<MaterialPrior>,
     air: Air,
     air_assumed: bool,
@@ -127,6 +152,14 @@ pub struct MeasuredRoom {
 }
 
 impl MeasuredRoom {
+    /// Reads `room.toml` and the mesh of a folder, and the headers of its responses: files below that folder only.
+    ///
+    /// # Errors
+    /// As [`MeasuredRoom::read_with`].
+    pub fn read(folder: impl AsRef<Path>) -> Result<Self, Error> {
+        Self::read_with(folder, &ReadOptions::default())
+    }
+
     /// Reads `room.toml` and the mesh of a folder, and the headers of its responses.
     ///
     /// Materials stand in the order in which the mesh first uses them, in the bands of the file. What takes rays to find out
@@ -136,32 +169,61 @@ impl MeasuredRoom {
     /// [`Error::Io`] and [`Error::Toml`] (grammar, unknown or missing keys, wrong types);
     /// for the mesh as [`Mesh::read`] and [`Mesh::into_scene`]; [`Error::InFile`] naming file and field, with the cause
     /// [`Error::TableWithoutMaterial`], [`Error::BandCount`], [`Error::Length`], [`Error::OutOfRange`],
-    /// [`Error::UnknownBand`], [`Error::BandOrder`], [`Error::DuplicateId`], [`Error::UnknownId`] or [`Error::Empty`]; for
+    /// [`Error::UnknownBand`], [`Error::BandOrder`], [`Error::DuplicateId`], [`Error::UnknownId`], [`Error::UnknownMaterial`],
+    /// [`Error::TwoTables`], [`Error::TurnedMesh`], [`Error::OutsideFolder`] or [`Error::Empty`]; for
     /// the responses what [`probe_wav`] gives and, where sample 0 is the emission,
     /// [`Error::ShorterThanDirectSound`].
-    pub fn read(folder: impl AsRef<Path>) -> Result<Self, Error> {
+    pub fn read_with(folder: impl AsRef<Path>, options: &ReadOptions) -> Result<Self, Error> {
         let folder = folder.as_ref();
         let path = folder.join("room.toml");
-        let file: RoomFile = toml::from_str(&read_text(&path)?)
-            .map_err(|source| Error::Toml { path: path.clone(), source: Box::new(source) })?;
-        let mut room = Self::assemble(&path, &file, &folder.join(&file.room.mesh))?;
+        let text = read_text(&path)?;
+        let file: RoomFile = toml::from_str(&text).map_err(|source| Error::toml(&path, &text, source))?;
+        let named = |field: String, name: &Path| -> Result<PathBuf, Error> {
+            let file = folder.join(name);
+            if !options.allow_outside {
+                check_inside(folder, &file).map_err(|error| error.in_file(&path, field))?;
+            }
+            Ok(file)
+        };
+        let mesh_options = MeshOptions {
+            unit: file.room.units.unwrap_or_default(),
+            up_axis: file.room.up_axis,
+            folder: Some(folder.to_owned()),
+            allow_outside: options.allow_outside,
+        };
+        let mesh_path = named("room.mesh".into(), &file.room.mesh)?;
+        let mut room = Self::assemble(&path, &file, &mesh_path, &mesh_options)?;
         for (i, table) in file.responses.iter().enumerate() {
-            let entry = room.entry(&file, i, table, folder)?;
+            let wav = named(format!("responses[{i}].file"), &table.file)?;
+            let entry = room.entry(&file, i, table, wav)?;
             room.responses.push(entry);
         }
         Ok(room)
     }
 
     /// Everything but the responses.
-    fn assemble(path: &Path, file: &RoomFile, mesh_path: &Path) -> Result<Self, Error> {
+    fn assemble(
+        path: &Path,
+        file: &RoomFile,
+        mesh_path: &Path,
+        mesh_options: &MeshOptions,
+    ) -> Result<Self, Error> {
         let bands = bands(&file.bands.centres_hz).map_err(|e| e.in_file(path, "bands.centres_hz"))?;
-        let mesh = Mesh::read(mesh_path)?;
+        let mesh = Mesh::read_with(mesh_path, mesh_options)?;
         if let Some(name) = file.materials.keys().find(|name| !mesh.material_names().contains(name)) {
             let error = Error::TableWithoutMaterial { mesh: mesh_path.to_owned() };
             return Err(error.in_file(path, format!("materials.{name}")));
         }
-        let (materials, mut priors) = materials(path, bands, &file.materials)?;
-        let faces_without_area = mesh.faces_without_area();
+        let mut tables = file.materials.clone();
+        let in_library =
+            |name: &&String| !file.materials.contains_key(*name) && library_material(name).is_ok();
+        let named_as_in_library: Vec<String> =
+            mesh.material_names().iter().filter(in_library).cloned().collect();
+        for name in &named_as_in_library {
+            tables.insert(name.clone(), MaterialTable { library: Some(name.clone()), ..Default::default() });
+        }
+        let (materials, mut priors) = materials(path, bands, &tables)?;
+        let (faces_without_area, up_axis) = (mesh.faces_without_area(), mesh.up_axis());
         let scene = mesh.into_scene(&materials)?;
         let priors = scene.materials().iter().filter_map(|named| priors.remove(&named.name)).collect();
         let air = match &file.air {
@@ -182,15 +244,18 @@ impl MeasuredRoom {
                 return Err(error.in_file(path, "measurement"));
             }
         };
-        let sources = places(path, "sources", &file.sources)?
+        let sources: Vec<Source> = places(path, "sources", &file.sources)?
             .into_iter()
             .map(|Receiver { id, position_m, axis }| Source { id, position_m, axis })
             .collect();
         let receivers = places(path, "receivers", &file.receivers)?;
+        turned::check(path, &scene, up_axis, &sources, &receivers)?;
         Ok(Self {
             file: path.to_owned(),
             scene,
             faces_without_area,
+            up_axis,
+            named_as_in_library,
             priors,
             air,
             air_assumed: file.air.is_none(),
@@ -206,7 +271,7 @@ impl MeasuredRoom {
         file: &RoomFile,
         index: usize,
         table: &ResponseTable,
-        folder: &Path,
+        path: PathBuf,
     ) -> Result<ResponseEntry, Error> {
         let field = |name: &str| format!("responses[{index}].{name}");
         let in_file = |name: &'static str| move |error: Error| error.in_file(&self.file, field(name));
@@ -215,7 +280,6 @@ impl MeasuredRoom {
             let id = table.file.display().to_string();
             return Err(in_file("file")(Error::DuplicateId { id }));
         }
-        let path = folder.join(&table.file);
         let info = probe_wav(&path)?;
         if info.channels != 1 {
             return Err(Error::ManyChannels { path, channels: info.channels });
@@ -333,11 +397,15 @@ impl MeasuredRoom {
     /// Reads the samples of a response, as they stand in its file.
     ///
     /// # Errors
-    /// [`Error::Index`] if there is no such response; else as [`read_audio`].
+    /// [`Error::Index`] if there is no such response; [`Error::InFile`] with the cause [`Error::Silent`],
+    /// [`Error::NoDirectSound`] or [`Error::NotAResponse`] for what is no impulse response; else as [`read_audio`].
     pub fn load_response(&self, index: usize) -> Result<ImpulseResponse, Error> {
         let count = self.responses.len();
         let entry = self.responses.get(index).ok_or(Error::Index { what: "response", index, count })?;
-        Ok(read_audio(&entry.path, Channel::Mono)?.into())
+        let signal = read_audio(&entry.path, Channel::Mono)?;
+        response_check::check(signal.samples(), signal.sample_rate_hz())
+            .map_err(|error| error.in_file(&entry.path, format!("responses[{index}].file")))?;
+        Ok(signal.into())
     }
 
     fn source_index(&self, id: &str) -> Result<usize, Error> {
@@ -356,6 +424,9 @@ fn read_text(path: &Path) -> Result<String, Error> {
 }
 
 fn bands(centres_hz: &[f64]) -> Result<Bands, Error> {
+    if centres_hz.is_empty() {
+        return Err(Error::Empty { what: "the list of centres" });
+    }
     for &centre in centres_hz {
         check_range(
             "centre (Hz)",
@@ -392,6 +463,19 @@ fn materials(
         let sd = column("absorption_sd", &table.absorption_sd, 1e-4, "between 0.0001 and 1")?;
         let scattering = column("scattering", &table.scattering, 0.0, "between 0 and 1")?;
         let uniform = |value| PerBand::uniform(bands, value);
+        let listed = match &table.library {
+            None => None,
+            Some(_) if absorption.is_some() => {
+                return Err(Error::TwoTables.in_file(path, format!("materials.{name}.library")));
+            }
+            Some(entry) => Some(
+                library_material(entry)
+                    .and_then(|surface| surface.material(bands))
+                    .map_err(|error| error.in_file(path, format!("materials.{name}.library")))?,
+            ),
+        };
+        let absorption = absorption.or(listed.as_ref().map(|material| material.absorption().clone()));
+        let scattering = scattering.or(listed.map(|material| material.scattering().clone()));
         let (mean, default_sd) = match &absorption {
             Some(table) => (table.clone(), MaterialPrior::TABLE_SD),
             None => (uniform(MaterialPrior::UNKNOWN_ABSORPTION), MaterialPrior::UNKNOWN_ABSORPTION_SD),
@@ -411,6 +495,9 @@ fn places(path: &Path, kind: &str, tables: &[PlaceTable]) -> Result<Vec<Receiver
     let mut places = Vec::with_capacity(tables.len());
     for (i, table) in tables.iter().enumerate() {
         let in_field = |error: Error, name: &str| error.in_file(path, format!("{kind}[{i}].{name}"));
+        if table.id.trim().is_empty() {
+            return Err(in_field(Error::Empty { what: "the identifier" }, "id"));
+        }
         if !ids.insert(&table.id) {
             return Err(in_field(Error::DuplicateId { id: table.id.clone() }, "id"));
         }

@@ -2,11 +2,15 @@
 
 #[cfg(feature = "gltf")]
 mod gltf;
+mod mesh_options;
 mod obj;
 mod polygon;
 
+pub use mesh_options::{LengthUnit, MeshOptions, UpAxis};
+pub(crate) use polygon::triangulate;
+
 use crate::{Error, Material, NamedMaterial, Scene, Triangle};
-use polygon::triangulate;
+use mesh_options::Placement;
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
@@ -18,6 +22,7 @@ use std::path::{Path, PathBuf};
 /// | `.gltf`, `.glb` (feature `gltf`) | triangle lists, strips and fans of the default scene, nodes applied | of the material; `material_3` where the fourth has none |
 ///
 /// Coordinates are metres, right-handed, z up; glTF is y up by definition and is turned: its (x, y, z) becomes (x, -z, y).
+/// [`MeshOptions`] states other units and another axis, for [`Mesh::read_with`].
 /// Faces that name no material get [`Mesh::DEFAULT_MATERIAL`]. Materials of one name are one material; they stand in the
 /// order in which the faces first use them. Textures, normals, colours, cameras, skins and animations are not looked at.
 ///
@@ -42,24 +47,53 @@ pub struct Mesh {
     material_names: Vec<String>,
     faces_without_area: usize,
     faces_without_material: usize,
+    up_axis: UpAxis,
 }
 
 impl Mesh {
     /// The material of faces that name none: those before the first `usemtl`, and glTF primitives without material.
     pub const DEFAULT_MATERIAL: &str = "default";
 
-    /// Reads a file; its ending (`.obj`, `.gltf`, `.glb`) says what it is.
+    /// Reads a file in metres; its ending (`.obj`, `.gltf`, `.glb`) says what it is.
     ///
     /// # Errors
+    /// As [`Mesh::read_with`].
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
+        Self::read_with(path, &MeshOptions::default())
+    }
+
+    /// Reads a file whose units and axes are stated; its ending (`.obj`, `.gltf`, `.glb`) says what it is.
+    ///
+    /// ```
+    /// use sabine_acoustics::{LengthUnit, Mesh, MeshOptions, UpAxis};
+    /// let folder = tempfile::tempdir()?;
+    /// let path = folder.path().join("sheet.obj");
+    /// std::fs::write(&path, "v 0 0 0\nv 250 0 0\nv 0 300 0\nf 1 2 3\n")?;
+    /// let options = MeshOptions { unit: LengthUnit::Centimetre, up_axis: Some(UpAxis::Y), ..Default::default() };
+    /// let mesh = Mesh::read_with(&path, &options)?;
+    /// assert_eq!(mesh.vertices_m()[1..], [[2.5, 0.0, 0.0], [0.0, 0.0, 3.0]]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::InFile`] with the cause [`Error::OutsideFolder`] for a glTF buffer outside the folder that may be read;
     /// [`Error::Io`]; [`Error::UnknownMeshFormat`] for other endings and, without the feature `gltf`, [`Error::GltfFeature`];
     /// [`Error::InFile`] naming the line or the element, with the cause
     /// [`Error::ObjSyntax`], [`Error::OutOfRange`], [`Error::Length`], [`Error::CrossedPolygon`], [`Error::Index`],
     /// [`Error::MeshTooLarge`], [`Error::BeyondBuffer`], [`Error::BufferUri`], [`Error::UnsupportedMesh`] or
     /// [`Error::NodeTwice`]; [`Error::MeshFormat`] for what is no glTF.
-    pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
+    pub fn read_with(path: impl AsRef<Path>, options: &MeshOptions) -> Result<Self, Error> {
         let path = path.as_ref();
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
-        let mut draft = MeshDraft::new(path);
+        let usual = if ending == "obj" { UpAxis::Z } else { UpAxis::Y };
+        let placement = Placement { unit: options.unit, up_axis: options.up_axis.unwrap_or(usual) };
+        let mut draft = MeshDraft::new(path, placement);
+        #[cfg(feature = "gltf")]
+        let folder = match (&options.folder, options.allow_outside) {
+            (_, true) => None,
+            (Some(folder), false) => Some(folder.as_path()),
+            (None, false) => Some(path.parent().unwrap_or(Path::new(""))),
+        };
         match ending.to_str() {
             Some("obj") => {
                 let bytes = read_bytes(path, u64::MAX)?;
@@ -67,7 +101,9 @@ impl Mesh {
                 obj::parse_obj(path, &String::from_utf8_lossy(&bytes), &mut draft)?;
             }
             #[cfg(feature = "gltf")]
-            Some("gltf" | "glb") => gltf::parse_gltf(path, &read_bytes(path, u64::MAX)?, &mut draft)?,
+            Some("gltf" | "glb") => {
+                gltf::parse_gltf(path, &read_bytes(path, u64::MAX)?, folder, &mut draft)?;
+            }
             #[cfg(not(feature = "gltf"))]
             Some("gltf" | "glb") => return Err(Error::GltfFeature { path: path.to_owned() }),
             _ => return Err(Error::UnknownMeshFormat { path: path.to_owned() }),
@@ -103,6 +139,11 @@ impl Mesh {
     /// Faces that name no material and have [`Mesh::DEFAULT_MATERIAL`] for that reason.
     pub fn faces_without_material(&self) -> usize {
         self.faces_without_material
+    }
+
+    /// The axis of the file that was taken to point up.
+    pub fn up_axis(&self) -> UpAxis {
+        self.up_axis
     }
 
     /// Gives each material what it does to sound.
@@ -151,6 +192,7 @@ fn read_bytes(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
 /// A mesh that is being read.
 struct MeshDraft {
     mesh: Mesh,
+    placement: Placement,
     /// Index of each material that is in use.
     materials: HashMap<String, u32>,
     /// Corners of the face at hand.
@@ -158,7 +200,7 @@ struct MeshDraft {
 }
 
 impl MeshDraft {
-    fn new(path: &Path) -> Self {
+    fn new(path: &Path, placement: Placement) -> Self {
         let mesh = Mesh {
             path: path.to_owned(),
             vertices_m: Vec::new(),
@@ -166,8 +208,15 @@ impl MeshDraft {
             material_names: Vec::new(),
             faces_without_area: 0,
             faces_without_material: 0,
+            up_axis: placement.up_axis,
         };
-        Self { mesh, materials: HashMap::new(), points: Vec::new() }
+        Self { mesh, placement, materials: HashMap::new(), points: Vec::new() }
+    }
+
+    /// Adds a vertex, given in the file's coordinates.
+    fn vertex(&mut self, point: [f64; 3]) -> Result<(), Error> {
+        self.mesh.vertices_m.push(self.placement.apply(point)?);
+        Ok(())
     }
 
     /// Adds a polygon; its corners must be indices of vertices.
@@ -204,7 +253,8 @@ mod tests {
 
     /// A square without name beside one of glass.
     fn squares() -> Mesh {
-        let mut draft = MeshDraft::new(Path::new("two.obj"));
+        let placement = Placement { unit: LengthUnit::Metre, up_axis: UpAxis::Z };
+        let mut draft = MeshDraft::new(Path::new("two.obj"), placement);
         draft.mesh.vertices_m = vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
         draft.face(None, &[0, 1, 2, 3]).unwrap();
         draft.face(Some("glass"), &[3, 2, 1, 0]).unwrap();

@@ -1,5 +1,7 @@
 //! Room-acoustic parameters of traced paths, with the Monte-Carlo error that the rays leave in them.
 
+mod material_errors;
+
 use crate::{Bands, Conditions, EnergyDecayCurve, Error, Estimate, NoReading, PathSet, PerBand, Reading};
 
 /// Step of the decay curve, in seconds.
@@ -26,7 +28,8 @@ const BATCHES: usize = PathSet::BATCHES as usize;
 /// no decay time ([`NoReading::DynamicRange`]: trace longer).
 ///
 /// Standard errors are by the jackknife over the [`PathSet::BATCHES`] independent batches of rays; exact paths have none. They
-/// say how well the rays answer the question, not how well the model describes a room.
+/// say how well the rays answer the question, not how well the model describes a room: what the materials' tables leave open
+/// is told by [`PathParameters::read_material_errors`].
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct PathParameters {
@@ -81,11 +84,7 @@ impl PathParameters {
     pub fn read(paths: &PathSet, conditions: &Conditions) -> Result<Self, Error> {
         let energies = paths.energies_under(conditions)?;
         let bands = conditions.materials[0].bands();
-        let first_m = paths.lengths_m().iter().copied().fold(f32::INFINITY, f32::min);
-        let speed_m_s = conditions.air.speed_of_sound_m_s();
-        let duration_s = (paths.max_length_m() - f64::from(first_m)) / speed_m_s;
-        let times_s: Vec<f64> =
-            paths.lengths_m().iter().map(|&length| f64::from(length - first_m) / speed_m_s).collect();
+        let (times_s, duration_s) = arrival_times(paths, conditions);
         let read: Vec<[Reading; QUANTITIES]> = energies
             .iter()
             .map(|energies| {
@@ -116,6 +115,14 @@ impl PathParameters {
     pub fn bands(&self) -> Bands {
         self.t30_s.bands()
     }
+}
+
+/// When each path arrives after the shortest one, and how long paths were looked for after that (s).
+fn arrival_times(paths: &PathSet, conditions: &Conditions) -> (Vec<f64>, f64) {
+    let first_m = paths.lengths_m().iter().copied().fold(f32::INFINITY, f32::min);
+    let speed_m_s = conditions.air.speed_of_sound_m_s();
+    let times_s = paths.lengths_m().iter().map(|&length| f64::from(length - first_m) / speed_m_s).collect();
+    (times_s, (paths.max_length_m() - f64::from(first_m)) / speed_m_s)
 }
 
 /// What the parameters of one band need to know of energy over time; energies of different rays add up.

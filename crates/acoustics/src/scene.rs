@@ -157,6 +157,14 @@ impl Scene {
         Self::new(self.vertices.clone(), self.triangles.clone(), named)
     }
 
+    /// The lowest and the highest coordinates of the corners of its triangles, in metres.
+    pub fn bounds_m(&self) -> [[f64; 3]; 2] {
+        let used = self.triangles.iter().flat_map(|t| t.vertices.map(|v| self.vertices[v as usize]));
+        used.fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], p| {
+            [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
+        })
+    }
+
     /// Total surface in square metres, each triangle counted once.
     pub fn surface_m2(&self) -> f64 {
         self.material_areas_m2().iter().sum()
@@ -175,9 +183,12 @@ impl Scene {
 
     /// Enclosed volume in cubic metres (divergence theorem); meaningful for a closed mesh whose faces are wound alike.
     pub fn volume_m3(&self) -> f64 {
+        // Seen from its middle: far from the origin the differences of large products would be rounding.
+        let [low, high] = self.bounds_m();
+        let middle = [0, 1, 2].map(|k| 0.5 * (low[k] + high[k]));
         let signed: f64 = (0..self.triangles.len())
             .map(|i| {
-                let [a, b, c] = self.corners_m(i);
+                let [a, b, c] = self.corners_m(i).map(|corner| sub(corner, middle));
                 dot(a, cross(b, c)) / 6.0
             })
             .sum();
@@ -272,6 +283,16 @@ mod tests {
         for (area, expected) in scene.material_areas_m2().iter().zip([21., 21., 30., 30., 70., 70.]) {
             assert!((area - expected).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn a_box_far_from_the_origin_keeps_its_volume() {
+        let m = Material::uniform(Bands::SIMULATION, 0.1, 0.1).unwrap();
+        let scene = Scene::shoebox([10.0, 7.0, 3.0], std::array::from_fn(|_| m.clone())).unwrap();
+        let far = scene.vertices().iter().map(|v| v.map(|c| c + 50_000.0)).collect();
+        let far = Scene::new(far, scene.triangles().to_vec(), scene.materials().to_vec()).unwrap();
+        assert!((far.volume_m3() - 210.0).abs() < 1e-6, "{}", far.volume_m3());
+        assert_eq!(far.bounds_m(), [[50_000.0; 3], [50_010.0, 50_007.0, 50_003.0]]);
     }
 
     #[test]

@@ -34,7 +34,8 @@ fn room(samples: usize) -> NewRoom {
         name: name.into(),
         air: None,
         session: None,
-        samples: ImpulseResponse::new(vec![0.5; samples], 48_000).unwrap(),
+        samples: ImpulseResponse::new((0..samples).map(|i| (-1e-3 * i as f32).exp()).collect(), 48_000)
+            .unwrap(),
     };
     NewRoom {
         priors: vec![MaterialPrior { absorption: None, absorption_sd: PerBand::uniform(Bands::T60, 0.2) }],

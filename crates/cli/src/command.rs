@@ -2,8 +2,8 @@
 
 use crate::channel;
 use crate::commands::{
-    augment, diagnose, eq, estimate, evaluate, fit, listen, live, match_room, measure, mix, replace, trace,
-    train, validate, walk,
+    augment, diagnose, eq, estimate, evaluate, fit, listen, live, match_room, materials, measure, mix,
+    new_room, replace, trace, train, validate, walk,
 };
 use crate::console;
 use crate::failure::Failure;
@@ -62,6 +62,10 @@ enum Job {
     Train(train::Arguments),
     /// Print the estimator's errors on a data set
     Evaluate(evaluate::Arguments),
+    /// Print the tables of the material library with their sources
+    Materials(materials::Arguments),
+    /// Make a room folder from a size or a floor plan and names of the material library
+    NewRoom(new_room::Arguments),
     /// Print a completion script for a shell
     Completions(shell::CompletionArguments),
     /// Write manual pages
@@ -151,6 +155,8 @@ impl Job {
             Self::Augment(arguments) => augment::run(arguments),
             Self::Train(arguments) => train::run(arguments),
             Self::Evaluate(arguments) => evaluate::run(arguments),
+            Self::Materials(arguments) => materials::run(arguments),
+            Self::NewRoom(arguments) => new_room::run(arguments),
             Self::Completions(arguments) => shell::completions(arguments),
             Self::Man(arguments) => shell::manual(arguments),
         }

@@ -3,8 +3,8 @@
 use crate::demo::Demo;
 use crate::failure::Failure;
 use clap::Args;
-use sabine::acoustics::MeasuredRoom;
-use std::path::PathBuf;
+use sabine::acoustics::{MeasuredRoom, ReadOptions};
+use std::path::{Path, PathBuf};
 
 /// Options of every command that reads a room.
 #[derive(Args, Debug, Default)]
@@ -12,15 +12,31 @@ pub struct RoomArguments {
     /// Folder with room.toml and its mesh [default: the built-in demo]
     #[arg(long = "room", value_name = "DIR")]
     pub folder: Option<PathBuf>,
+    /// Read a mesh or responses outside the room's folder, too: only for rooms that you trust
+    #[arg(long)]
+    pub allow_outside: bool,
 }
 
 impl RoomArguments {
-    /// The room, and its name as the user should read it.
+    /// The room, and its name as the user should read it. Its size and what should be known of it are printed.
     ///
     /// # Errors
     /// The room cannot be read: the error names file and field.
     pub fn read(&self, demo: &mut Demo) -> Result<(MeasuredRoom, String), Failure> {
         let folder = demo.or(self.folder.as_deref(), "room")?;
-        Ok((MeasuredRoom::read(&folder)?, demo.name(&folder)))
+        Ok((read_room(&folder, self.allow_outside)?, demo.name(&folder)))
     }
+}
+
+/// Reads a room, and prints its size and what should be known of it before numbers are believed.
+///
+/// # Errors
+/// The room cannot be read: the error names file and field.
+pub fn read_room(folder: &Path, allow_outside: bool) -> Result<MeasuredRoom, Failure> {
+    let room = MeasuredRoom::read_with(folder, &ReadOptions { allow_outside })?;
+    println!("{}", room.size_line());
+    for note in room.notes() {
+        println!("note: {note}");
+    }
+    Ok(room)
 }

@@ -1,5 +1,6 @@
 //! `room.toml`, field by field as it stands in the file.
 
+use crate::{LengthUnit, UpAxis};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -27,6 +28,10 @@ pub(super) struct RoomFile {
 #[serde(deny_unknown_fields)]
 pub(super) struct RoomTable {
     pub mesh: PathBuf,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub units: Option<LengthUnit>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub up_axis: Option<UpAxis>,
 }
 
 #[derive(Deserialize, Serialize)]
@@ -50,9 +55,11 @@ pub(super) struct BandsTable {
     pub centres_hz: Vec<f64>,
 }
 
-#[derive(Default, Deserialize, Serialize)]
+#[derive(Clone, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct MaterialTable {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub library: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub absorption: Option<Vec<f64>>,
     #[serde(skip_serializing_if = "Option::is_none")]

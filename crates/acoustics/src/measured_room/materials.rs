@@ -173,8 +173,8 @@ impl Materials {
     }
 
     fn parse(text: &str, path: &Path) -> Result<Self, Error> {
-        let MaterialsFile { bands, materials } = toml::from_str(text)
-            .map_err(|source| Error::Toml { path: path.to_owned(), source: Box::new(source) })?;
+        let MaterialsFile { bands, materials } =
+            toml::from_str(text).map_err(|source| Error::toml(path, text, source))?;
         let bands = super::bands(&bands.centres_hz).map_err(|e| e.in_file(path, "bands.centres_hz"))?;
         let mut order: Vec<(usize, String)> =
             materials.keys().map(|name| (name.span().start, name.get_ref().clone())).collect();
@@ -236,7 +236,10 @@ impl MeasuredRoom {
         }
         let surfaces = tables.tables.iter().map(MaterialTable::material).collect::<Result<_, _>>()?;
         let scene = self.scene().with_materials(surfaces)?;
-        Ok(Self { scene, priors: tables.tables.iter().map(MaterialTable::prior).collect(), ..self.clone() })
+        let priors = tables.tables.iter().map(MaterialTable::prior).collect();
+        let mut named_as_in_library = self.named_as_in_library.clone();
+        named_as_in_library.retain(|name| materials.get(name).is_none());
+        Ok(Self { scene, priors, named_as_in_library, ..self.clone() })
     }
 
     /// The same with the tables of a file.
@@ -280,6 +283,7 @@ impl From<&MaterialTable> for FileTable {
             values.values().iter().map(|v| (v * DECIMALS).round() / DECIMALS).collect()
         };
         Self {
+            library: None,
             absorption: table.absorption.as_ref().map(rounded),
             absorption_sd: Some(rounded(&table.absorption_sd)),
             scattering: Some(rounded(&table.scattering)),

@@ -91,67 +91,19 @@ impl NewRoom {
             let (expected, found) = (self.scene.materials().len(), self.priors.len());
             return Err(Error::MaterialCount { expected, found });
         }
-        let draft =
-            create_folder_beside(folder).map_err(|source| Error::Io { path: folder.to_owned(), source })?;
-        let written = self.fill(&draft).and_then(|()| {
-            std::fs::rename(&draft, folder).map_err(|source| Error::Io { path: folder.to_owned(), source })
-        });
-        if let Err(error) = written {
-            // The error that counts is the first.
-            let _ = std::fs::remove_dir_all(&draft);
-            return Err(error);
-        }
-        MeasuredRoom::read(folder)
-    }
-
-    fn fill(&self, draft: &Path) -> Result<(), Error> {
-        let ir = draft.join("ir");
-        std::fs::create_dir(&ir).map_err(|source| Error::Io { path: ir.clone(), source })?;
-        for response in &self.responses {
-            let path = ir.join(format!("{}.wav", response.name));
-            let (samples, rate) = (response.samples.samples(), response.samples.sample_rate_hz());
-            write_wav(&path, samples, rate, SampleFormat::Float32)?;
-        }
-        // Atomic within the draft for the sake of the disk: it is told of each file before the folder gets its name.
-        write_atomically(&draft.join("room.obj"), |file| file.write_all(self.obj().as_bytes()))?;
-        let path = draft.join("room.toml");
-        let text =
-            toml::to_string(&self.tables()).map_err(|error| Error::implementation("room.toml", error))?;
-        write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
-        // What cannot be read back is refused before the folder gets its name.
-        MeasuredRoom::read(draft).map(|_| ())
-    }
-
-    fn obj(&self) -> String {
-        let mut text = String::from("# metres, z up\n");
-        for [x, y, z] in self.scene.vertices() {
-            // Writing to a String cannot fail.
-            let _ = writeln!(text, "v {x} {y} {z}");
-        }
-        for (index, named) in self.scene.materials().iter().enumerate() {
-            let _ = writeln!(text, "usemtl {}", named.name);
-            for triangle in self.scene.triangles().iter().filter(|t| t.material as usize == index) {
-                let [a, b, c] = triangle.vertices.map(|v| v + 1);
-                let _ = writeln!(text, "f {a} {b} {c}");
-            }
-        }
-        text
+        write_folder(folder, &self.tables(), &obj(&self.scene), &self.responses)
     }
 
     fn tables(&self) -> RoomFile {
         let material = |(named, prior): (&crate::NamedMaterial, &MaterialPrior)| {
             let values = |column: &crate::PerBand<f64>| Some(column.values().to_vec());
             let table = MaterialTable {
+                library: None,
                 absorption: prior.absorption.as_ref().and_then(values),
                 absorption_sd: values(&prior.absorption_sd),
                 scattering: values(named.material.scattering()),
             };
             (named.name.clone(), table)
-        };
-        let place = |id: &String, position: [f64; 3], axis: Option<[f64; 3]>| PlaceTable {
-            id: id.clone(),
-            position_m: position.to_vec(),
-            orientation: axis.map(|a| a.to_vec()),
         };
         let response = |response: &NewResponse| ResponseTable {
             source: response.source.clone(),
@@ -162,7 +114,7 @@ impl NewRoom {
             session: response.session.clone(),
         };
         RoomFile {
-            room: RoomTable { mesh: "room.obj".into() },
+            room: RoomTable { mesh: "room.obj".into(), units: None, up_axis: None },
             air: self.air.map(|air| AirTable {
                 temperature_c: air.temperature_c(),
                 relative_humidity_percent: air.relative_humidity_percent(),
@@ -179,4 +131,65 @@ impl NewRoom {
             responses: self.responses.iter().map(response).collect(),
         }
     }
+}
+
+/// Writes a room as a new folder, and reads it back.
+pub(super) fn write_folder(
+    folder: &Path,
+    file: &RoomFile,
+    obj: &str,
+    responses: &[NewResponse],
+) -> Result<MeasuredRoom, Error> {
+    let draft =
+        create_folder_beside(folder).map_err(|source| Error::Io { path: folder.to_owned(), source })?;
+    let written = fill(&draft, file, obj, responses).and_then(|()| {
+        std::fs::rename(&draft, folder).map_err(|source| Error::Io { path: folder.to_owned(), source })
+    });
+    if let Err(error) = written {
+        // The error that counts is the first.
+        let _ = std::fs::remove_dir_all(&draft);
+        return Err(error);
+    }
+    MeasuredRoom::read(folder)
+}
+
+fn fill(draft: &Path, file: &RoomFile, obj: &str, responses: &[NewResponse]) -> Result<(), Error> {
+    let ir = draft.join("ir");
+    if !responses.is_empty() {
+        std::fs::create_dir(&ir).map_err(|source| Error::Io { path: ir.clone(), source })?;
+    }
+    for response in responses {
+        let path = ir.join(format!("{}.wav", response.name));
+        let (samples, rate) = (response.samples.samples(), response.samples.sample_rate_hz());
+        write_wav(&path, samples, rate, SampleFormat::Float32)?;
+    }
+    // Atomic within the draft for the sake of the disk: it is told of each file before the folder gets its name.
+    write_atomically(&draft.join("room.obj"), |file| file.write_all(obj.as_bytes()))?;
+    let path = draft.join("room.toml");
+    let text = toml::to_string(file).map_err(|error| Error::implementation("room.toml", error))?;
+    write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
+    // What cannot be read back is refused before the folder gets its name.
+    MeasuredRoom::read(draft).map(|_| ())
+}
+
+/// The mesh as text.
+pub(super) fn obj(scene: &Scene) -> String {
+    let mut text = String::from("# metres, z up\n");
+    for [x, y, z] in scene.vertices() {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "v {x} {y} {z}");
+    }
+    for (index, named) in scene.materials().iter().enumerate() {
+        let _ = writeln!(text, "usemtl {}", named.name);
+        for triangle in scene.triangles().iter().filter(|t| t.material as usize == index) {
+            let [a, b, c] = triangle.vertices.map(|v| v + 1);
+            let _ = writeln!(text, "f {a} {b} {c}");
+        }
+    }
+    text
+}
+
+/// A source or receiver as the file has it.
+pub(super) fn place(id: &str, position_m: [f64; 3], axis: Option<[f64; 3]>) -> PlaceTable {
+    PlaceTable { id: id.to_owned(), position_m: position_m.to_vec(), orientation: axis.map(|a| a.to_vec()) }
 }

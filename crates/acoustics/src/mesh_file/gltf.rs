@@ -28,11 +28,17 @@ const LOOKS: [&str; 6] =
 /// Columns of an affine transformation: three axes and the origin.
 type Affine = [[f64; 3]; 4];
 
-/// (x, y, z) with y up becomes (x, -z, y) with z up.
-const UPRIGHT: Affine = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [0.0; 3]];
+/// As the file has it: the draft turns what comes out.
+const IDENTITY: Affine = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0; 3]];
 
-/// Reads a glTF or GLB file; `path` is for the errors and for the buffers beside it.
-pub(super) fn parse_gltf(path: &Path, bytes: &[u8], draft: &mut MeshDraft) -> Result<(), Error> {
+/// Reads a glTF or GLB file; `path` is for the errors and for the buffers beside it, which must lie below `folder`, if one
+/// is named.
+pub(super) fn parse_gltf(
+    path: &Path,
+    bytes: &[u8],
+    folder: Option<&Path>,
+    draft: &mut MeshDraft,
+) -> Result<(), Error> {
     let format = |source: Box<dyn std::error::Error + Send + Sync>| Error::MeshFormat {
         path: path.to_owned(),
         source,
@@ -61,7 +67,7 @@ pub(super) fn parse_gltf(path: &Path, bytes: &[u8], draft: &mut MeshDraft) -> Re
         let error = Error::UnsupportedMesh { found: name.clone(), expected };
         return Err(error.in_file(path, "extensionsRequired"));
     }
-    let buffers = Buffers::load(path, &root, blob)?;
+    let buffers = Buffers::load(path, &root, blob, folder)?;
     Reader { path, root: &root, buffers, draft, vertices: 0, triangles: 0 }.scene()
 }
 
@@ -83,7 +89,7 @@ impl Reader<'_> {
         let scene = item("scene", &root.scenes, index).map_err(|e| e.in_file(self.path, "scene"))?;
         let mut seen = vec![false; root.nodes.len()];
         let mut waiting: Vec<(usize, Affine)> =
-            scene.nodes.iter().rev().map(|node| (node.value(), UPRIGHT)).collect();
+            scene.nodes.iter().rev().map(|node| (node.value(), IDENTITY)).collect();
         while let Some((index, parent)) = waiting.pop() {
             let field = || format!("nodes[{index}]");
             let node =
@@ -146,11 +152,7 @@ impl Reader<'_> {
                 self.vertices = within("vertices", self.vertices, vertices, MOST_VERTICES)?;
                 let base = self.draft.mesh.vertices_m.len() as u32;
                 for point in self.buffers.positions(self.root, positions)? {
-                    let at = applied(placed, point.map(f64::from));
-                    for c in at {
-                        check_range("vertex coordinate (m)", c, -1e5, 1e5, "finite and within 100 km")?;
-                    }
-                    self.draft.mesh.vertices_m.push(at);
+                    self.draft.vertex(applied(placed, point.map(f64::from)))?;
                 }
                 bases.insert(positions, base);
                 base

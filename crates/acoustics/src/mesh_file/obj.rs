@@ -49,7 +49,7 @@ pub(super) fn parse_obj(path: &Path, text: &str, draft: &mut MeshDraft) -> Resul
         }
         let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((&line, ""));
         let result = match keyword {
-            "v" => vertex(rest).map(|v| draft.mesh.vertices_m.push(v)),
+            "v" => vertex(rest).and_then(|point| draft.vertex(point)),
             "f" => {
                 corners.clear();
                 face(rest, draft.mesh.vertices_m.len(), &mut corners)
@@ -79,9 +79,7 @@ fn vertex(rest: &str) -> Result<[f64; 3], Error> {
     let mut words = rest.split_whitespace();
     let mut next = || {
         let word = words.next().unwrap_or_default();
-        let value = word.parse::<f64>().map_err(|_| syntax(word, "a coordinate in metres"))?;
-        crate::error::check_range("vertex coordinate (m)", value, -1e5, 1e5, "finite and within 100 km")?;
-        Ok(value)
+        word.parse::<f64>().map_err(|_| syntax(word, "a coordinate"))
     };
     Ok([next()?, next()?, next()?])
 }
@@ -120,12 +118,14 @@ fn syntax(text: &str, expected: &'static str) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Mesh;
+    use crate::mesh_file::mesh_options::Placement;
+    use crate::{LengthUnit, Mesh, UpAxis};
     use proptest::prelude::*;
 
     fn parse(text: &str) -> Result<Mesh, Error> {
         let path = Path::new("room.obj");
-        let mut draft = MeshDraft::new(path);
+        let placement = Placement { unit: LengthUnit::Metre, up_axis: UpAxis::Z };
+        let mut draft = MeshDraft::new(path, placement);
         parse_obj(path, text, &mut draft).map(|()| draft.mesh)
     }
 

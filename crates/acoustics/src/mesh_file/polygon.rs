@@ -9,7 +9,7 @@ use crate::Error;
 ///
 /// # Errors
 /// [`Error::CrossedPolygon`] if the outline crosses itself.
-pub(super) fn triangulate(points: &[[f64; 3]]) -> Result<Vec<[usize; 3]>, Error> {
+pub(crate) fn triangulate(points: &[[f64; 3]]) -> Result<Vec<[usize; 3]>, Error> {
     let normal = newell_normal(points);
     let extent = extent(points);
     // Relative to the polygon's own size, so that neither a doll's house nor a cathedral is special.

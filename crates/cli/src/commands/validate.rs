@@ -4,6 +4,7 @@
 
 use crate::bar::Bar;
 use crate::failure::Failure;
+use crate::room::read_room;
 use clap::Args;
 use sabine::acoustics::{
     Bands, Conditions, Estimate, Material, MeasuredRoom, PathParameters, PathSet, PerBand, Propagator,
@@ -19,6 +20,9 @@ pub struct Arguments {
     /// Folder with room.toml and its mesh
     #[arg(long, value_name = "DIR")]
     room: PathBuf,
+    /// Read a mesh or responses outside the room's folder, too: only for rooms that you trust
+    #[arg(long)]
+    allow_outside: bool,
     /// Measured room means by third octave: columns frequency_hz, T20, EDT, C80, D50 (percent) [default: measured_parameters.csv of the room]
     #[arg(long, value_name = "F.csv")]
     measured: Option<PathBuf>,
@@ -67,7 +71,7 @@ const QUANTITIES: [Quantity; 4] = [
 /// # Errors
 /// Whatever stands in the way, in words for the user.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let room = MeasuredRoom::read(&arguments.room)?;
+    let room = read_room(&arguments.room, arguments.allow_outside)?;
     let file = arguments.measured.clone().unwrap_or_else(|| arguments.room.join("measured_parameters.csv"));
     let measured = third_octaves(&file)?;
     let bands = room.bands();

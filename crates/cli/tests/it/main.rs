@@ -9,6 +9,7 @@ mod listen;
 mod live;
 mod match_room;
 mod replace;
+mod rooms;
 mod trace;
 
 use std::process::Command;

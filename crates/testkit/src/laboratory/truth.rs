@@ -103,8 +103,7 @@ impl Truth {
         let path = path.as_ref();
         let text =
             std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
-        toml::from_str(&text)
-            .map_err(|source| Error::Toml { path: path.to_owned(), source: Box::new(source) })
+        toml::from_str(&text).map_err(|source| Error::toml(path, &text, source))
     }
 
     pub(crate) fn write(&self, path: &Path) -> Result<(), Error> {

@@ -2,6 +2,7 @@
 
 use super::item;
 use crate::Error;
+use crate::inside_folder::check_inside;
 use crate::mesh_file::read_bytes;
 use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
@@ -20,8 +21,14 @@ const MOST_ABSENT: u64 = 1_000_000;
 pub(super) struct Buffers<'a>(Vec<Cow<'a, [u8]>>);
 
 impl<'a> Buffers<'a> {
-    /// Takes buffers from the file (`blob`: the binary part of a GLB), from its text or from files beside it.
-    pub fn load(path: &Path, root: &Root, blob: Option<&'a [u8]>) -> Result<Self, Error> {
+    /// Takes buffers from the file (`blob`: the binary part of a GLB), from its text or from files beside it, which must lie
+    /// below `folder`, if one is named.
+    pub fn load(
+        path: &Path,
+        root: &Root,
+        blob: Option<&'a [u8]>,
+        folder: Option<&Path>,
+    ) -> Result<Self, Error> {
         let mut total = 0u64;
         let mut buffers = Vec::with_capacity(root.buffers.len());
         for (i, buffer) in root.buffers.iter().enumerate() {
@@ -30,7 +37,7 @@ impl<'a> Buffers<'a> {
                 .map_err(|e| e.in_file(path, field()))?;
             let bytes = match (&buffer.uri, blob) {
                 (None, Some(blob)) if i == 0 => Cow::Borrowed(blob),
-                _ => Cow::Owned(fetch(path, buffer).map_err(|e| e.in_file(path, field()))?),
+                _ => Cow::Owned(fetch(path, buffer, folder).map_err(|e| e.in_file(path, field()))?),
             };
             let (needed_bytes, found_bytes) = (buffer.byte_length.0, bytes.len() as u64);
             if found_bytes < needed_bytes {
@@ -169,7 +176,7 @@ fn unsupported(accessor: usize, expected: &'static str) -> Error {
 }
 
 /// The bytes of a buffer that is written out in the text or lies in a file beside it.
-fn fetch(path: &Path, buffer: &Buffer) -> Result<Vec<u8>, Error> {
+fn fetch(path: &Path, buffer: &Buffer, folder: Option<&Path>) -> Result<Vec<u8>, Error> {
     let uri = buffer.uri.as_deref().unwrap_or_default();
     let wrong = || Error::BufferUri { uri: uri.chars().take(60).collect() };
     if let Some(data) = uri.strip_prefix("data:") {
@@ -183,5 +190,9 @@ fn fetch(path: &Path, buffer: &Buffer) -> Result<Vec<u8>, Error> {
     if name.is_empty() || name.contains(':') || Path::new(name.as_ref()).is_absolute() {
         return Err(wrong());
     }
-    read_bytes(&path.with_file_name(name.as_ref()), buffer.byte_length.0)
+    let file = path.with_file_name(name.as_ref());
+    if let Some(folder) = folder {
+        check_inside(folder, &file)?;
+    }
+    read_bytes(&file, buffer.byte_length.0)
 }

@@ -14,7 +14,8 @@ use crate::room::RoomArguments;
 use clap::{Args, ValueEnum};
 use sabine::acoustics::{
     Conditions, DiffuseRoom, Directivity, MeasuredRoom, NoReading, Orientation, PathParameters, PathSet,
-    PerBand, Propagator, Reading, Receiver, SampleFormat, Signal, Source, encode_wav, write_atomically,
+    PerBand, Propagator, Reading, Receiver, RoomNote, SampleFormat, Signal, Source, encode_wav,
+    write_atomically,
 };
 use sabine::diagnose::ExtendedModel;
 use sabine::propagate::{
@@ -161,15 +162,27 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let directional = ambisonic.render(&paths, &conditions, facing)?;
     let render_s = render_s + start.elapsed().as_secs_f64();
 
+    let absorption_sd: Vec<PerBand<f64>> =
+        room.priors().iter().map(|prior| prior.absorption_sd.clone()).collect();
+    let by_materials = PathParameters::read_material_errors(&paths, &conditions, &absorption_sd)?;
+
     for warning in MeshReport::inspect(room.scene(), source.position_m)?.warnings() {
         println!("note: {warning}");
     }
-    print!("{}", table(&parameters));
+    print!("{}", table(&parameters, &by_materials));
+    if let Some(line) = headline(&parameters, &by_materials) {
+        println!("{line}");
+    }
     println!("{} paths; traced in {trace_s:.2} s, rendered in {render_s:.2} s", paths.len());
     if let Some(waves) = &waves {
         println!("{}", waves.line());
     }
-    let mut result = as_json(&parameters);
+    let mut result = as_json(&parameters, &by_materials);
+    let [low, high] = room.scene().bounds_m();
+    result["size_m"] = json!([0, 1, 2].map(|k| high[k] - low[k]));
+    result["volume_m3"] = json!(room.scene().volume_m3());
+    result["surface_m2"] = json!(room.scene().surface_m2());
+    result["guessed_materials"] = guessed(&room);
     result["waves"] = json!(waves.as_ref().map(Waves::as_json));
     result["room"] = json!(room_name);
     result["model"] = json!(model.map(|path| path.display().to_string()));
@@ -268,8 +281,9 @@ fn quantities(parameters: &PathParameters) -> [(&'static str, &'static str, &Per
     ]
 }
 
-/// A table for the terminal, each value with its standard error; a dash stands for what cannot be read.
-fn table(parameters: &PathParameters) -> String {
+/// A table for the terminal: each value with the standard error of the rays, below it what the materials leave open; a dash
+/// stands for what cannot be read.
+fn table(parameters: &PathParameters, by_materials: &PathParameters) -> String {
     let mut text = format!("{:<14}", "");
     for hz in parameters.bands().iter_hz() {
         let label = if hz < 1000.0 { format!("{hz}") } else { format!("{}k", hz / 1000.0) };
@@ -277,7 +291,8 @@ fn table(parameters: &PathParameters) -> String {
     }
     text.push('\n');
     let mut reasons = Vec::new();
-    for (name, unit, per_band) in quantities(parameters) {
+    let materials = quantities(by_materials);
+    for ((name, unit, per_band), (_, _, open)) in quantities(parameters).into_iter().zip(materials) {
         let _ = write!(text, "{:<14}", format!("{name}{unit}"));
         for (hz, reading) in per_band.iter() {
             let cell = match reading {
@@ -289,21 +304,53 @@ fn table(parameters: &PathParameters) -> String {
             };
             let _ = write!(text, "{cell:>17}");
         }
+        let _ = write!(text, "\n{:<14}", "  materials");
+        for reading in open.values() {
+            let cell = reading.as_ref().map_or("-".to_owned(), |e| format!("± {:.3}", e.standard_error));
+            let _ = write!(text, "{cell:>17}");
+        }
         text.push('\n');
     }
     text.extend(reasons);
     text
 }
 
-fn as_json(parameters: &PathParameters) -> Value {
+/// The reverberation time at 1 kHz, or in the band next to it, with both of its uncertainties.
+fn headline(parameters: &PathParameters, by_materials: &PathParameters) -> Option<String> {
+    let bands = parameters.bands();
+    let near = |hz: &f64| (hz / 1000.0).ln().abs();
+    let (band, hz) = bands.iter_hz().enumerate().min_by(|a, b| near(&a.1).total_cmp(&near(&b.1)))?;
+    let (rays, materials) = (&parameters.t30_s.values()[band], &by_materials.t30_s.values()[band]);
+    let (rays, materials) = (rays.as_ref().ok()?, materials.as_ref().ok());
+    let open = materials.map_or("unknown".to_owned(), |e| format!("{:.3}", e.standard_error));
+    Some(format!(
+        "T30 at {hz} Hz: {:.3} s ± {:.3} (rays) ± {open} (materials)",
+        rays.value, rays.standard_error
+    ))
+}
+
+/// The materials without a table.
+fn guessed(room: &MeasuredRoom) -> Value {
+    let entry = |note: RoomNote| match note {
+        RoomNote::GuessedAbsorption { material, area_m2, share: (low, high) } => {
+            json!({ "material": material, "area_m2": area_m2, "share_of_absorption": [low, high] })
+        }
+        other => json!(other.to_string()),
+    };
+    room.guessed().into_iter().map(entry).collect()
+}
+
+fn as_json(parameters: &PathParameters, by_materials: &PathParameters) -> Value {
     let mut result = json!({ "bands_hz": parameters.bands().iter_hz().collect::<Vec<_>>() });
     let mut reasons = vec![serde_json::Map::new(); parameters.bands().len()];
-    for (name, unit, per_band) in quantities(parameters) {
-        let pick = |value: fn(&sabine::acoustics::Estimate) -> f64| -> Value {
-            per_band.values().iter().map(|r| r.as_ref().map_or(Value::Null, |e| json!(value(e)))).collect()
+    let materials = quantities(by_materials);
+    for ((name, unit, per_band), (_, _, open)) in quantities(parameters).into_iter().zip(materials) {
+        let pick = |readings: &PerBand<Reading>, value: fn(&sabine::acoustics::Estimate) -> f64| -> Value {
+            readings.values().iter().map(|r| r.as_ref().map_or(Value::Null, |e| json!(value(e)))).collect()
         };
-        result[format!("{name}{unit}")] = pick(|e| e.value);
-        result[format!("{name}_sd{unit}")] = pick(|e| e.standard_error);
+        result[format!("{name}{unit}")] = pick(per_band, |e| e.value);
+        result[format!("{name}_sd{unit}")] = pick(per_band, |e| e.standard_error);
+        result[format!("{name}_materials_sd{unit}")] = pick(open, |e| e.standard_error);
         for (reasons, reading) in reasons.iter_mut().zip(per_band.values()) {
             if let Err(reason) = reading {
                 reasons.insert(format!("{name}{unit}"), json!(reason.to_string()));

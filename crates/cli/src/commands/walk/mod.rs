@@ -1,12 +1,16 @@
 //! A walk from room to room while somebody talks: paths and responses anew many times a second, the sound block by block.
 
+mod route;
+
 use crate::bar::Bar;
 use crate::demo::Demo;
 use crate::failure::Failure;
+use crate::room::read_room;
 use clap::{Args, ValueEnum};
+use route::{Walk, read_corners};
 use sabine::acoustics::{
-    Air, Bands, Channel, Conditions, Material, MeasuredRoom, NamedMaterial, Orientation, PerBand, Receiver,
-    SampleFormat, Scene, Source, Triangle, read_audio, resample, write_wav_channels,
+    Air, Bands, Channel, Conditions, Material, NamedMaterial, Orientation, PerBand, Receiver, SampleFormat,
+    Scene, Source, Triangle, read_audio, resample, write_wav_channels,
 };
 use sabine::eqfilter::{PartitionedConfig, PartitionedConvolver, ResponsePreparer};
 use sabine::propagate::{
@@ -14,11 +18,14 @@ use sabine::propagate::{
     TracerConfig,
 };
 use std::collections::BTreeMap;
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Blocks that the convolver may take to start a cross-fade.
 const BLOCKS_BEFORE_FADE: usize = 32;
+/// Walls in the way that are listed.
+const LISTED: usize = 3;
 
 /// Render a walk through two rooms joined by a doorway, or through a room of your own.
 #[derive(Args)]
@@ -26,6 +33,12 @@ pub struct Arguments {
     /// Room folder instead of the two rooms; its first source talks, the walk goes from receiver to receiver
     #[arg(long, value_name = "DIR")]
     room: Option<PathBuf>,
+    /// Read a mesh outside the room's folder, too: only for rooms that you trust
+    #[arg(long)]
+    allow_outside: bool,
+    /// Walk on where a wall or furniture is in the way
+    #[arg(long)]
+    through_walls: bool,
     /// Corners of the walk, a line each: x y z in metres
     #[arg(long, value_name = "FILE")]
     path: Option<PathBuf>,
@@ -77,17 +90,31 @@ enum Mode {
 /// Whatever stands in the way, in words for the user.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (scene, air, source, mut corners) = match &arguments.room {
-        Some(folder) => furnished(folder)?,
+        Some(folder) => furnished(folder, arguments.allow_outside)?,
         None => two_rooms()?,
     };
     if let Some(path) = &arguments.path {
         corners = read_corners(path)?;
     }
     let walk = Walk::new(corners, arguments.speed)?;
+    let walls = walk.walls_in_the_way(&scene)?;
+    if let Some(wall) = walls.first().filter(|_| !arguments.through_walls) {
+        return Err(
+            format!("{wall}; walk around it (corners by --path), or go on with --through-walls").into()
+        );
+    }
+    for wall in walls.iter().take(LISTED) {
+        println!("note: {wall}");
+    }
+    if walls.len() > LISTED {
+        println!("note: so do {} legs more", walls.len() - LISTED);
+    }
     let mut demo = Demo::default();
     let speech = demo.or(arguments.speech.as_deref(), "speech/dry_reader.wav")?;
     let speech = resample(&read_audio(speech, Channel::Index(0))?, arguments.rate)?;
     let renderer = Renderer::new(arguments)?;
+    walk.check_size(arguments.rate, renderer.channels(arguments))?;
+    println!("{}", walk.line());
     let materials: Vec<Material> = scene.materials().iter().map(|named| named.material.clone()).collect();
     let tracer = TracerConfig {
         rays: arguments.rays,
@@ -127,6 +154,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         .collect::<Result<Vec<_>, Failure>>()?;
     let bar = Bar::new();
     let whole = Instant::now();
+    // Where no bar is drawn, lines say how far it is.
+    let terminal = std::io::stderr().is_terminal();
     let mut input = speech.samples().iter().copied().cycle();
     let mut samples = vec![0.0; block];
     for index in 0..blocks {
@@ -137,6 +166,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
                 channel.exchange(&response)?;
             }
             sabine::acoustics::report(&bar, "walking", index as u64, blocks as u64)?;
+            if !terminal && (10 * index / blocks) > (10 * (index - update_blocks) / blocks) {
+                let left_s = whole.elapsed().as_secs_f64() * (blocks as f64 / index as f64 - 1.0);
+                eprintln!("walked {} %, about {left_s:.0} s left", 100 * index / blocks);
+            }
         }
         samples.iter_mut().for_each(|s| *s = input.next().unwrap_or(0.0));
         for channel in &mut channels {
@@ -235,6 +268,14 @@ impl Renderer {
         })
     }
 
+    fn channels(&self, arguments: &Arguments) -> usize {
+        match self {
+            Self::Mono(_) => 1,
+            Self::Ambisonic(_) => (arguments.order + 1) * (arguments.order + 1),
+            Self::Binaural(..) => 2,
+        }
+    }
+
     fn longest_response(&self, arguments: &Arguments) -> usize {
         let taps = if let Self::Binaural(_, head) = self { head.pair(0)[0].len() } else { 1 };
         (arguments.duration * f64::from(arguments.rate)).ceil() as usize + taps
@@ -257,75 +298,10 @@ impl Renderer {
     }
 }
 
-/// A polygon walked at an even speed, face forward.
-struct Walk {
-    corners_m: Vec<[f64; 3]>,
-    speed_m_s: f64,
-}
-
-impl Walk {
-    fn new(corners_m: Vec<[f64; 3]>, speed_m_s: f64) -> Result<Self, Failure> {
-        if !(0.01..=20.0).contains(&speed_m_s) {
-            return Err(format!("--speed is {speed_m_s}; it must be between 0.01 and 20 m/s").into());
-        }
-        let mut walk = Self { corners_m, speed_m_s };
-        walk.corners_m.dedup();
-        if walk.corners_m.len() < 2 {
-            return Err("the walk needs two different corners at least".into());
-        }
-        Ok(walk)
-    }
-
-    fn duration_s(&self) -> f64 {
-        self.corners_m.windows(2).map(|leg| distance_m(leg[0], leg[1])).sum::<f64>() / self.speed_m_s
-    }
-
-    /// The leg of a time, and the share of it that is done.
-    fn leg(&self, time_s: f64) -> ([f64; 3], [f64; 3], f64) {
-        let mut left_m = time_s * self.speed_m_s;
-        let last = self.corners_m.len() - 2;
-        for (i, leg) in self.corners_m.windows(2).enumerate() {
-            let length_m = distance_m(leg[0], leg[1]);
-            if left_m <= length_m || i == last {
-                return (leg[0], leg[1], (left_m / length_m).min(1.0));
-            }
-            left_m -= length_m;
-        }
-        (self.corners_m[last], self.corners_m[last + 1], 1.0)
-    }
-
-    fn place_m(&self, time_s: f64) -> [f64; 3] {
-        let (from, to, share) = self.leg(time_s);
-        std::array::from_fn(|i| from[i] + share * (to[i] - from[i]))
-    }
-
-    fn facing(&self, time_s: f64) -> Result<Orientation, Failure> {
-        let (from, to, _) = self.leg(time_s);
-        Ok(Orientation::towards(std::array::from_fn(|i| to[i] - from[i]))?)
-    }
-}
-
-fn distance_m(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
-}
-
-fn read_corners(path: &Path) -> Result<Vec<[f64; 3]>, Failure> {
-    let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
-    text.lines()
-        .enumerate()
-        .filter(|(_, line)| !line.trim().is_empty())
-        .map(|(number, line)| {
-            let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
-            let wrong = || format!("{}: line {}: `{line}` is not x y z", path.display(), number + 1).into();
-            <[f64; 3]>::try_from(numbers).map_err(|_| wrong())
-        })
-        .collect()
-}
-
 type Setting = (Scene, Air, Source, Vec<[f64; 3]>);
 
-fn furnished(folder: &Path) -> Result<Setting, Failure> {
-    let room = MeasuredRoom::read(folder)?;
+fn furnished(folder: &Path, allow_outside: bool) -> Result<Setting, Failure> {
+    let room = read_room(folder, allow_outside)?;
     let source = room.sources().first().ok_or("the room has no source")?.clone();
     let corners = room.receivers().iter().map(|receiver| receiver.position_m).collect();
     Ok((room.scene().clone(), room.air(), source, corners))

@@ -1,0 +1,105 @@
+//! Whether a file that is said to hold an impulse response does.
+
+use crate::{Error, NoReading, Onset};
+
+/// Blocks in which the level is followed, in seconds: longer than the gaps between single reflections.
+const BLOCK_S: f64 = 0.025;
+/// A level that falls and rises again by this much (dB) ...
+const FALL_DB: f64 = 12.0;
+/// ... to no more than this below the loudest block (dB) ...
+const BELOW_PEAK_DB: f64 = 20.0;
+/// ... so many times belongs to speech or music: a response decays, but for a few late echoes.
+const RISES: usize = 4;
+
+/// Refuses silence, noise without direct sound, and speech or music.
+pub(super) fn check(samples: &[f32], sample_rate_hz: u32) -> Result<(), Error> {
+    if samples.iter().all(|&sample| sample == 0.0) {
+        return Err(Error::Silent);
+    }
+    match Onset::find(samples, sample_rate_hz) {
+        // A short piece is short, not wrong: whether it suffices is for the measurement to say.
+        Ok(_) | Err(NoReading::TooShort { .. }) => {}
+        Err(source) => return Err(Error::NoDirectSound { source }),
+    }
+    match rises(samples, sample_rate_hz) {
+        rises if rises >= RISES => Err(Error::NotAResponse { rises, fall_db: FALL_DB }),
+        _ => Ok(()),
+    }
+}
+
+/// How often the level falls and rises again, near the level of the loudest block.
+fn rises(samples: &[f32], sample_rate_hz: u32) -> usize {
+    let block = ((BLOCK_S * f64::from(sample_rate_hz)) as usize).max(1);
+    let power = |chunk: &[f32]| chunk.iter().map(|&x| f64::from(x).powi(2)).sum::<f64>() / chunk.len() as f64;
+    let levels_db: Vec<f64> =
+        samples.chunks_exact(block).map(|c| 10.0 * (power(c) + 1e-30).log10()).collect();
+    let loudest_db = levels_db.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let (mut count, mut fallen) = (0, false);
+    // The extreme level since the last turn.
+    let mut extreme_db = levels_db.first().copied().unwrap_or(loudest_db);
+    for &level_db in &levels_db {
+        if fallen {
+            extreme_db = extreme_db.min(level_db);
+            if level_db > extreme_db + FALL_DB && level_db > loudest_db - BELOW_PEAK_DB {
+                count += 1;
+                (fallen, extreme_db) = (false, level_db);
+            }
+        } else {
+            extreme_db = extreme_db.max(level_db);
+            if level_db < extreme_db - FALL_DB {
+                (fallen, extreme_db) = (true, level_db);
+            }
+        }
+    }
+    count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Channel, read_audio};
+
+    /// Noise of a power that decays by 60 dB in `t60_s`, from each of some onsets (s) on.
+    fn decays(onsets_s: &[f64], t60_s: f64, duration_s: f64) -> Vec<f32> {
+        let mut state = 1u32;
+        (0..(16_000.0 * duration_s) as usize)
+            .map(|i| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                let noise = f64::from(state >> 8) / 8_388_608.0 - 1.0;
+                let since = onsets_s.iter().map(|onset| i as f64 / 16_000.0 - onset).filter(|t| *t >= 0.0);
+                let envelope: f64 = since.map(|t| (-6.9 * t / t60_s).exp()).sum();
+                (noise * (envelope + 1e-4)) as f32
+            })
+            .collect()
+    }
+
+    #[test]
+    fn responses_pass_and_other_sounds_do_not() {
+        for t60_s in [0.1, 0.5, 3.0] {
+            check(&decays(&[0.1], t60_s, 4.0), 16_000).unwrap();
+            // Late echoes.
+            check(&decays(&[0.1, 0.6, 1.2], t60_s, 4.0), 16_000).unwrap();
+        }
+        assert!(matches!(check(&[0.0; 16_000], 16_000), Err(Error::Silent)));
+        assert!(matches!(check(&decays(&[], 1.0, 1.0), 16_000), Err(Error::NoDirectSound { .. })));
+        let syllables: Vec<f64> = (0..12).map(|i| 0.3 * f64::from(i)).collect();
+        let talk = check(&decays(&syllables, 0.3, 4.0), 16_000);
+        assert!(matches!(talk, Err(Error::NotAResponse { rises, .. }) if rises > 6), "{talk:?}");
+    }
+
+    #[test]
+    fn recorded_speech_is_no_response() {
+        let fixtures = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures");
+        for name in
+            ["speech/recording.wav", "speech/dry_reader.wav", "speech/dry_talker.wav", "speech/dry_guest.wav"]
+        {
+            let speech = read_audio(format!("{fixtures}/{name}"), Channel::Index(0)).unwrap();
+            let found = check(speech.samples(), speech.sample_rate_hz());
+            assert!(matches!(found, Err(Error::NotAResponse { .. })), "{name}: {found:?}");
+        }
+        for name in ["room/ir/talker_corner.wav", "room/ir/talker_microphone.wav"] {
+            let response = read_audio(format!("{fixtures}/{name}"), Channel::Mono).unwrap();
+            check(response.samples(), response.sample_rate_hz()).unwrap();
+        }
+    }
+}

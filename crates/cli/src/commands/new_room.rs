@@ -1,0 +1,143 @@
+//! A room folder without a mesh program: from its size or its floor plan, and names of the material library.
+
+use crate::failure::Failure;
+use clap::{ArgGroup, Args};
+use sabine::acoustics::{DrawnRoom, FloorPlan, Receiver, Source};
+use std::path::PathBuf;
+
+/// Make a room folder from a size or a floor plan and names of the material library (`sabine materials`).
+#[derive(Args)]
+#[command(group(ArgGroup::new("outline").required(true).args(["size", "plan"])))]
+pub struct Arguments {
+    /// Length, width and height in metres, as 5x4x2.6: x from 0 to length, y from 0 to width, z up
+    #[arg(long, value_name = "LxWxH", allow_hyphen_values = true)]
+    size: Option<String>,
+    /// Floor plan: a file with one corner in a line, x y in metres, in order
+    #[arg(long, value_name = "FILE", requires = "height")]
+    plan: Option<PathBuf>,
+    /// Height in metres, with --plan
+    #[arg(long, value_name = "M", conflicts_with = "size")]
+    height: Option<f64>,
+    /// Material of the floor [default: unknown, to be fitted]
+    #[arg(long, value_name = "NAME")]
+    floor: Option<String>,
+    /// Material of the ceiling [default: unknown, to be fitted]
+    #[arg(long, value_name = "NAME")]
+    ceiling: Option<String>,
+    /// Material of all walls that have none of their own [default: unknown, to be fitted]
+    #[arg(long, value_name = "NAME")]
+    walls: Option<String>,
+    /// Material of one wall, repeatable. Wall 1 goes from corner 1 to corner 2; with --size 1 is y = 0, 2 x = length, 3 y = width,
+    /// 4 x = 0
+    #[arg(long, value_name = "N=NAME")]
+    wall: Vec<String>,
+    /// Position of a source in metres, repeatable; named s1, s2, ... unless it is given a name
+    #[arg(long, value_name = "[ID=]X,Y,Z", allow_hyphen_values = true)]
+    source: Vec<String>,
+    /// Position of a receiver in metres, repeatable; named r1, r2, ... unless it is given a name
+    #[arg(long, value_name = "[ID=]X,Y,Z", allow_hyphen_values = true)]
+    receiver: Vec<String>,
+    /// Folder to be made; it must not exist, or be empty
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Whatever stands in the way, in words for the user.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let room = drawn(arguments)?.write(&arguments.out)?;
+    let folder = arguments.out.display();
+    println!("{}", room.size_line());
+    for note in room.notes() {
+        println!("note: {note}");
+    }
+    println!("wrote {folder}/room.toml and {folder}/room.obj");
+    for (empty, table) in [(room.sources().is_empty(), "sources"), (room.receivers().is_empty(), "receivers")]
+    {
+        if empty {
+            println!(
+                "note: there are no {table}: add [[{table}]] with id and position_m to {folder}/room.toml"
+            );
+        }
+    }
+    println!("next: sabine trace --room {folder} --out {folder}-traced");
+    Ok(())
+}
+
+fn drawn(arguments: &Arguments) -> Result<DrawnRoom, Failure> {
+    let (plan, height_m) = match (&arguments.size, &arguments.plan, arguments.height) {
+        (Some(size), _, _) => {
+            let [length, width, height] = numbers(size, ['x', 'X', '×']).ok_or_else(|| {
+                format!("--size {size}: write length x width x height in metres, as 5x4x2.6")
+            })?;
+            (FloorPlan::rectangle(length, width).map_err(|error| format!("--size {size}: {error}"))?, height)
+        }
+        (None, Some(plan), Some(height)) => (FloorPlan::read(plan)?, height),
+        // Refused by the group and by `requires` before.
+        _ => return Err("give --size, or --plan and --height".into()),
+    };
+    let walls = arguments.wall.iter().map(|text| {
+        let (number, name) = text.split_once('=').unwrap_or((text, ""));
+        let number = number.trim().parse::<usize>().ok().filter(|_| !name.trim().is_empty());
+        let number =
+            number.ok_or_else(|| format!("--wall {text}: write number=material, as 2=glass_window"))?;
+        Ok((number, name.trim().to_owned()))
+    });
+    let source = |(id, position_m)| Source { id, position_m, axis: None };
+    let receiver = |(id, position_m)| Receiver { id, position_m, axis: None };
+    Ok(DrawnRoom {
+        plan,
+        height_m,
+        floor: arguments.floor.clone(),
+        ceiling: arguments.ceiling.clone(),
+        walls: arguments.walls.clone(),
+        wall: walls.collect::<Result<_, Failure>>()?,
+        sources: places(&arguments.source, "source")?.into_iter().map(source).collect(),
+        receivers: places(&arguments.receiver, "receiver")?.into_iter().map(receiver).collect(),
+    })
+}
+
+/// `ID=x,y,z` or `x,y,z`, the nth of which is named after the first letter of its kind.
+fn places(texts: &[String], kind: &str) -> Result<Vec<(String, [f64; 3])>, Failure> {
+    let place = |(index, text): (usize, &String)| {
+        let (id, position) = match text.split_once('=') {
+            Some((id, position)) => (id.trim().to_owned(), position),
+            None => (format!("{}{}", &kind[..1], index + 1), text.as_str()),
+        };
+        let position_m = numbers(position, [',', ';', ' '])
+            .ok_or_else(|| format!("--{kind} {text}: write x,y,z in metres, as 1,2,1.5, or name=1,2,1.5"))?;
+        Ok((id, position_m))
+    };
+    texts.iter().enumerate().map(place).collect()
+}
+
+fn numbers(text: &str, between: [char; 3]) -> Option<[f64; 3]> {
+    let words = text.split(between).map(str::trim).filter(|word| !word.is_empty());
+    <[f64; 3]>::try_from(words.map(|word| word.parse().ok()).collect::<Option<Vec<f64>>>()?).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_and_places_are_read_as_people_write_them() {
+        for size in ["5x4x2.6", "5 x 4 x 2.6", "5X4X2.6", "5×4×2.6"] {
+            assert_eq!(numbers(size, ['x', 'X', '×']), Some([5.0, 4.0, 2.6]), "{size}");
+        }
+        for size in ["5x4", "5x4x2.6x1", "5x4xhigh", ""] {
+            assert_eq!(numbers(size, ['x', 'X', '×']), None, "{size}");
+        }
+        let texts = ["1,2,1.5".to_owned(), "screen = -0.5, 2 ,1".to_owned()];
+        let expected = [("s1".to_owned(), [1.0, 2.0, 1.5]), ("screen".to_owned(), [-0.5, 2.0, 1.0])];
+        assert_eq!(places(&texts, "source").unwrap(), expected);
+        assert!(
+            places(&["1,2".to_owned()], "receiver")
+                .unwrap_err()
+                .to_string()
+                .starts_with("--receiver 1,2: write")
+        );
+    }
+}
