@@ -15,6 +15,9 @@ pub struct RoomArguments {
     /// Read a mesh or responses outside the room's folder, too: only for rooms that you trust
     #[arg(long)]
     pub allow_outside: bool,
+    /// Tables of materials instead of the room's: a materials.toml as `fit` and `match` write it
+    #[arg(long, value_name = "F")]
+    pub materials: Option<PathBuf>,
 }
 
 impl RoomArguments {
@@ -24,16 +27,25 @@ impl RoomArguments {
     /// The room cannot be read: the error names file and field.
     pub fn read(&self, demo: &mut Demo) -> Result<(MeasuredRoom, String), Failure> {
         let folder = demo.or(self.folder.as_deref(), "room")?;
-        Ok((read_room(&folder, self.allow_outside)?, demo.name(&folder)))
+        let room = read_room(&folder, self.allow_outside, self.materials.as_deref())?;
+        Ok((room, demo.name(&folder)))
     }
 }
 
-/// Reads a room, and prints its size and what should be known of it before numbers are believed.
+/// Reads a room, with the tables of a file where there is one, and prints its size and what should be known of it before numbers are
+/// believed.
 ///
 /// # Errors
-/// The room cannot be read: the error names file and field.
-pub fn read_room(folder: &Path, allow_outside: bool) -> Result<MeasuredRoom, Failure> {
-    let room = MeasuredRoom::read_with(folder, &ReadOptions { allow_outside })?;
+/// Room or tables cannot be read, or a table is of a material that the room does not have: the error names file and field.
+pub fn read_room(
+    folder: &Path,
+    allow_outside: bool,
+    materials: Option<&Path>,
+) -> Result<MeasuredRoom, Failure> {
+    let mut room = MeasuredRoom::read_with(folder, &ReadOptions { allow_outside })?;
+    if let Some(file) = materials {
+        room = room.with_materials_file(file)?;
+    }
     println!("{}", room.size_line());
     for note in room.notes() {
         println!("note: {note}");

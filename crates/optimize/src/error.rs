@@ -86,7 +86,7 @@ pub enum Error {
     },
     /// The paths end before the target decay has passed through the range that is fitted.
     #[error(
-        "target at {band_hz} Hz: a T60 of {target_s} s needs paths of {needed_s:.3} s; they were traced for {traced_s:.3} s"
+        "target at {band_hz} Hz: a T60 of {target_s} s needs paths of {needed_s:.3} s; they are traced for {traced_s:.3} s"
     )]
     PathsTooShort {
         /// Nominal centre of the band, in Hz.

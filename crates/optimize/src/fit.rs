@@ -1,6 +1,6 @@
 //! What a fit found, and what it could not.
 
-use sabine_acoustics::{Material, PerBand, Reading};
+use sabine_acoustics::{Material, MaterialTable, Materials, PerBand, Reading};
 use std::fmt;
 
 /// Fitted materials and everything that must be said about them.
@@ -265,6 +265,22 @@ impl fmt::Display for Unconverged {
 }
 
 impl MaterialFit {
+    /// The materials as tables by these names, one for each: what a room file and [`Materials::write`] take.
+    ///
+    /// # Errors
+    /// [`sabine_acoustics::Error::MaterialCount`] for another number of names; else as [`Materials::new`].
+    pub fn tables(&self, names: &[&str]) -> Result<Materials, sabine_acoustics::Error> {
+        let (expected, found) = (self.materials.len(), names.len());
+        if expected != found {
+            return Err(sabine_acoustics::Error::MaterialCount { expected, found });
+        }
+        let table = |((name, material), error): ((&&str, &Material), &PerBand<f64>)| {
+            MaterialTable::new(*name, material, &error.map(|sd| sd.min(1.0)))
+        };
+        let tables = names.iter().zip(&self.materials).zip(&self.absorption_standard_error).map(table);
+        Materials::new(tables.collect::<Result<_, _>>()?)
+    }
+
     /// Nominal centres of the bands in which the fit has not converged, in Hz; empty for a result.
     pub fn unconverged_hz(&self) -> Vec<f64> {
         let of = |warning: &Warning| match warning {

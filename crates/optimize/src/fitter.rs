@@ -10,7 +10,7 @@ use crate::uncertainty::Spread;
 use crate::unknowns::BandPrior;
 use crate::{AbsorptionPrior, Error, FitConfig, SlopeObjective};
 use rayon::prelude::*;
-use sabine_acoustics::{Air, Estimate, Material, Observer, PathSet, PerBand, report};
+use sabine_acoustics::{Air, Bands, Estimate, Material, Observer, PathSet, PerBand, report};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Shortest and longest T60 that is accepted as a target, in seconds: a studio's booth and a mausoleum.
@@ -68,6 +68,29 @@ impl MaterialFitter {
         self.fit_traces(&traces, materials, priors, air, target_t60_s, observer)
     }
 
+    /// Whether targets are in range, and paths of this duration in seconds long enough for them: what [`fit_t60`](Self::fit_t60)
+    /// would refuse after they have been traced.
+    ///
+    /// # Errors
+    /// [`Error::Target`], [`Error::TargetError`] and [`Error::PathsTooShort`].
+    pub fn check_t60(
+        &self,
+        target_t60_s: &PerBand<Estimate>,
+        bands: Bands,
+        air: &Air,
+        traced_s: f64,
+    ) -> Result<(), Error> {
+        check_targets(target_t60_s)?;
+        let limits_s = air_limits_s(air, bands);
+        for ((band_hz, target), limit_s) in target_t60_s.resampled(bands).iter().zip(limits_s.values()) {
+            let needed_s = -self.config.range_db.1 / 60.0 * target.value.min(*limit_s);
+            if traced_s < needed_s {
+                return Err(Error::PathsTooShort { band_hz, target_s: target.value, needed_s, traced_s });
+            }
+        }
+        Ok(())
+    }
+
     /// The same for pairs that were traced more than once: their energies add up.
     pub(crate) fn fit_traces(
         &self,
@@ -81,20 +104,13 @@ impl MaterialFitter {
         let paths: Vec<&PathSet> = traces.iter().map(|t| t.paths).collect();
         check_paths(&paths, materials)?;
         self.check_priors(materials, priors)?;
-        check_targets(target_t60_s)?;
         let octaves = materials[0].bands();
         let targets = target_t60_s.resampled(octaves);
         let exponents = air.energy_exponent_per_m(octaves);
-        // Rigid walls leave the air alone, at the exact centre of the band as the paths are computed.
-        let limits_s = exponents.map(|m| 60.0 / (crate::decay::DB_PER_NEPER * m * air.speed_of_sound_m_s()));
+        let limits_s = air_limits_s(air, octaves);
         let traced_s =
             paths.iter().map(|p| p.max_length_m()).fold(f64::INFINITY, f64::min) / air.speed_of_sound_m_s();
-        for ((band_hz, target), limit_s) in targets.iter().zip(limits_s.values()) {
-            let needed_s = -self.config.range_db.1 / 60.0 * target.value.min(*limit_s);
-            if traced_s < needed_s {
-                return Err(Error::PathsTooShort { band_hz, target_s: target.value, needed_s, traced_s });
-            }
-        }
+        self.check_t60(target_t60_s, octaves, air, traced_s)?;
 
         let histories: Vec<History> =
             paths.par_iter().map(|p| History::new(p, air, self.config.bin_s)).collect();
@@ -217,6 +233,7 @@ impl MaterialFitter {
         })
     }
 
+    /// Whether there is a prior for each material, in range and in the same bands.
     pub(crate) fn check_priors(
         &self,
         materials: &[Material],
@@ -249,6 +266,12 @@ impl MaterialFitter {
         }
         Ok(())
     }
+}
+
+/// T60 between rigid walls, in seconds: the air alone, at the exact centre of the band as the paths are computed.
+fn air_limits_s(air: &Air, bands: Bands) -> PerBand<f64> {
+    let speed_m_s = air.speed_of_sound_m_s();
+    air.energy_exponent_per_m(bands).map(|m| 60.0 / (crate::decay::DB_PER_NEPER * m * speed_m_s))
 }
 
 fn check_targets(target_t60_s: &PerBand<Estimate>) -> Result<(), Error> {

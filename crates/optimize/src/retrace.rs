@@ -173,6 +173,11 @@ impl MaterialFitter {
         observer: &dyn Observer,
     ) -> Result<RetracedFit, Error> {
         config.check()?;
+        // Before anything is traced; how long the paths are is known only then.
+        if let Some(material) = materials.first() {
+            self.check_priors(materials, priors)?;
+            self.check_t60(target_t60_s, material.bands(), air, f64::INFINITY)?;
+        }
         let mut clock = Clock::default();
         let mut seed = config.seed;
         let mut trace = |effort: f64, clock: &mut Clock| {

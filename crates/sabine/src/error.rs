@@ -60,7 +60,4 @@ pub enum Error {
     /// A number that JSON cannot hold.
     #[error("summary: {0}")]
     Json(#[from] serde_json::Error),
-    /// A table that TOML cannot hold.
-    #[error("materials: {0}")]
-    Toml(#[from] toml::ser::Error),
 }

@@ -196,6 +196,9 @@ impl MatchInput<'_> {
     }
 }
 
+/// Deviation of an octave's gain from the one wanted that is said, in dB: half of what is heard.
+const EQ_MISSED_DB: f64 = 0.5;
+
 /// Everything after listening.
 fn match_targets(
     targets: RoomTargets,
@@ -212,14 +215,7 @@ fn match_targets(
     let air = room.air();
     let materials_before: Vec<Material> =
         room.scene().materials().iter().map(|named| named.material.resampled(bands)).collect();
-    let priors: Vec<AbsorptionPrior> = materials_before
-        .iter()
-        .zip(room.priors())
-        .map(|(material, prior)| AbsorptionPrior {
-            mean: material.absorption().clone(),
-            standard_deviation: prior.absorption_sd.averaged(bands),
-        })
-        .collect();
+    let priors = AbsorptionPrior::of_room(room, bands);
     let scene = room.scene().with_materials(materials_before.clone())?;
     let longest_s = targets.t60_s().values().iter().map(|t| t.value).fold(0.0, f64::max);
     let duration_s = (config.duration_factor * longest_s).clamp(DURATION_S.0, DURATION_S.1);
@@ -230,6 +226,11 @@ fn match_targets(
             STANDARD_RATE_HZ
         }
     };
+    // Whatever would be refused is refused before the room is traced.
+    let renderer =
+        PressureRenderer::new(RenderConfig { sample_rate_hz, seed: config.seed, ..RenderConfig::default() })?;
+    let fitter = MaterialFitter::new(config.fit.clone())?;
+    fitter.check_t60(targets.t60_s(), bands, &air, duration_s)?;
     let low_end = config.wave_below_hz.map(|hz| LowEnd::new(hz, sample_rate_hz, room, source)).transpose()?;
     let paths = tracer(duration_s)?.trace(&scene, source, receiver, &air, observer)?;
     if paths.is_empty() {
@@ -237,9 +238,6 @@ fn match_targets(
     }
     clock.lap("trace");
 
-    let renderer =
-        PressureRenderer::new(RenderConfig { sample_rate_hz, seed: config.seed, ..RenderConfig::default() })?;
-    let fitter = MaterialFitter::new(config.fit.clone())?;
     let mut aim = targets.t60_s().clone();
     let mut corrections = 0;
     let (fit, mut response, mut parameters) = loop {
@@ -277,6 +275,7 @@ fn match_targets(
         let gains_db = eq_gains(targets.eq_db(), &eq_simulated_db, config.largest_eq_db, &mut warnings)?;
         EqFilter::design(&gains_db, sample_rate_hz, EqFilterConfig { above, ..EqFilterConfig::default() })?
     };
+    warn_of_eq(&eq_filter, &mut warnings);
     let filtered = eq_filter.apply(&Signal::from(response.clone()))?;
     let eq_reached_db = levels(&ImpulseResponse::from(filtered))?;
     let dry = resample(input.dry.signal, sample_rate_hz)?;
@@ -378,6 +377,17 @@ fn warn_of_fit(fit: &MaterialFit, room: &MeasuredRoom, warnings: &mut Vec<Warnin
     for (material, (bands_hz, deviations)) in far {
         let material = room.scene().materials()[material].name.clone();
         warnings.push(Warning::FarFromTable { material, bands_hz, deviations });
+    }
+}
+
+/// Gains that the filter misses, because its solver has not met them or its impulse response is too short.
+fn warn_of_eq(filter: &EqFilter, warnings: &mut Vec<Warning>) {
+    for ((band_hz, &wanted_db), realised_db) in filter.wanted_db().iter().zip(filter.realised_db().values()) {
+        let Some(realised_db) = *realised_db else { continue };
+        let off_db = (realised_db - wanted_db).abs();
+        if off_db.is_nan() || off_db > EQ_MISSED_DB {
+            warnings.push(Warning::EqMissed { band_hz, wanted_db, realised_db });
+        }
     }
 }
 

@@ -138,41 +138,12 @@ fn without_reference<T>(levels: &PerBand<T>) -> Vec<(f64, &T)> {
     levels.iter().filter(|(hz, _)| *hz != 1000.0).collect()
 }
 
-/// The materials of a match as tables of a room file (`[bands]` and `[materials.NAME]`).
+/// The materials of a match as tables of a room file (`[bands]` and `[materials.NAME]`), which
+/// [`MeasuredRoom::with_materials_file`](sabine_acoustics::MeasuredRoom::with_materials_file) reads.
 ///
 /// # Errors
-/// [`Error::Toml`], which plain numbers and names do not cause.
+/// [`Error::Acoustics`], which a fit's numbers and names do not cause.
 pub fn materials_toml(matched: &RoomMatch) -> Result<String, Error> {
-    #[derive(Serialize)]
-    struct Tables<'a> {
-        bands: Centres,
-        materials: BTreeMap<&'a str, Table>,
-    }
-    #[derive(Serialize)]
-    struct Centres {
-        centres_hz: Vec<f64>,
-    }
-    #[derive(Serialize)]
-    struct Table {
-        absorption: Vec<f64>,
-        absorption_sd: Vec<f64>,
-        scattering: Vec<f64>,
-    }
-    let rounded = |values: &PerBand<f64>| values.values().iter().map(|v| (v * 1e4).round() / 1e4).collect();
-    let materials = matched
-        .material_names
-        .iter()
-        .enumerate()
-        .map(|(i, name)| {
-            let material = &matched.fit.materials[i];
-            let table = Table {
-                absorption: rounded(material.absorption()),
-                absorption_sd: rounded(&matched.fit.absorption_standard_error[i]),
-                scattering: rounded(material.scattering()),
-            };
-            (name.as_str(), table)
-        })
-        .collect();
-    let centres_hz = matched.materials_before[0].bands().iter_hz().collect();
-    Ok(toml::to_string(&Tables { bands: Centres { centres_hz }, materials })?)
+    let names: Vec<&str> = matched.material_names.iter().map(String::as_str).collect();
+    Ok(matched.fit.tables(&names)?.to_toml()?)
 }

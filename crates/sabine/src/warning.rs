@@ -81,6 +81,16 @@ pub enum Warning {
         /// Greatest gain that is applied, in dB.
         limit_db: f64,
     },
+    /// An equalisation that the filter does not meet.
+    #[error("{band_hz} Hz: the filter gives {realised_db:.1} dB; {wanted_db:.1} dB are wanted")]
+    EqMissed {
+        /// Nominal octave centre in Hz.
+        band_hz: f64,
+        /// Gain that was asked for, in dB.
+        wanted_db: f64,
+        /// Gain of the filter, in dB.
+        realised_db: f64,
+    },
     /// An equalisation that is hardly heard: what is applied is close to the average of the rooms trained on.
     #[error(
         "the equalisation at {} is heard with a standard error of {least_db:.0} dB or more: it is mostly the average of the rooms that the network was trained on",

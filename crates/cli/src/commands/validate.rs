@@ -7,8 +7,8 @@ use crate::failure::Failure;
 use crate::room::read_room;
 use clap::Args;
 use sabine::acoustics::{
-    Bands, Conditions, Estimate, Material, MeasuredRoom, PathParameters, PathSet, PerBand, Propagator,
-    Reading, Scene, library_material,
+    Bands, Conditions, Estimate, Material, MaterialTable, Materials, MeasuredRoom, PathParameters, PathSet,
+    PerBand, Propagator, Reading, Scene, library_material,
 };
 use sabine::optimize::{AbsorptionPrior, FitConfig, MaterialFitter};
 use sabine::propagate::{PathTracer, TracerConfig};
@@ -23,6 +23,9 @@ pub struct Arguments {
     /// Read a mesh or responses outside the room's folder, too: only for rooms that you trust
     #[arg(long)]
     allow_outside: bool,
+    /// Tables of materials instead of the room's: a materials.toml as `fit` and `match` write it
+    #[arg(long, value_name = "F")]
+    materials: Option<PathBuf>,
     /// Measured room means by third octave: columns frequency_hz, T20, EDT, C80, D50 (percent) [default: measured_parameters.csv of the room]
     #[arg(long, value_name = "F.csv")]
     measured: Option<PathBuf>,
@@ -71,7 +74,7 @@ const QUANTITIES: [Quantity; 4] = [
 /// # Errors
 /// Whatever stands in the way, in words for the user.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let room = read_room(&arguments.room, arguments.allow_outside)?;
+    let room = read_room(&arguments.room, arguments.allow_outside, arguments.materials.as_deref())?;
     let file = arguments.measured.clone().unwrap_or_else(|| arguments.room.join("measured_parameters.csv"));
     let measured = third_octaves(&file)?;
     let bands = room.bands();
@@ -181,15 +184,13 @@ fn fitted(
     bar: &Bar,
 ) -> Result<Vec<Material>, Failure> {
     let bands = room.bands();
-    let priors: Vec<AbsorptionPrior> = room
-        .priors()
-        .iter()
-        .zip(materials)
-        .map(|(prior, material)| AbsorptionPrior {
-            mean: material.absorption().clone(),
-            standard_deviation: prior.absorption_sd.clone(),
-        })
-        .collect();
+    // The tables as the options have them, trusted as far as the file says.
+    let known = room.scene().materials().iter().zip(room.priors()).zip(materials);
+    let tables = known.map(|((named, prior), material)| {
+        MaterialTable::new(named.name.clone(), material, &prior.absorption_sd)
+    });
+    let stated = room.with_materials(&Materials::new(tables.collect::<Result<_, _>>()?)?)?;
+    let priors = AbsorptionPrior::of_room(&stated, bands);
     let targets: Vec<Estimate> = (0..bands.len())
         .map(|band| {
             octave(measured, 1, bands, band)
@@ -200,7 +201,13 @@ fn fitted(
     let fitter = MaterialFitter::new(FitConfig { range_db: (-5.0, -25.0), ..FitConfig::default() })?;
     let references: Vec<&PathSet> = paths.iter().collect();
     let targets = PerBand::new(bands, targets)?;
-    Ok(fitter.fit_t60(&references, materials, &priors, &room.air(), &targets, bar)?.materials)
+    let fit = fitter.fit_t60(&references, materials, &priors, &room.air(), &targets, bar)?;
+    let names: Vec<&str> = room.scene().materials().iter().map(|named| named.name.as_str()).collect();
+    let unreachable = fit.unreachable.iter().map(ToString::to_string);
+    for note in unreachable.chain(fit.warnings.iter().map(|warning| warning.describe(&names))) {
+        println!("note: {note}");
+    }
+    Ok(fit.materials)
 }
 
 fn mean<'r>(readings: impl Iterator<Item = &'r Reading>) -> Option<f64> {

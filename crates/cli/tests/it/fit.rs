@@ -9,8 +9,17 @@ fn run(arguments: &[&str]) -> Output {
 }
 
 /// What other programs read.
-const KEYS: [&str; 7] =
-    ["bands_hz", "target_t60_s", "reached_t60_s", "unreachable", "materials", "not_determined", "seconds"];
+const KEYS: [&str; 9] = [
+    "verdict",
+    "unconverged_hz",
+    "bands_hz",
+    "target_t60_s",
+    "reached_t60_s",
+    "unreachable",
+    "materials",
+    "not_determined",
+    "seconds",
+];
 
 /// The fixture's responses are sampled at 16 kHz: the octave of 8 kHz says nothing, and the others are fitted all the same.
 #[test]
@@ -48,9 +57,16 @@ fn responses_of_the_fixture_are_fitted_where_they_say_something() {
     let bands: Vec<f64> =
         result["bands_hz"].as_array().unwrap().iter().map(|b| b.as_f64().unwrap()).collect();
     assert_eq!(bands, [125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0]);
-    for file in ["impulse_response.wav", "report.html", "responses.json"] {
+    for file in ["impulse_response.wav", "report.html", "responses.json", "materials.toml"] {
         assert!(out.join(file).exists(), "{file} is missing");
     }
+    // One sentence, in the file, the report and on the terminal.
+    assert_eq!(result["unconverged_hz"], serde_json::json!([]));
+    let verdict = result["verdict"].as_str().unwrap();
+    assert!(verdict.starts_with("Fitted T30 "), "{verdict}");
+    assert!(verdict.contains("8 kHz cannot be read from the responses"), "{verdict}");
+    assert!(std::fs::read_to_string(out.join("report.html")).unwrap().contains(verdict));
+    assert!(String::from_utf8_lossy(&output.stdout).contains(verdict));
 }
 
 #[test]
@@ -118,6 +134,10 @@ fn bad_targets_and_names_are_refused_and_nothing_is_written() {
         (vec!["--t60=1,1"], "7 bands"),
         (vec!["--responses", "--hold-out", "nobody"], "nobody"),
         (vec!["--t60=1,1,1,1,1,1,1", "--receiver", "nobody"], "nobody"),
+        // Refused before so many rays are traced, which takes an hour.
+        (vec!["--t60=20,1,1,1,1,1,1", "--rays", "100000000"], "11.667 s"),
+        (vec!["--t60=1,1,1,1,1,1,1", "--rays", "100000000", "--smoothness=-1"], "smoothness"),
+        (vec!["--t60=1,1,1,1,1,1,1", "--materials", "nowhere.toml"], "nowhere.toml"),
     ] {
         let output = run(&[&arguments[..], &["--out", out.to_str().unwrap()]].concat());
         let message = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -125,4 +145,28 @@ fn bad_targets_and_names_are_refused_and_nothing_is_written() {
         assert!(message.contains(named) && !message.contains("panicked"), "{arguments:?}: {message}");
         assert!(!out.exists(), "{arguments:?} left {}", out.display());
     }
+}
+
+#[test]
+fn fitted_materials_are_read_by_other_commands() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    // Deader than the tables say.
+    let t60 = "--t60=0.4,0.4,0.4,0.4,0.4,0.4,0.4";
+    let output = run(&[t60, "--rays", "500", "--out", out.to_str().unwrap()]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let tables = out.join("materials.toml");
+    let t30_at_1_khz_s = |name: &str, more: &[&str]| {
+        let json = folder.path().join(name);
+        let arguments = ["--rays", "500", "--json", json.to_str().unwrap()];
+        let output = sabine("trace").args(arguments).args(more).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let result: Value = serde_json::from_slice(&std::fs::read(json).unwrap()).unwrap();
+        let bands_hz = result["bands_hz"].as_array().unwrap();
+        let band = bands_hz.iter().position(|hz| hz.as_f64() == Some(1000.0)).unwrap();
+        result["t30_s"][band].as_f64().unwrap()
+    };
+    let before_s = t30_at_1_khz_s("before.json", &[]);
+    let after_s = t30_at_1_khz_s("after.json", &["--materials", tables.to_str().unwrap()]);
+    assert!((after_s / 0.4 - 1.0).abs() < 0.15 && before_s > 1.3 * after_s, "{before_s} {after_s}");
 }

@@ -3,6 +3,7 @@
 //! Without arguments it fits the built-in demo to its two responses.
 
 mod summary;
+mod verdict;
 
 use crate::bar::Bar;
 use crate::chart::{Chart, Look, Scale, Series};
@@ -24,6 +25,7 @@ use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig
 use std::path::PathBuf;
 use std::time::Instant;
 use summary::{Compared, Seconds, Summary, mean_of};
+use verdict::Aim;
 
 /// Octaves of targets and materials: 125 Hz to 8 kHz.
 const OCTAVES: Bands = Bands::T60;
@@ -88,6 +90,7 @@ enum Slope {
 
 /// Everything that the two ways of fitting have in common.
 struct Outcome {
+    aim: Aim,
     fit: MaterialFit,
     target_s: Vec<Option<f64>>,
     reached_s: Vec<Option<f64>>,
@@ -114,6 +117,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut demo = Demo::default();
     let (file, _) = arguments.room.read(&mut demo)?;
     let room = Room::new(&file, arguments)?;
+    // Settings are checked before anything is traced.
+    let config = RenderConfig { sample_rate_hz: RATE_HZ, seed: arguments.seed, ..RenderConfig::default() };
+    let renderer = PressureRenderer::new(config)?;
     let bar = Bar::new();
     let outcome = match &arguments.t60 {
         Some(t60_s) => room.fit_t60(t60_s, &bar)?,
@@ -123,16 +129,16 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
     let names: Vec<&str> = file.scene().materials().iter().map(|m| m.name.as_str()).collect();
     let summary = Summary::new(&names, &outcome);
-    let config = RenderConfig { sample_rate_hz: RATE_HZ, seed: arguments.seed, ..RenderConfig::default() };
-    let response =
-        PressureRenderer::new(config)?.render(&outcome.independent, &outcome.fit.materials, &room.air)?;
+    let response = renderer.render(&outcome.independent, &outcome.fit.materials, &room.air)?;
     let json = serde_json::to_string_pretty(&summary)?;
     out.write("impulse_response.wav", &encode_wav(&Signal::from(response), SampleFormat::Float32)?)?;
     out.write("fit.json", json.as_bytes())?;
+    out.write("materials.toml", outcome.fit.tables(&names)?.to_toml()?.as_bytes())?;
     if !outcome.compared.is_empty() {
         out.write("responses.json", serde_json::to_string_pretty(&outcome.compared)?.as_bytes())?;
     }
     let mut page = Page::new("Materials fitted");
+    page.paragraph(&summary.verdict);
     page.warnings(&summary.notes).heading("Decay before and after");
     page.markup("<div class=\"small\">");
     for (b, curves) in outcome.curves.iter().enumerate() {
@@ -169,11 +175,7 @@ impl<'a> Room<'a> {
     fn new(file: &'a MeasuredRoom, arguments: &'a Arguments) -> Result<Self, Failure> {
         let materials: Vec<Material> =
             file.scene().materials().iter().map(|m| m.material.resampled(OCTAVES)).collect();
-        let prior = |(material, prior): (&Material, &sabine::acoustics::MaterialPrior)| AbsorptionPrior {
-            mean: material.absorption().clone(),
-            standard_deviation: prior.absorption_sd.averaged(OCTAVES),
-        };
-        let priors = materials.iter().zip(file.priors()).map(prior).collect();
+        let priors = AbsorptionPrior::of_room(file, OCTAVES);
         let scene = file.scene().with_materials(materials.clone())?;
         Ok(Self { file, scene, materials, priors, air: file.air(), arguments })
     }
@@ -220,13 +222,12 @@ impl<'a> Room<'a> {
     fn fit_t60(&self, t60_s: &[f64], bar: &Bar) -> Result<Outcome, Failure> {
         let targets = PerBand::new(OCTAVES, t60_s.iter().map(|&t| Estimate::exact(t)).collect())?;
         let longest_s = t60_s.iter().copied().fold(0.0, f64::max);
-        let retraced = Retraced {
-            room: self,
-            places: self.places()?,
-            duration_s: (DURATION_FACTOR * longest_s).clamp(DURATION_S.0, DURATION_S.1),
-        };
+        let duration_s = (DURATION_FACTOR * longest_s).clamp(DURATION_S.0, DURATION_S.1);
+        let fitter = self.fitter()?;
+        fitter.check_t60(&targets, OCTAVES, &self.air, duration_s)?;
+        let retraced = Retraced { room: self, places: self.places()?, duration_s };
         let config = RetraceConfig { seed: self.arguments.seed, ..RetraceConfig::default() };
-        let done = self.fitter()?.fit_t60_retracing(
+        let done = fitter.fit_t60_retracing(
             &retraced,
             &self.materials,
             &self.priors,
@@ -252,6 +253,7 @@ impl<'a> Room<'a> {
         let warnings = done.not_verified.iter().map(ToString::to_string).collect();
         let (trace, fit) = done.seconds;
         Ok(Outcome {
+            aim: Aim { quantity: "T60", of: "what is wanted" },
             target_s: t60_s.iter().map(|&t| Some(t)).collect(),
             reached_s: values(&done.read_t60_s),
             curves: curves.collect(),
@@ -283,6 +285,7 @@ impl<'a> Room<'a> {
         if held_out.iter().all(|h| *h) {
             return Err("room.toml: responses: none is left to fit to".into());
         }
+        let fitter = self.fitter()?;
         let measured = (0..entries.len())
             .map(|i| Ok(MeasuredDecay::new(&self.file.load_response(i)?, OCTAVES)?))
             .collect::<Result<Vec<_>, Failure>>()?;
@@ -303,14 +306,8 @@ impl<'a> Room<'a> {
             pairs.iter().zip(&held_out).filter(|(_, held)| !**held).map(|(pair, _)| *pair).collect();
         let start = Instant::now();
         let measurement = self.file.measurement();
-        let done = self.fitter()?.fit_responses(
-            &fitted,
-            measurement,
-            &self.materials,
-            &self.priors,
-            &self.air,
-            bar,
-        )?;
+        let done =
+            fitter.fit_responses(&fitted, measurement, &self.materials, &self.priors, &self.air, bar)?;
         let fit_s = start.elapsed().as_secs_f64();
 
         // Held against rays that the fit has not seen.
@@ -343,7 +340,9 @@ impl<'a> Room<'a> {
             let used = || compared.iter().filter(|c| !c.held_out);
             (0..OCTAVES.len()).map(|b| mean_of(used().filter_map(|c| of(c)[b]))).collect()
         };
+        let one = held_out.iter().filter(|held| !**held).count() == 1;
         Ok(Outcome {
+            aim: Aim { quantity: "T30", of: if one { "the response" } else { "the responses" } },
             target_s: mean(&|c| &c.measured_t30_s),
             reached_s: mean(&|c| &c.t30_after_s),
             independent: other.into_iter().next().ok_or("no paths")?,

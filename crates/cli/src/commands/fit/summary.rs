@@ -1,5 +1,6 @@
 //! The numbers of a fit, for files and for people.
 
+use super::verdict::{Octave, in_one_sentence};
 use super::{OCTAVES, Outcome};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -8,6 +9,10 @@ use std::path::Path;
 /// The numbers, as other programs read them.
 #[derive(Serialize)]
 pub struct Summary {
+    /// How well it fits, in one sentence.
+    pub verdict: String,
+    /// Octaves in which the fit has not converged, in Hz: their absorption is no result.
+    pub unconverged_hz: Vec<f64>,
     pub bands_hz: Vec<f64>,
     pub target_t60_s: Vec<Option<f64>>,
     pub reached_t60_s: Vec<Option<f64>>,
@@ -68,7 +73,17 @@ impl Summary {
         let bounds = fit.at_bounds.iter().map(|bound| bound.describe(names));
         let warnings = fit.warnings.iter().map(|warning| warning.describe(names));
         let notes = bounds.chain(warnings).chain(outcome.warnings.clone()).chain(not_determined.clone());
+        let unconverged_hz = fit.unconverged_hz();
+        let octave = |(b, hz): (usize, f64)| Octave {
+            hz,
+            wanted_s: outcome.target_s[b],
+            reached_s: outcome.reached_s[b],
+            converged: !unconverged_hz.contains(&hz),
+        };
+        let octaves: Vec<Octave> = OCTAVES.iter_hz().enumerate().map(octave).collect();
         Self {
+            verdict: in_one_sentence(&outcome.aim, &octaves),
+            unconverged_hz,
             notes: notes.collect(),
             bands_hz: OCTAVES.iter_hz().collect(),
             target_t60_s: outcome.target_s.clone(),
@@ -90,7 +105,9 @@ impl Summary {
         let mut rows = vec![std::iter::once("material".to_owned()).chain(head).collect()];
         for (name, fitted) in &self.materials {
             let cells = fitted.absorption.iter().zip(&fitted.absorption_sd);
-            let cells = cells.map(|(a, sd)| format!("{a:.3} ± {sd:.3}"));
+            let cells = cells.zip(&self.bands_hz).map(|((a, sd), hz)| {
+                if self.unconverged_hz.contains(hz) { "-".to_owned() } else { format!("{a:.3} ± {sd:.3}") }
+            });
             rows.push(std::iter::once(name.clone()).chain(cells).collect());
         }
         rows
@@ -106,7 +123,14 @@ impl Summary {
         println!("T60 reached   {} s", row(&self.reached_t60_s));
         for (name, fitted) in &self.materials {
             let cells = fitted.absorption.iter().zip(&fitted.absorption_sd);
-            println!("{name:14}{}", cells.map(|(a, sd)| format!(" {a:.2}±{sd:.2}")).collect::<String>());
+            let cells = cells.zip(&self.bands_hz).map(|((a, sd), hz)| {
+                if self.unconverged_hz.contains(hz) {
+                    format!("{:>10}", "-")
+                } else {
+                    format!(" {a:.2}±{sd:.2}")
+                }
+            });
+            println!("{name:14}{}", cells.collect::<String>());
         }
         for held_out in [false, true] {
             let some = || outcome.compared.iter().filter(|c| c.held_out == held_out);
@@ -131,6 +155,7 @@ impl Summary {
         for text in &self.notes {
             println!("note: {text}");
         }
+        println!("{}", self.verdict);
         println!(
             "{:.2} s tracing, {:.2} s fitting; look at {}",
             self.seconds.trace,

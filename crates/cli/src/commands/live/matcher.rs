@@ -45,6 +45,8 @@ pub struct Matched {
     pub response: ImpulseResponse,
     /// The same through the equalisation filter, whose delay is taken out.
     pub equalised: ImpulseResponse,
+    /// Octaves in which the fit has not converged, in Hz.
+    pub unconverged_hz: Vec<f64>,
     /// Seconds that it took.
     pub seconds: f64,
 }
@@ -62,14 +64,7 @@ impl Matcher {
         let bands = Bands::SIMULATION;
         let materials: Vec<Material> =
             room.scene().materials().iter().map(|named| named.material.resampled(bands)).collect();
-        let priors = materials
-            .iter()
-            .zip(room.priors())
-            .map(|(material, prior)| AbsorptionPrior {
-                mean: material.absorption().clone(),
-                standard_deviation: prior.absorption_sd.averaged(bands),
-            })
-            .collect();
+        let priors = AbsorptionPrior::of_room(room, bands);
         let scene = room.scene().with_materials(materials.clone())?;
         let air = room.air();
         let diffuse = DiffuseRoom::of_scene(&scene, &air, bands)?;
@@ -142,7 +137,13 @@ impl Matcher {
         });
         let filter = self.designer.design(&gains_db)?;
         let equalised = filter.apply(&Signal::from(response.clone()))?;
-        Ok(Matched { targets, response, equalised: equalised.into(), seconds: start.elapsed().as_secs_f64() })
+        Ok(Matched {
+            targets,
+            response,
+            equalised: equalised.into(),
+            unconverged_hz: fit.unconverged_hz(),
+            seconds: start.elapsed().as_secs_f64(),
+        })
     }
 }
 

@@ -155,6 +155,12 @@ impl Session {
                 let (matched, response, since) = reply?;
                 waiting = false;
                 println!("{:>7}  materials and EQ refitted in {:.2} s", "", matched.seconds);
+                for band_hz in &matched.unconverged_hz {
+                    println!(
+                        "{:>7}  warning: the fit of the materials has not converged at {band_hz} Hz",
+                        ""
+                    );
+                }
                 self.timing.updates.push(matched.seconds);
                 self.in_use = Some(matched.targets);
                 pending = Some((response, since));

@@ -39,6 +39,9 @@ pub struct Arguments {
     /// Walk on where a wall or furniture is in the way
     #[arg(long)]
     through_walls: bool,
+    /// Tables of materials instead of the room's: a materials.toml as `fit` and `match` write it
+    #[arg(long, value_name = "F", requires = "room")]
+    materials: Option<PathBuf>,
     /// Corners of the walk, a line each: x y z in metres
     #[arg(long, value_name = "FILE")]
     path: Option<PathBuf>,
@@ -90,7 +93,7 @@ enum Mode {
 /// Whatever stands in the way, in words for the user.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (scene, air, source, mut corners) = match &arguments.room {
-        Some(folder) => furnished(folder, arguments.allow_outside)?,
+        Some(folder) => furnished(folder, arguments.allow_outside, arguments.materials.as_deref())?,
         None => two_rooms()?,
     };
     if let Some(path) = &arguments.path {
@@ -300,8 +303,8 @@ impl Renderer {
 
 type Setting = (Scene, Air, Source, Vec<[f64; 3]>);
 
-fn furnished(folder: &Path, allow_outside: bool) -> Result<Setting, Failure> {
-    let room = read_room(folder, allow_outside)?;
+fn furnished(folder: &Path, allow_outside: bool, materials: Option<&Path>) -> Result<Setting, Failure> {
+    let room = read_room(folder, allow_outside, materials)?;
     let source = room.sources().first().ok_or("the room has no source")?.clone();
     let corners = room.receivers().iter().map(|receiver| receiver.position_m).collect();
     Ok((room.scene().clone(), room.air(), source, corners))
