@@ -243,7 +243,7 @@ pub enum Error {
     /// A mesh with more vertices or triangles than can be meant.
     #[error("{found} {what}; at most {limit} are read")]
     MeshTooLarge {
-        /// "vertices" or "triangles".
+        /// "vertices", "triangles", "corners of a face" ...
         what: &'static str,
         /// How many the file asks for, as far as it was read.
         found: u64,

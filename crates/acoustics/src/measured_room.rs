@@ -141,6 +141,8 @@ pub struct MeasuredRoom {
     scene: Scene,
     faces_without_area: usize,
     up_axis: UpAxis,
+    /// Whether the file states the units and the axis of its mesh: then they are not questioned.
+    stated: [bool; 2],
     named_as_in_library: Vec<String>,
     priors: Vec<MaterialPrior>,
     air: Air,
@@ -255,6 +257,7 @@ impl MeasuredRoom {
             scene,
             faces_without_area,
             up_axis,
+            stated: [file.room.units.is_some(), file.room.up_axis.is_some()],
             named_as_in_library,
             priors,
             air,

@@ -287,3 +287,26 @@ fn what_is_no_response_is_refused_with_file_and_field() {
         assert!(error.starts_with(&start), "{error}");
     }
 }
+
+/// No response of a real or independently simulated room is taken for silence or speech.
+#[test]
+fn measured_responses_of_many_rooms_pass() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    let kinds = ["rooms", "rooms_more", "rooms_foreign"].map(|kind| data.join(kind));
+    let folders = kinds.iter().filter_map(|kind| std::fs::read_dir(kind).ok()).flatten();
+    let (mut rooms, mut responses) = (0, 0);
+    for folder in folders.map(|entry| entry.unwrap().path()).filter(|path| path.join("room.toml").exists()) {
+        let room = MeasuredRoom::read(&folder).unwrap();
+        println!("{}: {} {:?}", folder.display(), room.size_line(), room.notes());
+        // Every seventh of the many of a large room.
+        for index in (0..room.responses().len()).step_by(if room.responses().len() > 50 { 7 } else { 1 }) {
+            room.load_response(index).unwrap_or_else(|error| panic!("{error}"));
+            responses += 1;
+        }
+        rooms += 1;
+    }
+    match rooms {
+        0 => println!("skipped: {} is not there", data.display()),
+        _ => println!("{responses} responses of {rooms} rooms"),
+    }
+}

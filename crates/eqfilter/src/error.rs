@@ -5,7 +5,7 @@
 #[non_exhaustive]
 pub enum Error {
     /// A setting outside its range, or not finite.
-    #[error("{field} is {value}; it must be {range}")]
+    #[error("{field} is {}; it must be {range}", sabine_acoustics::Engineering(*value))]
     OutOfRange {
         /// Name of the setting, with its unit.
         field: &'static str,
@@ -15,7 +15,7 @@ pub enum Error {
         range: &'static str,
     },
     /// A gain that is not finite or beyond 120 dB.
-    #[error("the gain at {band_hz} Hz is {gain_db} dB; it must be between -120 and 120 dB")]
+    #[error("the gain at {band_hz} Hz is {} dB; it must be between -120 and 120 dB", sabine_acoustics::Engineering(*gain_db))]
     Gain {
         /// Nominal centre of the band in Hz.
         band_hz: f64,

@@ -5,7 +5,7 @@
 #[non_exhaustive]
 pub enum Error {
     /// A setting outside its range, or not finite.
-    #[error("{field} is {value}; it must be {range}")]
+    #[error("{field} is {}; it must be {range}", sabine_acoustics::Engineering(*value))]
     OutOfRange {
         /// The setting, with its unit.
         field: &'static str,

@@ -189,6 +189,7 @@ impl MatchInput<'_> {
         self.dry.check_not_silent()?;
         self.room.source(self.source)?;
         self.room.receiver(self.receiver)?;
+        warnings.extend(self.room.notes().into_iter().map(Warning::Room));
         if self.room.air_assumed() {
             warnings.push(Warning::AirAssumed);
         }

@@ -15,6 +15,9 @@ pub enum Warning {
     /// What the estimator says of the recording.
     #[error("recording: {0}")]
     Speech(sabine_estimator::Warning),
+    /// What should be known of the room before numbers are believed: materials without a table, doubtful units.
+    #[error("{0}")]
+    Room(sabine_acoustics::RoomNote),
     /// The room file says nothing about the air.
     #[error("the room file has no [air]: 20 C, 50 % and 101.325 kPa are assumed")]
     AirAssumed,

@@ -7,8 +7,9 @@ use std::fmt;
 /// A longer room than this, or a smaller one than that, may be in other units (m).
 const LONGEST_M: f64 = 100.0;
 const SHORTEST_M: f64 = 1.0;
-/// Usual height of a room (m), which tells units apart.
+/// Usual height of a room (m), which tells units apart, and how far from it a room may be (logarithm: four times).
 const USUAL_HEIGHT_M: f64 = 3.0;
+const MAX_MISFIT: f64 = 1.4;
 /// Farther from the origin than this many times its size, and than 1 km, a room is oddly placed.
 const FAR: f64 = 100.0;
 const FAR_M: f64 = 1000.0;
@@ -130,10 +131,12 @@ impl MeasuredRoom {
         let [low, high] = self.scene.bounds_m();
         let size = [0, 1, 2].map(|k| high[k] - low[k]);
         let longest_m = size.into_iter().fold(0.0, f64::max);
-        if !(SHORTEST_M..=LONGEST_M).contains(&longest_m) {
-            notes.push(RoomNote::UnusualSize { longest_m, unit: self.likely_unit(size) });
+        let [units_stated, axis_stated] = self.stated;
+        if !units_stated && !(SHORTEST_M..=LONGEST_M).contains(&longest_m) {
+            notes.push(RoomNote::UnusualSize { longest_m, unit: likely_unit(size) });
         }
-        if let Some(up_axis) = turned::suspected(&self.scene, self.up_axis, &self.sources, &self.receivers) {
+        let suspected = || turned::suspected(&self.scene, self.up_axis, &self.sources, &self.receivers);
+        if let Some(up_axis) = (!axis_stated).then(suspected).flatten() {
             notes.push(RoomNote::LiesOnItsSide { up_axis });
         }
         let middle = [0, 1, 2].map(|k| 0.5 * (low[k] + high[k]));
@@ -176,14 +179,16 @@ impl MeasuredRoom {
         };
         (0..materials.len()).filter(unknown).map(note).collect()
     }
+}
 
-    /// The unit in which a room of this size (m) would be of a usual height, and all places inside, if there is one.
-    fn likely_unit(&self, size: [f64; 3]) -> Option<LengthUnit> {
-        let misfit = |unit: &LengthUnit| (size[2] * unit.metres() / USUAL_HEIGHT_M).ln().abs();
-        let usual = |unit: &LengthUnit| {
-            let longest_m = size.into_iter().fold(0.0, f64::max) * unit.metres();
-            *unit != LengthUnit::Metre && (SHORTEST_M..=LONGEST_M).contains(&longest_m) && misfit(unit) < 1.4
-        };
-        LengthUnit::ALL.into_iter().filter(usual).min_by(|a, b| misfit(a).total_cmp(&misfit(b)))
-    }
+/// The unit in which a room of this size in metres would be about 3 m high and neither too long nor too short, if there is one.
+fn likely_unit(size: [f64; 3]) -> Option<LengthUnit> {
+    let misfit = |unit: &LengthUnit| (size[2] * unit.metres() / USUAL_HEIGHT_M).ln().abs();
+    let usual = |unit: &LengthUnit| {
+        let longest_m = size.into_iter().fold(0.0, f64::max) * unit.metres();
+        *unit != LengthUnit::Metre
+            && (SHORTEST_M..=LONGEST_M).contains(&longest_m)
+            && misfit(unit) < MAX_MISFIT
+    };
+    LengthUnit::ALL.into_iter().filter(usual).min_by(|a, b| misfit(a).total_cmp(&misfit(b)))
 }

@@ -99,7 +99,8 @@ fn face(rest: &str, vertices: usize, corners: &mut Vec<u32>) -> Result<(), Error
             corners.push(index);
         }
         if corners.len() > MOST_CORNERS {
-            return Err(Error::Length { expected: MOST_CORNERS, found: rest.split_whitespace().count() });
+            let found = rest.split_whitespace().count() as u64;
+            return Err(Error::MeshTooLarge { what: "corners of a face", found, limit: MOST_CORNERS as u64 });
         }
     }
     if corners.len() > 1 && corners.first() == corners.last() {
@@ -174,7 +175,8 @@ mod tests {
         let crossed = format!("{CORNERS}usemtl a\nf 1 3 2 4");
         assert!(parse(&crossed).is_err_and(|e| e.to_string().contains("crosses itself")));
         let long = format!("{CORNERS}usemtl a\nf {}", "1 2 ".repeat(MOST_CORNERS));
-        assert!(parse(&long).is_err());
+        let message = parse(&long).unwrap_err().to_string();
+        assert!(message.ends_with("line 6: 2048 corners of a face; at most 1024 are read"), "{message}");
     }
 
     #[test]

@@ -106,7 +106,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let summary = MatchSummary::new(&matched);
     write_results(&mut out, &input, &room_name, &matched, &summary)?;
     out.finish()?;
-    print_summary(&summary, &arguments.out);
+    let known: Vec<String> = room.notes().iter().map(ToString::to_string).collect();
+    print_summary(&summary, &known, &arguments.out);
     Ok(())
 }
 
@@ -128,7 +129,7 @@ fn write_results(
     Ok(())
 }
 
-fn print_summary(summary: &MatchSummary, out: &Path) {
+fn print_summary(summary: &MatchSummary, known: &[String], out: &Path) {
     println!("octave        {}", row(&summary.bands_hz, |hz| format!("{hz}")));
     println!("T60 heard     {} s", row(&summary.t60_target_s, |t| format!("{t:.2}")));
     println!(
@@ -141,7 +142,8 @@ fn print_summary(summary: &MatchSummary, out: &Path) {
             waves.below_hz, waves.voxels, waves.level_difference_db, waves.gain_db
         );
     }
-    for warning in &summary.warnings {
+    // What concerns the room was printed when it was read.
+    for warning in summary.warnings.iter().filter(|warning| !known.contains(warning)) {
         println!("note: {warning}");
     }
     let seconds: f64 = summary.seconds.values().sum();

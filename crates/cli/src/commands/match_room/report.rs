@@ -36,6 +36,7 @@ pub fn html(
         input.receiver,
     ));
     page.paragraph(&verdict(summary));
+    page.paragraph(&input.room.size_line());
     page.warnings(&summary.warnings);
     page.heading("Listen");
     let before = in_room_before(input, matched)?;
