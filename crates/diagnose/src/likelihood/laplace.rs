@@ -128,8 +128,8 @@ pub(crate) fn maximise(model: &dyn Model, start: &[f64], what: &'static str) -> 
             damping = damping.max(1e-4) * 10.0;
         }
         let Some((next, found, length, gain)) = accepted else {
-            // No step gains anything: this is the top as far as numbers can tell.
-            converged = true;
+            // No step gains anything: this is the top as far as numbers can tell, if there are numbers.
+            converged = value.is_finite();
             break;
         };
         (x, likelihood) = (next, found);
@@ -224,5 +224,21 @@ mod tests {
         assert_eq!(found.values[1], 0.5);
         // The best level under that slope: the mean of y - t / 2.
         assert!((found.values[0] - 1.5).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_likelihood_that_is_not_finite_has_no_top() {
+        struct Impossible([Prior; 1]);
+        impl Model for Impossible {
+            fn priors(&self) -> &[Prior] {
+                &self.0
+            }
+
+            fn log_likelihood(&self, _: &[f64], _: Option<&mut Slopes>) -> f64 {
+                f64::NEG_INFINITY
+            }
+        }
+        let found = maximise(&Impossible([Prior::normal(0.0, 1.0)]), &[0.5], "nothing").unwrap();
+        assert!(!found.converged);
     }
 }
