@@ -149,7 +149,7 @@ impl<'a> Trainer<'a> {
     /// is written there after every epoch.
     ///
     /// # Errors
-    /// [`Error::Config`]; [`Error::Dataset`] where rooms are too few or a label is missing throughout; [`Error::Io`].
+    /// [`Error::Config`]; [`Error::Dataset`] where rooms are too few or no clip of a partition has a label; [`Error::Io`].
     pub fn new(config: TrainConfig, dataset: &'a Dataset, folder: Option<&Path>) -> Result<Self, Error> {
         let mut config = config;
         config.network.outputs = LABEL_COUNT * if config.loss == Loss::Squared { 1 } else { 2 };
@@ -158,6 +158,14 @@ impl<'a> Trainer<'a> {
             let found = dataset.room_count(partition);
             if found < needed {
                 let fault = DatasetFault::Rooms { partition: partition.name(), found, needed };
+                return Err(Error::dataset("data set", fault));
+            }
+        }
+        // Without validation clips that have a label its intervals would not be calibrated, and look as if they were.
+        for partition in [Partition::Train, Partition::Validation] {
+            let clips = || dataset.partition(partition).iter().map(|&clip| &dataset.clips()[clip]);
+            if let Some(label) = (0..LABEL_COUNT).find(|&k| clips().all(|clip| clip.labels[k].is_nan())) {
+                let fault = DatasetFault::NoLabels { partition: partition.name(), label: label_name(label) };
                 return Err(Error::dataset("data set", fault));
             }
         }

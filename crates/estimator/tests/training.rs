@@ -105,6 +105,13 @@ fn missing_labels_are_left_out_and_a_band_without_any_is_refused() {
     support::write(folder.path(), &[("train", shard), ("validation", Shard::synthetic(4, 500, 2))]);
     let Err(Error::Dataset { fault, .. }) = train(folder.path(), None, 1, false) else { panic!() };
     assert!(matches!(*fault, DatasetFault::NoLabels { ref label, .. } if label == "T60 125 Hz"), "{fault}");
+    // Nothing would calibrate the intervals of this band.
+    let mut validation = Shard::synthetic(4, 500, 2);
+    validation.t60_s.iter_mut().step_by(7).for_each(|t| *t = f32::NAN);
+    support::write(folder.path(), &[("train", Shard::synthetic(16, 0, 1)), ("validation", validation)]);
+    let Err(Error::Dataset { fault, .. }) = train(folder.path(), None, 1, false) else { panic!() };
+    let DatasetFault::NoLabels { partition, ref label } = *fault else { panic!("{fault}") };
+    assert_eq!((partition, label.as_str()), ("validation", "T60 125 Hz"));
 }
 
 #[test]

@@ -40,6 +40,9 @@ pub struct Arguments {
     out: PathBuf,
 }
 
+/// Deviation of an octave's gain from the one wanted that goes without a warning, in dB: half of what is heard.
+const CLOSE_DB: f64 = 0.5;
+
 /// Runs the command.
 ///
 /// # Errors
@@ -64,7 +67,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     println!("  band Hz   wanted dB   realised dB");
     for ((hz, wanted), realised) in gains_db.iter().zip(filter.realised_db().values()) {
         match realised {
-            Some(realised) => println!("{hz:9} {wanted:11.2} {realised:13.2}"),
+            Some(realised) if (realised - wanted).abs() <= CLOSE_DB => {
+                println!("{hz:9} {wanted:11.2} {realised:13.2}");
+            }
+            // NaN is no gain either.
+            Some(realised) => println!("{hz:9} {wanted:11.2} {realised:13.2}   warning: not what is wanted"),
             None => println!("{hz:9} {wanted:11.2}   above half the sample rate"),
         }
     }
