@@ -1,4 +1,4 @@
-//! An effect of one's own in the catalogue: a recorder whose automatic gain swells and sinks while it records.
+//! An effect of one's own in the catalogue: a recorder whose automatic gain rises and falls while it records.
 //!
 //! The laboratory of the tests hides it in a small room; the whole catalogue and the new effect compete to explain the responses.
 //! `docs/how-to/own-effect.md` goes through it.
@@ -6,24 +6,22 @@
 use clap::Parser;
 use sabine::acoustics::MeasuredRoom;
 use sabine::diagnose::{
-    BandView, Case, DiagnoseConfig, Diagnoser, Diagnosis, Effect, Parameter, Stage, Survey, catalogue,
+    BandView, Case, DiagnoseConfig, Diagnoser, Diagnosis, Effect, EffectInfo, FittedCase, GainOverTime,
+    ModelChange, Parameter, Stage, Survey, catalogue,
 };
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
 use std::f64::consts::{LN_10, TAU};
 
 /// Gain in dB over the time of the file: a sine and a cosine of one period, alike in all octaves and responses.
 ///
-/// Mark: residuals that swell with the time of the file. Mimicked by: a cut, if less than half a period is heard.
+/// Mark: residuals that follow the time of the file. Mimicked by: a cut, if less than half a period is heard.
 #[derive(Clone, Copy)]
 struct GainDrift;
 
 impl Effect for GainDrift {
-    fn id(&self) -> &'static str {
-        "gain_drift"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "The gain swells and sinks while a response is recorded: is an automatic gain control on?"
+    fn info(&self) -> EffectInfo {
+        let text = "The gain rises and falls while a response is recorded: is an automatic gain control on?";
+        EffectInfo::new("gain_drift", "Recorder gain drifts", text)
     }
 
     fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
@@ -54,6 +52,17 @@ impl Case for GainDrift {
             let (sin, cos) = (TAU * view.file_time_s(bin) / values[2]).sin_cos();
             *ln += LN_10 / 10.0 * (values[0] * sin + values[1] * cos);
         }
+    }
+
+    /// What renders: the same gain, in steps of a 32nd of a period, until the longest file ends.
+    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+        let values = fitted.values();
+        let end_s = fitted.survey().responses().iter().map(|r| r.duration_s).fold(0.0, f64::max);
+        let steps = (32.0 * end_s / values[2]).ceil() as usize;
+        let time_s: Vec<f64> = (0..=steps).map(|k| values[2] * k as f64 / 32.0).collect();
+        let db = |t: &f64| values[0] * (TAU * t / values[2]).sin() + values[1] * (TAU * t / values[2]).cos();
+        let gain_db = time_s.iter().map(db).collect();
+        vec![ModelChange::GainOverTime(GainOverTime::new(time_s, gain_db))]
     }
 }
 

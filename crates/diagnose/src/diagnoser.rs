@@ -5,8 +5,9 @@ use crate::effect::Effect;
 use crate::effects::catalogue;
 use crate::error::Error;
 use crate::infer::baseline::Baseline;
+use crate::infer::candidates;
 use crate::infer::confirmation::confirm;
-use crate::infer::search::{self, Search};
+use crate::infer::search::Search;
 use crate::infer::selection::select;
 use crate::report::composition::compose;
 use crate::report::diagnosis::Diagnosis;
@@ -34,7 +35,7 @@ pub struct Diagnoser {
 
 impl std::fmt::Debug for Diagnoser {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let effects: Vec<&str> = self.effects.iter().map(|e| e.id()).collect();
+        let effects: Vec<&str> = self.effects.iter().map(|e| e.info().id).collect();
         f.debug_struct("Diagnoser").field("config", &self.config).field("effects", &effects).finish()
     }
 }
@@ -68,10 +69,10 @@ impl Diagnoser {
     /// # Errors
     /// [`Error::UnknownEffect`] for an identifier that none has.
     pub fn with_only(mut self, ids: &[String]) -> Result<Self, Error> {
-        if let Some(id) = ids.iter().find(|id| self.effects.iter().all(|e| e.id() != id.as_str())) {
+        if let Some(id) = ids.iter().find(|id| self.effects.iter().all(|e| e.info().id != id.as_str())) {
             return Err(Error::UnknownEffect { id: id.clone() });
         }
-        self.effects.retain(|e| ids.iter().any(|id| id == e.id()));
+        self.effects.retain(|e| ids.iter().any(|id| id == e.info().id));
         Ok(self)
     }
 
@@ -92,7 +93,7 @@ impl Diagnoser {
         let config = DiagnoseConfig { wave_solutions, ..self.config.clone() };
         let mut baseline = Baseline::new(room, &held, &config, &self.tracer, observer)?;
         let used = baseline.observations.fitted.clone();
-        let cases = search::cases(&self.effects, baseline.survey());
+        let cases = candidates::cases(&self.effects, baseline.survey());
 
         let started = Instant::now();
         baseline.calibrate_dispersion(&[], &used)?;

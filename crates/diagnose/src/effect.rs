@@ -1,8 +1,16 @@
 //! A named physical cause of a misfit, and the cases in which it can come.
 
-use crate::extend::extended_model::Dimensions;
+pub(crate) mod fitted_case;
+pub(crate) mod info;
+pub(crate) mod next_measurement;
+pub(crate) mod reflection_gate;
+
+pub use fitted_case::FittedCase;
+pub use info::EffectInfo;
+
+use crate::effect::reflection_gate::ReflectionGate;
+use crate::extend::model_change::ModelChange;
 use crate::likelihood::multilateration::UnassignedPeaks;
-use crate::likelihood::reflection_gates::ReflectionGate;
 use crate::observe::pre_arrival::PreArrival;
 use crate::report::diagnosis::FoundParameter;
 use crate::simulate::views::{ArrivalView, BandView};
@@ -53,7 +61,7 @@ impl Parameter {
     }
 }
 
-/// Something that every fit leaves open within a prior, and whose prior an effect may widen.
+/// Nuisance parameter. Fitted under its prior in every model; an effect may relax that prior.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Nuisance {
@@ -129,11 +137,13 @@ pub struct AddedReflection {
 /// To add one, implement this and [`Case`], and hand it to [`Diagnoser::with_effects`](crate::Diagnoser::with_effects) beside
 /// [`catalogue`](crate::catalogue).
 pub trait Effect: Send + Sync {
-    /// Identifier in the catalogue.
-    fn id(&self) -> &'static str;
+    /// Identifier, title, explanation, and the measurement that tells it apart from others.
+    fn info(&self) -> EffectInfo;
 
-    /// One sentence for people: what is the matter.
-    fn explanation(&self) -> &'static str;
+    /// Its identifier.
+    fn id(&self) -> &'static str {
+        self.info().id
+    }
 
     /// The cases in which it may come: one for each receiver, material, response ..., or a single one. None if it cannot be at
     /// work here.
@@ -203,11 +213,6 @@ pub trait Case: Send + Sync {
         Vec::new()
     }
 
-    /// The flat surface (index among [`Survey::planes`]) in which it is.
-    fn plane(&self) -> Option<usize> {
-        None
-    }
-
     /// Whether single reflections weigh it: then [`Case::among_reflections`] says how much.
     fn weighs_reflections(&self) -> bool {
         false
@@ -223,18 +228,14 @@ pub trait Case: Send + Sync {
         None
     }
 
-    /// Kelvin by which the air is warmer than stated: once the case is named, paths are taken at that temperature.
-    fn warmer_by_k(&self, _values: &[f64], _survey: &Survey) -> f64 {
-        0.0
-    }
-
-    /// Size of the room: once the case is named, it is traced anew at this size.
-    fn resized(&self, _values: &[f64]) -> Option<Dimensions> {
-        None
-    }
-
     /// Priors that it relaxes, with their new standard deviation.
     fn relaxes(&self) -> Vec<(Nuisance, f64)> {
+        Vec::new()
+    }
+
+    /// What it changes in the model once it is named: changes of temperature, dimensions and positions are traced again, and the extended
+    /// model renders all of them. A case without any is named, not rendered.
+    fn model_changes(&self, _fitted: &FittedCase<'_>) -> Vec<ModelChange> {
         Vec::new()
     }
 

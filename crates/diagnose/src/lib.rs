@@ -2,9 +2,16 @@
 //! the gain at positions that it has not seen.
 //!
 //! # Where it stands
-//! At the end of the workspace, after `acoustics` (rooms, responses), `propagate` (paths) and `optimize`. [`Diagnoser`] takes a
+//! At the end of the workspace, after the crates of rooms, responses and paths. [`Diagnoser`] takes a
 //! [`MeasuredRoom`](sabine_acoustics::MeasuredRoom) and returns a [`Diagnosis`]: a [`Verdict`], the [`Cause`]s with parameters and 90 %
-//! intervals, what cannot be told apart and which measurement would decide, and an [`ExtendedModel`] that renders.
+//! intervals, which causes cannot be told apart and which measurement would decide, and an [`ExtendedModel`] that renders. As a
+//! document ([`serde::Serialize`]) a diagnosis has the keys that `docs/versioning.md` promises.
+//!
+//! # Seams
+//! - [`Effect`] and [`Case`]: a cause of one's own, with its texts ([`EffectInfo`]) and what it changes in the model ([`ModelChange`]):
+//!   what is named with changes is traced again and rendered, whoever wrote it.
+//! - [`SceneTracer`]: another tracer ([`Diagnoser::with_tracer`]); [`EachScene`] makes one of any
+//!   [`Propagator`](sabine_acoustics::Propagator).
 //!
 //! # How
 //! Decays are compared as energy in octaves and time bins, relative to the direct sound; each bin with the spread that interference of
@@ -47,9 +54,11 @@
 //! | hidden effects are named, null rooms are not | `tests/hidden_effects.rs` |
 //! | harmonics before the direct sound are found, noise there is not taken for them | `tests/hidden_distortion.rs` |
 //! | panels and holes are found and located | `tests/hidden_surfaces.rs` |
-//! | evidence and bounds of the fit against closed forms | unit tests of the fit |
-//! | spread, groups of paths, octave shares against closed forms | unit tests of their modules |
-//! | what bends around a screen is found in finite differences of the wave equation, and not where sound goes straight | `tests/hidden_edges.rs` |
+//! | evidence and bounds of the fit against closed forms | unit tests of `likelihood/laplace.rs` |
+//! | gradients of both likelihoods against central differences | unit tests of `likelihood/decay.rs`, `likelihood/arrivals.rs` |
+//! | any tracer serves | `tests/any_tracer.rs` |
+//! | variances, groups of paths, octave shares against closed forms | unit tests of their modules |
+//! | diffraction around a screen is found in finite differences of the wave equation, and not where sound goes straight | `tests/hidden_edges.rs` |
 //! | rendering from the extended model against closed forms | `tests/rendering.rs` |
 //!
 //! `docs/validation/diagnose.md` has the figures, `cargo run --release -p sabine-validation --bin effect_atlas` makes them.
@@ -78,19 +87,24 @@ mod survey;
 
 pub use config::DiagnoseConfig;
 pub use diagnoser::Diagnoser;
-pub use effect::{AddedReflection, AuxiliaryEvidence, Case, Effect, Nuisance, Observable, Parameter, Stage};
+pub use effect::info::discriminating_measurement;
+pub use effect::next_measurement::NextMeasurement;
+pub use effect::reflection_gate::ReflectionGate;
+pub use effect::{
+    AddedReflection, AuxiliaryEvidence, Case, Effect, EffectInfo, FittedCase, Nuisance, Observable,
+    Parameter, Stage,
+};
 pub use effects::*;
 pub use error::Error;
-pub use extend::extended_model::{CoupledDecay, Dimensions, ExtendedModel, ThinPanel};
+pub use extend::extended_model::{CoupledDecay, Dimensions, ExtendedModel, GainOverTime, ThinPanel};
 pub use extend::extended_room::ExtendedRoom;
+pub use extend::model_change::ModelChange;
 pub use likelihood::multilateration::{UnassignedPeak, UnassignedPeaks};
-pub use likelihood::reflection_gates::ReflectionGate;
 pub use observe::pre_arrival::PreArrival;
 pub use report::diagnosis::{
     CandidateScore, Cause, DecayCurves, Diagnosis, FittedMaterial, FoundParameter, HeldOut, HeldOutGain,
     Isolability, LackOfFit, ResidualCell, Verdict,
 };
-pub use report::next_measurement::{NextMeasurement, discriminating_measurement};
 pub use simulate::scene_tracer::{EachScene, PreparedTracer, SceneTracer};
 pub use simulate::views::{ArrivalView, BandView};
 pub use survey::planes::Plane;

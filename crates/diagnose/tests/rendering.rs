@@ -310,3 +310,26 @@ fn octaves_above_half_the_sample_rate_are_left_alone() {
     assert!(samples.samples().iter().all(|s| s.is_finite()) && samples.peak() > 0.0);
     assert!(encode_wav(&Signal::from(samples), SampleFormat::Float32).is_ok());
 }
+
+#[test]
+fn a_gain_over_time_acts_on_the_time_of_the_file() {
+    let mut pulses = vec![0.0; 32_000];
+    for at in [3200, 9600, 16_000, 28_800] {
+        pulses[at] = 1.0;
+    }
+    let model = "[gain_over_time]\ntime_s = [0.2, 0.4, 0.6]\ngain_db = [-6, 0, 12]\n";
+    let found = finished(model, pulses);
+    // Before the first instant, halfway, halfway, after the last.
+    for (at, gain_db) in [(3200, -6.0), (9600, -3.0), (16_000, 6.0), (28_800, 12.0)] {
+        assert!((20.0 * f64::from(found[at]).log10() - gain_db).abs() < 1e-3, "{at}: {}", found[at]);
+    }
+    for (field, wrong) in [
+        ("gain_over_time.gain_db", "time_s = [0.2, 0.4]\ngain_db = [1]"),
+        ("gain_over_time.time_s", "time_s = [0.4, 0.2]\ngain_db = [1, 2]"),
+        ("gain_over_time.gain_db", "time_s = []\ngain_db = []"),
+    ] {
+        let (_folder, path) = in_file(&format!("[gain_over_time]\n{wrong}\n"));
+        let error = ExtendedModel::read(path).unwrap_err().to_string();
+        assert!(error.contains(field), "{error}");
+    }
+}

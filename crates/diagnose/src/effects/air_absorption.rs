@@ -1,6 +1,10 @@
 //! `air_absorption`: the air was drier or moister than the room file says.
 
+use crate::effect::EffectInfo;
+use crate::effect::FittedCase;
+use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, Effect, Parameter};
+use crate::extend::model_change::ModelChange;
 use crate::simulate::views::BandView;
 use crate::survey::Survey;
 use sabine_acoustics::Air;
@@ -17,12 +21,16 @@ const DRIEST_PERCENT: f64 = 3.0;
 const MOISTEST_PERCENT: f64 = 98.0;
 
 impl Effect for AirAbsorption {
-    fn id(&self) -> &'static str {
-        "air_absorption"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "The air swallowed more or less than the stated climate says: its humidity was another one."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "air_absorption",
+            "Air drier or more humid than stated",
+            "Air attenuation does not match the stated temperature and humidity.",
+        )
+        .against(&[
+            ("surface_absorption", NextMeasurement::OtherHumidity),
+            ("scattering", NextMeasurement::OtherHumidity),
+        ])
     }
 
     fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
@@ -56,5 +64,9 @@ impl Case for AirAbsorption {
         for (bin, l) in ln_energy.iter_mut().enumerate() {
             *l += per_s * view.time_s(bin);
         }
+    }
+
+    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+        vec![ModelChange::RelativeHumidity(fitted.values()[0])]
     }
 }

@@ -1,5 +1,7 @@
 //! `angle_dependent_absorption`: walls absorb by the angle at which sound meets them.
 
+use crate::effect::EffectInfo;
+use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, Effect, Parameter};
 use crate::simulate::views::BandView;
 use crate::survey::Survey;
@@ -19,12 +21,13 @@ use crate::survey::Survey;
 pub struct AngleDependentAbsorption;
 
 impl Effect for AngleDependentAbsorption {
-    fn id(&self) -> &'static str {
-        "angle_dependent_absorption"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "The walls absorb by the angle at which sound meets them, as locally reacting ones do; the tables are for sound from everywhere."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "angle_dependent_absorption",
+            "Absorption depends on the angle of incidence",
+            "The walls absorb as locally reacting surfaces do: absorption depends on the angle of incidence, whereas the tables hold for random incidence.",
+        )
+        .decided_by(10, NextMeasurement::AlongWalls)
     }
 
     fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {

@@ -1,7 +1,11 @@
 //! `background_noise`: sound that was there without the source.
 
 use super::add_energy;
+use crate::effect::EffectInfo;
+use crate::effect::FittedCase;
+use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, Effect, Parameter, Stage};
+use crate::extend::model_change::ModelChange;
 use crate::simulate::views::BandView;
 use crate::survey::Survey;
 
@@ -15,12 +19,14 @@ use crate::survey::Survey;
 pub struct BackgroundNoise;
 
 impl Effect for BackgroundNoise {
-    fn id(&self) -> &'static str {
-        "background_noise"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "Noise that has nothing to do with the loudspeaker fills the end of the responses."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "background_noise",
+            "Background noise",
+            "Noise that does not come from the loudspeaker fills the end of the responses.",
+        )
+        .against(&[("coupled_volume", NextMeasurement::LouderAndLonger)])
+        .decided_by(1, NextMeasurement::LongerWithSilence)
     }
 
     fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
@@ -49,5 +55,10 @@ impl Case for BackgroundNoise {
     fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
         let noise = view.reference_energy() * 10f64.powf(values[view.band()] / 10.0);
         ln_energy.iter_mut().for_each(|l| *l = add_energy(*l, noise));
+    }
+
+    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+        let level = |b: usize| fitted.level_per_s(b).unwrap_or(0.0) * 10f64.powf(fitted.values()[b] / 10.0);
+        vec![ModelChange::Noise(fitted.per_band(level))]
     }
 }

@@ -1,6 +1,10 @@
 //! `channel_fault`: one channel is wrong.
 
+use crate::effect::EffectInfo;
+use crate::effect::FittedCase;
+use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, Effect, Nuisance, Observable, Parameter};
+use crate::extend::model_change::ModelChange;
 use crate::survey::Survey;
 use sabine_acoustics::Levels;
 
@@ -14,12 +18,13 @@ pub struct ChannelFault;
 const OPEN_SD_DB: f64 = 10.0;
 
 impl Effect for ChannelFault {
-    fn id(&self) -> &'static str {
-        "channel_fault"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "One microphone channel has the wrong polarity or gain, or two were exchanged."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "channel_fault",
+            "Fault of one channel",
+            "One microphone channel has the wrong polarity or gain, or two channels were exchanged.",
+        )
+        .decided_by(8, NextMeasurement::ExchangedChannel)
     }
 
     fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {
@@ -63,6 +68,10 @@ impl Case for Polarity {
     fn inverted(&self) -> Option<usize> {
         Some(self.response)
     }
+
+    fn model_changes(&self, _: &FittedCase<'_>) -> Vec<ModelChange> {
+        vec![ModelChange::Inverted(self.name.clone())]
+    }
 }
 
 struct Gain {
@@ -81,6 +90,12 @@ impl Case for Gain {
 
     fn relaxes(&self) -> Vec<(Nuisance, f64)> {
         vec![(Nuisance::ResponseGain(self.response), OPEN_SD_DB)]
+    }
+
+    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+        let gain_db = fitted.relaxed(Nuisance::ResponseGain(self.response)).and_then(|g| g.first().copied());
+        let response = self.name.clone();
+        gain_db.map(|gain_db| ModelChange::ResponseGain { response, gain_db }).into_iter().collect()
     }
 }
 
@@ -104,5 +119,11 @@ impl Case for Exchange {
 
     fn exchanged(&self) -> Option<(usize, usize)> {
         Some(self.responses)
+    }
+
+    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+        let (a, b) = self.responses;
+        let name = |r: usize| fitted.survey().responses()[r].name.clone();
+        vec![ModelChange::Exchanged([name(a), name(b)])]
     }
 }

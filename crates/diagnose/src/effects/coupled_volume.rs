@@ -1,8 +1,12 @@
 //! `coupled_volume`: a neighbouring room gives back what it has stored.
 
 use super::add_energy;
+use crate::effect::EffectInfo;
+use crate::effect::FittedCase;
+use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, Effect, Parameter, Stage};
-use crate::extend::extended_model::BUILD_UP_S;
+use crate::extend::extended_model::{BUILD_UP_S, CoupledDecay};
+use crate::extend::model_change::ModelChange;
 use crate::simulate::views::BandView;
 use crate::survey::Survey;
 
@@ -17,12 +21,14 @@ use crate::survey::Survey;
 pub struct CoupledVolume;
 
 impl Effect for CoupledVolume {
-    fn id(&self) -> &'static str {
-        "coupled_volume"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "A second space (corridor, ceiling void, next room) rings on after the room itself has died away."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "coupled_volume",
+            "Coupled volume (double-slope decay)",
+            "A coupled volume (corridor, ceiling void, next room) keeps sounding after the room itself has decayed.",
+        )
+        .against(&[("background_noise", NextMeasurement::LouderAndLonger)])
+        .decided_by(0, NextMeasurement::DoorsClosed)
     }
 
     fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
@@ -72,5 +78,22 @@ impl Case for CoupledVolume {
             let energy = level * built * (-6.0 * std::f64::consts::LN_10 * time_s / decay_s).exp();
             *l = add_energy(*l, energy);
         }
+    }
+
+    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+        let (values, survey) = (fitted.values(), fitted.survey());
+        let octaves = |b: usize| survey.octaves_from_1khz(b);
+        let level = |b: usize| {
+            fitted.level_per_s(b).unwrap_or(0.0) * 10f64.powf((values[0] + values[1] * octaves(b)) / 10.0)
+        };
+        let receivers = survey.receivers().len() as f64;
+        vec![ModelChange::CoupledVolume(CoupledDecay {
+            energy_per_s: fitted.per_band(level),
+            decay_time_s: fitted.per_band(|b| (values[2] * (values[3] * octaves(b)).exp()).clamp(0.1, 20.0)),
+            gradient_db_per_m: [values[4], values[5], values[6]],
+            centre_m: std::array::from_fn(|k| {
+                survey.receivers().iter().map(|r| r.position_m[k]).sum::<f64>() / receivers
+            }),
+        })]
     }
 }

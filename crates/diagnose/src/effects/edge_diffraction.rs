@@ -1,7 +1,10 @@
 //! `edge_diffraction`: sound bends around edges into the shadow, and the simulation does not.
 
 use super::add_energy;
+use crate::effect::EffectInfo;
+use crate::effect::FittedCase;
 use crate::effect::{Case, Effect, Parameter};
+use crate::extend::model_change::ModelChange;
 use crate::simulate::views::BandView;
 use crate::survey::Survey;
 
@@ -26,12 +29,12 @@ const THEORY_SD_DB: f64 = 2.5;
 const LEVEL_DB: (f64, f64) = (-40.0, 10.0);
 
 impl Effect for MissingDiffraction {
-    fn id(&self) -> &'static str {
-        "edge_diffraction"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "Sound bends around edges into the shadow; the simulation lets it go straight only."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "edge_diffraction",
+            "Diffraction at edges",
+            "Sound is diffracted around edges into the shadow; the simulation has no diffraction.",
+        )
     }
 
     fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {
@@ -52,5 +55,9 @@ impl Case for MissingDiffraction {
                 *l = add_energy(*l, level * diffracted);
             }
         }
+    }
+
+    fn model_changes(&self, _: &FittedCase<'_>) -> Vec<ModelChange> {
+        vec![ModelChange::Diffraction]
     }
 }

@@ -1,7 +1,12 @@
 //! `extra_reflector`: a flat surface that the mesh does not have.
 
+use crate::effect::EffectInfo;
+use crate::effect::FittedCase;
+use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{AddedReflection, Case, Effect, Observable, Parameter};
-use crate::likelihood::multilateration::{UnassignedPeaks, mirrored};
+use crate::extend::extended_model::ThinPanel;
+use crate::extend::model_change::ModelChange;
+use crate::likelihood::multilateration::{UnassignedPeaks, mirrored, panel_axes};
 use crate::survey::Survey;
 
 /// One plane more: a table, a screen, a cabinet. It is found by where it mirrors the first source (the image of any other source follows).
@@ -22,16 +27,19 @@ pub struct ExtraReflector;
 const IMAGE_SD_M: f64 = 2.0;
 /// Farthest image along an axis, in metres.
 const FARTHEST_M: f64 = 20.0;
+/// The panel reaches beyond the outermost places where it was seen to reflect, in metres.
+const MARGIN_M: f64 = 0.25;
 /// Usual reflectance and its spread, in dB.
 const REFLECTANCE_DB: (f64, f64) = (-3.0, 3.0);
 
 impl Effect for ExtraReflector {
-    fn id(&self) -> &'static str {
-        "extra_reflector"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "A flat surface stands in the room that its model lacks: a table, a screen, a cabinet."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "extra_reflector",
+            "A reflecting surface that the model lacks",
+            "A flat surface in the room is missing from the model: a table, a screen, a cabinet.",
+        )
+        .decided_by(12, NextMeasurement::ObjectsRemoved)
     }
 
     fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {
@@ -82,4 +90,35 @@ impl Case for ExtraReflector {
             level_db: values[3] + 20.0 * (direct_m / way.length_m).log10(),
         })
     }
+
+    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+        panel(fitted).map(ModelChange::Panel).into_iter().collect()
+    }
+}
+
+/// The panel spans the places at which it was seen to reflect, and a little more.
+fn panel(fitted: &FittedCase<'_>) -> Option<ThinPanel> {
+    let (survey, values) = (fitted.survey(), fitted.values());
+    let first = first_m(survey);
+    let image = [values[0], values[1], values[2]];
+    let axes = panel_axes(first, image);
+    let middle: [f64; 3] = std::array::from_fn(|k| 0.5 * (first[k] + image[k]));
+    let mut reach = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+    for response in fitted.confirmed_responses().iter().map(|&r| &survey.responses()[r]) {
+        let source = survey.sources()[response.source].position_m;
+        let receiver = survey.receivers()[response.receiver].position_m;
+        let Some(way) = mirrored(first, image, source, receiver, survey.box_m()) else { continue };
+        for (extent, axis) in reach.iter_mut().zip(axes) {
+            let x: f64 = (0..3).map(|k| axis[k] * (way.place_m[k] - middle[k])).sum();
+            *extent = [extent[0].min(x), extent[1].max(x)];
+        }
+    }
+    if reach.iter().any(|[low, high]| low > high) {
+        return None;
+    }
+    let at = reach.map(|[low, high]| 0.5 * (low + high));
+    let centre = std::array::from_fn(|k| middle[k] + at[0] * axes[0][k] + at[1] * axes[1][k]);
+    let half_m = reach.map(|[low, high]| 0.5 * (high - low) + MARGIN_M);
+    let absorption = (1.0 - 10f64.powf(values[3] / 10.0)).clamp(0.0, 1.0);
+    Some(ThinPanel::rectangle(centre, axes, half_m, absorption))
 }

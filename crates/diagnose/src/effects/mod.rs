@@ -76,3 +76,38 @@ fn add_energy(ln_energy: f64, more: f64) -> f64 {
     let (high, low) = if ln_energy > ln_more { (ln_energy, ln_more) } else { (ln_more, ln_energy) };
     high + (low - high).exp().ln_1p()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::info::discriminating_measurement;
+    use crate::effect::next_measurement::NextMeasurement;
+
+    #[test]
+    fn every_effect_has_an_identifier_and_a_title_of_its_own() {
+        let infos: Vec<_> = catalogue().iter().map(|e| e.info()).collect();
+        for (i, a) in infos.iter().enumerate() {
+            assert!(a.explanation.ends_with('.') && !a.title.ends_with('.'), "{}", a.id);
+            assert!(a.id.chars().all(|c| c.is_ascii_lowercase() || c == '_'), "{}", a.id);
+            assert!(infos[..i].iter().all(|b| a.id != b.id && a.title != b.title), "{}", a.id);
+            for (other, _) in a.against {
+                assert!(infos.iter().any(|b| b.id == *other), "{} against {other}", a.id);
+            }
+        }
+    }
+
+    #[test]
+    fn what_decides_between_two_effects_does_not_depend_on_their_order() {
+        let infos: Vec<_> = catalogue().iter().map(|e| e.info()).collect();
+        for a in &infos {
+            for b in &infos {
+                let measurement = discriminating_measurement(a, b);
+                assert_eq!(measurement, discriminating_measurement(b, a), "{} {}", a.id, b.id);
+            }
+        }
+        let decides = |a: &dyn Effect, b: &dyn Effect| discriminating_measurement(&a.info(), &b.info());
+        assert_eq!(decides(&CoupledVolume, &BackgroundNoise), NextMeasurement::LouderAndLonger);
+        assert_eq!(decides(&BackgroundNoise, &Truncation), NextMeasurement::LongerWithSilence);
+        assert_eq!(decides(&MissingDiffraction, &SurfaceAbsorption), NextMeasurement::MorePositionsAndSource);
+    }
+}

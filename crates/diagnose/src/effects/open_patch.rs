@@ -1,7 +1,12 @@
 //! `open_patch`: a wall has a hole.
 
+use crate::effect::EffectInfo;
+use crate::effect::FittedCase;
+use crate::effect::next_measurement::NextMeasurement;
+use crate::effect::reflection_gate::ReflectionGate;
 use crate::effect::{AuxiliaryEvidence, Case, Effect, Parameter};
-use crate::likelihood::reflection_gates::ReflectionGate;
+use crate::extend::extended_model::ThinPanel;
+use crate::extend::model_change::ModelChange;
 use crate::report::diagnosis::FoundParameter;
 use crate::simulate::views::BandView;
 use crate::survey::Survey;
@@ -26,6 +31,8 @@ pub struct OpenPatch;
 const AREA_SD_M2: f64 = 2.0;
 /// Share of a surface that may be open at most.
 const MAX_SHARE: f64 = 0.7;
+/// The panel that stands for a hole lies so far before its wall, in metres.
+const BEFORE_WALL_M: f64 = 5e-3;
 /// Half the blur of an edge in metres.
 const EDGE_M: f64 = 0.15;
 /// Steps of the centre along each side of the surface.
@@ -37,12 +44,13 @@ const AREAS_M2: [f64; 12] = [0.3, 0.5, 0.75, 1.0, 1.4, 1.8, 2.3, 2.9, 3.6, 4.4, 
 const TAIL: f64 = 0.05;
 
 impl Effect for OpenPatch {
-    fn id(&self) -> &'static str {
-        "open_patch"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "A part of a wall is open (a door, a window, a niche): sound that meets it does not come back."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "open_patch",
+            "An opening in a wall",
+            "Part of a wall is open (a door, a window, a niche): sound that meets it does not return.",
+        )
+        .decided_by(11, NextMeasurement::PatchClosed)
     }
 
     fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {
@@ -81,10 +89,6 @@ impl Case for OneWall {
         for (bin, l) in ln_energy.iter_mut().enumerate() {
             *l += view.reflection_reweighting(bin, self.plane.material, (1.0 - open).ln());
         }
-    }
-
-    fn plane(&self) -> Option<usize> {
-        Some(self.index)
     }
 
     fn weighs_reflections(&self) -> bool {
@@ -158,6 +162,25 @@ impl Case for OneWall {
             parameters.push(interval(&format!("centre_{axis}"), "m", all.iter().map(along).zip(&weights)));
         }
         Some(AuxiliaryEvidence { nats, parameters })
+    }
+
+    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+        let survey = fitted.survey();
+        let inside = survey.responses().first().map(|r| survey.sources()[r.source].position_m);
+        inside.and_then(|inside| self.hole(inside, fitted)).map(ModelChange::Panel).into_iter().collect()
+    }
+}
+
+impl OneWall {
+    /// The hole: a square panel that absorbs everything, just before its wall on the side of `inside`.
+    fn hole(&self, inside: [f64; 3], fitted: &FittedCase<'_>) -> Option<ThinPanel> {
+        let centre = [fitted.found("centre_x")?, fitted.found("centre_y")?, fitted.found("centre_z")?];
+        let [normal, along, across] = self.plane.axes;
+        let towards: f64 = (0..3).map(|k| normal[k] * (inside[k] - centre[k])).sum();
+        let off = BEFORE_WALL_M * towards.signum();
+        let half = 0.5 * fitted.found("area")?.max(0.0).sqrt();
+        let before = std::array::from_fn(|k| centre[k] + off * normal[k]);
+        Some(ThinPanel::rectangle(before, [along, across], [half; 2], 1.0))
     }
 }
 

@@ -1,6 +1,10 @@
 //! `position_error`: a source or receiver stood elsewhere.
 
+use crate::effect::EffectInfo;
+use crate::effect::FittedCase;
+use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, Effect, Nuisance, Observable, Parameter};
+use crate::extend::model_change::ModelChange;
 use crate::survey::Survey;
 
 /// One place is not where the room file says: the prior of its position is opened along all axes.
@@ -14,12 +18,13 @@ pub struct PositionError;
 const OPEN_SD_M: f64 = 0.3;
 
 impl Effect for PositionError {
-    fn id(&self) -> &'static str {
-        "position_error"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "A loudspeaker or microphone stood elsewhere than the room file says."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "position_error",
+            "Wrong source or receiver position",
+            "A loudspeaker or microphone was not at the position that the room file states.",
+        )
+        .decided_by(5, NextMeasurement::Distances)
     }
 
     fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {
@@ -53,5 +58,17 @@ impl Case for OnePlace {
 
     fn relaxes(&self) -> Vec<(Nuisance, f64)> {
         vec![(self.place, OPEN_SD_M)]
+    }
+
+    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+        let survey = fitted.survey();
+        let stated = match self.place {
+            Nuisance::SourcePosition(i) => &survey.sources()[i],
+            Nuisance::ReceiverPosition(i) => &survey.receivers()[i],
+            Nuisance::Absorption(_) | Nuisance::ResponseGain(_) => return Vec::new(),
+        };
+        let Some(offset_m) = fitted.relaxed(self.place) else { return Vec::new() };
+        let position_m = std::array::from_fn(|k| stated.position_m[k] + offset_m[k]);
+        vec![ModelChange::Position { id: stated.id.clone(), position_m }]
     }
 }

@@ -1,7 +1,11 @@
 //! `room_dimensions`: the room is longer, wider or higher than its model.
 
+use crate::effect::EffectInfo;
+use crate::effect::FittedCase;
+use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, Effect, Observable, Parameter};
 use crate::extend::extended_model::Dimensions;
+use crate::extend::model_change::ModelChange;
 use crate::simulate::views::ArrivalView;
 use crate::survey::Survey;
 
@@ -19,12 +23,13 @@ pub struct RoomDimensions;
 const START_PERCENT: f64 = 2.5;
 
 impl Effect for RoomDimensions {
-    fn id(&self) -> &'static str {
-        "room_dimensions"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "Walls, floor or ceiling stand elsewhere than in the model."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "room_dimensions",
+            "Wrong room dimensions",
+            "Walls, floor or ceiling are not where the model has them.",
+        )
+        .decided_by(6, NextMeasurement::Distances)
     }
 
     fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
@@ -62,13 +67,6 @@ impl Case for RoomDimensions {
         starts
     }
 
-    fn resized(&self, values: &[f64]) -> Option<Dimensions> {
-        Some(Dimensions {
-            scale: std::array::from_fn(|k| 1.0 + 0.01 * values[k]),
-            shift_m: std::array::from_fn(|k| values[3 + k]),
-        })
-    }
-
     fn delay_s(&self, values: &[f64], arrival: &ArrivalView<'_>) -> f64 {
         let survey = arrival.survey();
         let [low, high] = survey.box_m();
@@ -87,5 +85,11 @@ impl Case for RoomDimensions {
             })
             .sum();
         longer_m / arrival.speed_m_s()
+    }
+
+    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+        let values = fitted.values();
+        let scale = std::array::from_fn(|k| 1.0 + 0.01 * values[k]);
+        vec![ModelChange::Dimensions(Dimensions::new(scale, std::array::from_fn(|k| values[3 + k])))]
     }
 }

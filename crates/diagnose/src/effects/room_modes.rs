@@ -1,6 +1,10 @@
 //! `room_modes`: standing waves in the lowest octaves.
 
+use crate::effect::EffectInfo;
+use crate::effect::FittedCase;
+use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, Effect, Parameter};
+use crate::extend::model_change::ModelChange;
 use crate::simulate::views::BandView;
 use crate::survey::Survey;
 
@@ -30,12 +34,13 @@ const LEFT_TO_CHANCE: (f64, f64) = (0.03, 1.0);
 pub struct RoomModes;
 
 impl Effect for RoomModes {
-    fn id(&self) -> &'static str {
-        "room_modes"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "In the lowest octaves the room is one of standing waves: where paths leave it to chance, the wave equation says how loud it is."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "room_modes",
+            "Room modes in the lowest octaves",
+            "Room modes dominate the lowest octaves: the wave equation predicts their levels, ray paths do not.",
+        )
+        .decided_by(13, NextMeasurement::OtherSourcePlace)
     }
 
     fn needs_waves(&self) -> bool {
@@ -73,5 +78,10 @@ impl Case for RoomModes {
                 *v *= 1.0 - predicted * (-(turn_per_s * view.time_s(bin)).powi(2)).exp();
             }
         }
+    }
+
+    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+        let highest = fitted.survey().bands_of_modes.checked_sub(1);
+        highest.map(|b| ModelChange::WaveBelow(fitted.survey().bands().edges_hz(b).1)).into_iter().collect()
     }
 }

@@ -1,6 +1,10 @@
 //! `sampling_clock`: player and recorder do not count seconds alike.
 
+use crate::effect::EffectInfo;
+use crate::effect::FittedCase;
+use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, Effect, Observable, Parameter};
+use crate::extend::model_change::ModelChange;
 use crate::simulate::views::ArrivalView;
 use crate::survey::Survey;
 
@@ -12,12 +16,13 @@ use crate::survey::Survey;
 pub struct SamplingClock;
 
 impl Effect for SamplingClock {
-    fn id(&self) -> &'static str {
-        "sampling_clock"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "The recorder's sampling clock runs fast or slow against the player's."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "sampling_clock",
+            "Sampling clock off",
+            "The sampling clock of the recorder runs fast or slow against that of the player.",
+        )
+        .against(&[("sound_speed", NextMeasurement::ClockOrThermometer)])
     }
 
     fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
@@ -36,5 +41,9 @@ impl Case for SamplingClock {
 
     fn delay_s(&self, values: &[f64], arrival: &ArrivalView<'_>) -> f64 {
         arrival.time_s() * values[0] * 1e-6
+    }
+
+    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+        vec![ModelChange::Clock(fitted.values()[0])]
     }
 }

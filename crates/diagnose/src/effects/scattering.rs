@@ -1,8 +1,14 @@
 //! `scattering`: the surfaces are rougher (or smoother) than the room file says.
 
+use crate::effect::EffectInfo;
+use crate::effect::FittedCase;
+use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, Effect, Parameter};
+use crate::extend::model_change::ModelChange;
+use crate::simulate::traced_pair::scattering_more;
 use crate::simulate::views::BandView;
 use crate::survey::Survey;
+use sabine_acoustics::Material;
 
 /// All surfaces scatter a share more of what they now reflect specularly (or, below zero, less of what they scatter), with one
 /// slope over frequency.
@@ -15,12 +21,14 @@ use crate::survey::Survey;
 pub struct Scattering;
 
 impl Effect for Scattering {
-    fn id(&self) -> &'static str {
-        "scattering"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "The surfaces (or furniture that the model leaves out) scatter sound more or less than stated."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "scattering",
+            "Scattering differs from the model",
+            "The surfaces, or furniture that the model omits, scatter more or less sound than stated.",
+        )
+        .against(&[("air_absorption", NextMeasurement::OtherHumidity)])
+        .decided_by(14, NextMeasurement::MorePositions)
     }
 
     fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
@@ -54,6 +62,18 @@ impl Case for Scattering {
         for (bin, v) in variance.iter_mut().enumerate() {
             *v += view.scattering_variance(bin, extra);
         }
+    }
+
+    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+        let (values, survey) = (fitted.values(), fitted.survey());
+        let scattered = |m: &Material| {
+            fitted.per_band(|b| {
+                let extra = (values[0] + values[1] * survey.octaves_from_1khz(b)).clamp(-1.0, 0.95);
+                scattering_more(m, extra).map_or(0.0, |m| m.scattering().values()[b])
+            })
+        };
+        let all = survey.materials().iter().zip(fitted.materials());
+        vec![ModelChange::Scattering(all.map(|(name, m)| (name.clone(), scattered(m))).collect())]
     }
 }
 

@@ -1,6 +1,10 @@
 //! `sound_speed`: the room was warmer or colder than the room file says.
 
+use crate::effect::EffectInfo;
+use crate::effect::FittedCase;
+use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, Effect, Observable, Parameter};
+use crate::extend::model_change::ModelChange;
 use crate::simulate::views::ArrivalView;
 use crate::survey::Survey;
 use sabine_acoustics::Air;
@@ -15,12 +19,14 @@ use sabine_acoustics::Air;
 pub struct SoundSpeed;
 
 impl Effect for SoundSpeed {
-    fn id(&self) -> &'static str {
-        "sound_speed"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "Sound travelled faster or slower than at the stated temperature."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "sound_speed",
+            "Air warmer or colder than stated",
+            "The speed of sound does not match the stated temperature.",
+        )
+        .against(&[("sampling_clock", NextMeasurement::ClockOrThermometer)])
+        .decided_by(7, NextMeasurement::Distances)
     }
 
     fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
@@ -38,10 +44,6 @@ impl Case for SoundSpeed {
         vec![Parameter::new("temperature", "deg C", stated, 5.0, (-20.0, 50.0)).typically(stated + 3.0)]
     }
 
-    fn warmer_by_k(&self, values: &[f64], survey: &Survey) -> f64 {
-        values[0] - survey.air().temperature_c()
-    }
-
     fn delay_s(&self, values: &[f64], arrival: &ArrivalView<'_>) -> f64 {
         let stated = arrival.pair().air;
         let change = values[0] - arrival.survey().air().temperature_c();
@@ -50,5 +52,9 @@ impl Case for SoundSpeed {
             Ok(air) => arrival.length_m() / air.speed_of_sound_m_s() - arrival.time_s(),
             Err(_) => 0.0,
         }
+    }
+
+    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+        vec![ModelChange::Temperature(fitted.values()[0])]
     }
 }

@@ -1,8 +1,12 @@
 //! `source_directivity`: the source does not radiate alike in all directions.
 
+use crate::effect::EffectInfo;
+use crate::effect::FittedCase;
+use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, Effect, Parameter};
+use crate::extend::model_change::ModelChange;
 use crate::simulate::views::BandView;
-use crate::survey::Survey;
+use crate::survey::{Place, Survey};
 
 /// A pattern of first order, 1 - d + d cos(angle to the axis), d rising by so much an octave; radiated power as without it.
 /// The axis is the room file's; where it states none, azimuth (from x towards y) and elevation are fitted, all directions being as
@@ -25,12 +29,13 @@ const STARTS_DEG: [[f64; 2]; 6] =
     [[0.0, 0.0], [90.0, 0.0], [180.0, 0.0], [-90.0, 0.0], [0.0, 70.0], [0.0, -70.0]];
 
 impl Effect for SourceDirectivity {
-    fn id(&self) -> &'static str {
-        "source_directivity"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "The loudspeaker radiates more to the front than to the sides, the more so the higher the frequency."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "source_directivity",
+            "Directional loudspeaker",
+            "The loudspeaker radiates more to the front than to the sides, increasingly so at high frequencies.",
+        )
+        .decided_by(3, NextMeasurement::TurnedSource)
     }
 
     fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
@@ -44,7 +49,7 @@ impl SourceDirectivity {
     }
 
     /// The axis of a source, a unit vector.
-    pub(crate) fn axis(values: &[f64], survey: &Survey, source: usize) -> [f64; 3] {
+    fn axis(values: &[f64], survey: &Survey, source: usize) -> [f64; 3] {
         if let Some(axis) = survey.sources()[source].axis.filter(|_| Self::axes_are_stated(survey)) {
             return axis;
         }
@@ -101,5 +106,15 @@ impl Case for SourceDirectivity {
             let gain = (q * q + 2.0 * q * d * along + d * d * squared) / power;
             *l += gain.max(1e-4).ln();
         }
+    }
+
+    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+        let (values, survey) = (fitted.values(), fitted.survey());
+        let share = |b: usize| (values[0] + values[1] * survey.octaves_from_1khz(b)).clamp(0.0, MAX_SHARE);
+        let axis = |(i, source): (usize, &Place)| (source.id.clone(), Self::axis(values, survey, i));
+        vec![ModelChange::SourcePattern {
+            directed_share: fitted.per_band(share),
+            axis: survey.sources().iter().enumerate().map(axis).collect(),
+        }]
     }
 }

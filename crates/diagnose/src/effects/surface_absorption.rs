@@ -1,5 +1,7 @@
 //! `surface_absorption`: one material is not what its table says.
 
+use crate::effect::EffectInfo;
+use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, Effect, Nuisance, Parameter};
 use crate::survey::Survey;
 
@@ -13,12 +15,13 @@ pub struct SurfaceAbsorption;
 const OPEN_SD: f64 = 0.3;
 
 impl Effect for SurfaceAbsorption {
-    fn id(&self) -> &'static str {
-        "surface_absorption"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "One surface absorbs far more or less than its table says: another material, or something in front of it."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "surface_absorption",
+            "Absorption of one material is wrong",
+            "One material absorbs far more or less than its table states: another material, or something in front of it.",
+        )
+        .against(&[("air_absorption", NextMeasurement::OtherHumidity)])
     }
 
     fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {

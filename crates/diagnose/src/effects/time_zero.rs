@@ -1,6 +1,10 @@
 //! `time_zero`: the first sample is not the instant of emission.
 
+use crate::effect::EffectInfo;
+use crate::effect::FittedCase;
+use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, Effect, Observable, Parameter};
+use crate::extend::model_change::ModelChange;
 use crate::simulate::views::ArrivalView;
 use crate::survey::Survey;
 use sabine_acoustics::TimeZero;
@@ -13,12 +17,13 @@ use sabine_acoustics::TimeZero;
 pub struct TimeZeroOffset;
 
 impl Effect for TimeZeroOffset {
-    fn id(&self) -> &'static str {
-        "time_zero"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "The recording does not start when the loudspeaker does: a latency was not taken out."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "time_zero",
+            "Latency not removed",
+            "The recording does not start with the emission: a latency was not removed.",
+        )
+        .decided_by(4, NextMeasurement::Loopback)
     }
 
     fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {
@@ -38,5 +43,9 @@ impl Case for TimeZeroOffset {
 
     fn delay_s(&self, values: &[f64], _: &ArrivalView<'_>) -> f64 {
         1e-3 * values[0]
+    }
+
+    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+        vec![ModelChange::Latency(1e-3 * fitted.values()[0])]
     }
 }

@@ -1,6 +1,9 @@
 //! `transducer_response`: loudspeaker and microphone do not treat all octaves alike.
 
+use crate::effect::EffectInfo;
+use crate::effect::FittedCase;
 use crate::effect::{Case, Effect, Parameter, Stage};
+use crate::extend::model_change::ModelChange;
 use crate::simulate::views::BandView;
 use crate::survey::Survey;
 use sabine_acoustics::Levels;
@@ -32,7 +35,7 @@ impl TransducerResponse {
     }
 
     /// Gain of every octave in dB, that of the reference included.
-    pub(crate) fn gains_db(values: &[f64], survey: &Survey) -> Vec<f64> {
+    fn gains_db(values: &[f64], survey: &Survey) -> Vec<f64> {
         let mut gains = values.to_vec();
         if let Some(reference) = Self::reference(survey) {
             gains.insert(reference, 0.0);
@@ -42,12 +45,12 @@ impl TransducerResponse {
 }
 
 impl Effect for TransducerResponse {
-    fn id(&self) -> &'static str {
-        "transducer_response"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "The loudspeaker or the microphone favours some octaves over others, alike in every response. Gains are relative to 1 kHz unless levels are absolute."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "transducer_response",
+            "Loudspeaker or microphone not flat",
+            "The loudspeaker or the microphone has more gain in some octaves than in others, the same in every response. Gains are relative to 1 kHz unless levels are absolute.",
+        )
     }
 
     fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
@@ -83,5 +86,9 @@ impl Case for TransducerResponse {
         };
         let gain = gain_db * std::f64::consts::LN_10 / 10.0;
         ln_energy.iter_mut().for_each(|l| *l += gain);
+    }
+
+    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+        vec![ModelChange::BandGains(Self::gains_db(fitted.values(), fitted.survey()))]
     }
 }

@@ -1,6 +1,10 @@
 //! `truncation`: the responses were cut off before they had died away.
 
+use crate::effect::EffectInfo;
+use crate::effect::FittedCase;
+use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, Effect, Parameter, Stage};
+use crate::extend::model_change::ModelChange;
 use crate::simulate::views::BandView;
 use crate::survey::Survey;
 
@@ -21,12 +25,13 @@ const POINTS: usize = 4;
 const START_S: f64 = 0.02;
 
 impl Effect for Truncation {
-    fn id(&self) -> &'static str {
-        "truncation"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "The responses were faded out or cut off before the sound had died away."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "truncation",
+            "Responses cut off early",
+            "The responses were faded out or cut off before the sound had decayed.",
+        )
+        .decided_by(2, NextMeasurement::LongerWithSilence)
     }
 
     fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
@@ -73,5 +78,9 @@ impl Case for Truncation {
                 / POINTS as f64;
             *l += (mean + LEFT).ln();
         }
+    }
+
+    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+        vec![ModelChange::Truncation([fitted.values()[0], fitted.values()[1]])]
     }
 }

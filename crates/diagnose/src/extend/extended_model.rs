@@ -49,6 +49,9 @@ pub struct ExtendedModel {
     /// End of the response and length of its fade, in seconds from the first sample.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truncation: Option<[f64; 2]>,
+    /// Gain of all responses over the time of the file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain_over_time: Option<GainOverTime>,
     /// Deviation of the sampling clock in parts per million.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub clock_ppm: Option<f64>,
@@ -87,6 +90,46 @@ pub struct ThinPanel {
     pub corners_m: [[f64; 3]; 4],
     /// Absorption, the same in all octaves, 0 to 1; it does not scatter.
     pub absorption: f64,
+}
+
+impl ThinPanel {
+    /// A rectangle about a centre, half as long along two unit vectors as given.
+    pub fn rectangle(centre_m: [f64; 3], axes: [[f64; 3]; 2], half_m: [f64; 2], absorption: f64) -> Self {
+        let corner = |[a, b]: [f64; 2]| {
+            std::array::from_fn(|k| centre_m[k] + a * half_m[0] * axes[0][k] + b * half_m[1] * axes[1][k])
+        };
+        Self { corners_m: [[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]].map(corner), absorption }
+    }
+}
+
+/// Gain of a recorder that changes while it records: straight lines in dB between the given instants, constant before the first and after
+/// the last.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct GainOverTime {
+    /// Instants in seconds from the first sample, rising.
+    pub time_s: Vec<f64>,
+    /// Gain at each of them, in dB.
+    pub gain_db: Vec<f64>,
+}
+
+impl GainOverTime {
+    /// Gains in dB at instants in seconds from the first sample, which rise.
+    pub fn new(time_s: Vec<f64>, gain_db: Vec<f64>) -> Self {
+        Self { time_s, gain_db }
+    }
+
+    /// The gain at an instant, in dB.
+    pub(crate) fn at(&self, time_s: f64) -> f64 {
+        let next = self.time_s.partition_point(|t| *t <= time_s);
+        if next == 0 || next == self.time_s.len() {
+            return self.gain_db.get(next.saturating_sub(1)).copied().unwrap_or(0.0);
+        }
+        let (from, to) = (self.time_s[next - 1], self.time_s[next]);
+        let share = (time_s - from) / (to - from);
+        self.gain_db[next - 1] * (1.0 - share) + self.gain_db[next] * share
+    }
 }
 
 /// A coupled volume fills within this time, in seconds.

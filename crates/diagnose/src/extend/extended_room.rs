@@ -288,6 +288,7 @@ impl ExtendedModel {
             check.each("sheets.corners_m", corners, (-1e5, 1e5), "a finite coordinate")?;
             check.each("sheets.absorption", &[sheet.absorption], (0.0, 1.0), "between 0 and 1")?;
         }
+        self.check_gain_over_time(&check)?;
         for (field, values, limits, range) in [
             (
                 "relative_humidity_percent",
@@ -313,6 +314,19 @@ impl ExtendedModel {
             check.each(field, &values, limits, range)?;
         }
         Ok(bands)
+    }
+
+    fn check_gain_over_time(&self, check: &Checks) -> Result<(), Fault> {
+        let Some(gain) = &self.gain_over_time else { return Ok(()) };
+        let (times, gains) = (&gain.time_s, &gain.gain_db);
+        if times.len() != gains.len() || times.is_empty() {
+            let error = Cause::BandCount { expected: times.len().max(1), found: gains.len() };
+            return Err(("gain_over_time.gain_db".to_owned(), error));
+        }
+        check.each("gain_over_time.time_s", times, (0.0, 1e4), "between 0 and 10000 s")?;
+        check.each("gain_over_time.gain_db", gains, (-200.0, 200.0), "within 200 dB")?;
+        let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        check.each("gain_over_time.time_s", &steps, (1e-9, 1e4), "rising")
     }
 
     fn check_names(&self, room: &MeasuredRoom) -> Result<(), Fault> {

@@ -3,5 +3,5 @@
 pub(crate) mod extended_model;
 pub(crate) mod extended_room;
 pub(crate) mod extension;
-pub(crate) mod panels;
+pub(crate) mod model_change;
 pub(crate) mod recording_chain;

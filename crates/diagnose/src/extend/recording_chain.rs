@@ -72,6 +72,11 @@ impl RecordingChain {
             })
             .collect();
         filters.add_noise(&mut samples, begin_s, rates, generator(seed, name));
+        if let Some(gain) = &self.model.gain_over_time {
+            for (i, sample) in samples.iter_mut().enumerate() {
+                *sample = (f64::from(*sample) * 10f64.powf(gain.at(i as f64 / rate) / 20.0)) as f32;
+            }
+        }
         if let Some([end_s, fade_s]) = self.model.truncation {
             for (i, sample) in samples.iter_mut().enumerate() {
                 let left_s = end_s - i as f64 / rate;

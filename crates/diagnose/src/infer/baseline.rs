@@ -3,6 +3,7 @@
 use crate::config::DiagnoseConfig;
 use crate::effect::Case;
 use crate::error::Error;
+use crate::extend::model_change::ModelChange;
 use crate::likelihood::arrivals::{self, ArrivalData};
 use crate::likelihood::decay::{self, BinResidual, EnergyData, EnergyModel, WarmStart};
 use crate::likelihood::discrepancy::FreeDiscrepancy;
@@ -11,7 +12,7 @@ use crate::likelihood::parameters::{ArrivalLayout, DecayLayout};
 use crate::observe::observations::Observations;
 use crate::observe::observed_response::Measured;
 use crate::simulate::scene_tracer::SceneTracer;
-use crate::simulate::simulation::{ABSORPTION, Retracing, Simulation, bands_of_modes};
+use crate::simulate::simulation::{ABSORPTION, Simulation, bands_of_modes};
 use crate::simulate::traced_pair::TracedPair;
 use crate::survey::Survey;
 use sabine_acoustics::{MaterialPrior, MeasuredRoom, Observer, report};
@@ -98,10 +99,9 @@ impl Baseline {
         Ok(())
     }
 
-    /// Takes changes of the model into the simulation, and expands it anew.
-    pub fn retrace(&mut self, change: &Retracing) -> Result<(), Error> {
-        self.simulation.apply(change, &self.observations.survey)?;
-        self.expand(true)
+    /// Takes a change of the model into the simulation, and expands it again where paths moved.
+    pub fn retrace(&mut self, change: &ModelChange) -> Result<(), Error> {
+        if self.simulation.apply(change, &self.observations.survey)? { self.expand(true) } else { Ok(()) }
     }
 
     /// Expands about fitted absorption.
@@ -208,15 +208,6 @@ impl Baseline {
     ) -> Result<LaplaceFit, Error> {
         let data = EnergyData { measured, ..self.energy_data() };
         Ok(decay::fit(&data, cases, used, before)?.0)
-    }
-
-    /// Which response holds which pair.
-    pub fn assignment(&self, cases: &[&dyn Case]) -> Vec<usize> {
-        let mut assignment: Vec<usize> = (0..self.pairs()).collect();
-        for (a, b) in cases.iter().filter_map(|c| c.exchanged()) {
-            assignment.swap(a, b);
-        }
-        assignment
     }
 
     /// Bins of the given pairs under fitted values.

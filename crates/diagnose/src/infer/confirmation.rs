@@ -49,7 +49,7 @@ pub(crate) fn confirm(
     let base = search.state(&[], None)?;
     let mut state = search.state(&found.chosen, Some(&base))?;
     // Receivers that are held out have no say in what is named: causes are confirmed among the others.
-    let in_turn = Folds::in_turn(baseline);
+    let in_turn = Folds::in_turn(&baseline.survey().responses, &search.used);
     let mut predicted = predict(search, &state, &in_turn, observer)?;
     let predicting_s = started.elapsed().as_secs_f64();
 
@@ -86,7 +86,12 @@ pub(crate) fn confirm(
         predicted = predict(search, &state, &in_turn, observer)?;
     }
     if !held.is_empty() {
-        predicted = predict(search, &state, &Folds::never_fitted(baseline, held), observer)?;
+        predicted = predict(
+            search,
+            &state,
+            &Folds::never_fitted(&baseline.survey().responses, &search.used, held),
+            observer,
+        )?;
     }
     Ok(Confirmation {
         base,

@@ -12,8 +12,10 @@ use crate::likelihood::laplace::LaplaceFit;
 use crate::likelihood::polarity;
 use crate::report::diagnosis::{DecayCurves, HeldOut, HeldOutGain};
 use crate::statistics;
+use crate::survey::SurveyedResponse;
 use rayon::prelude::*;
 use sabine_acoustics::{Observer, report};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Groups of receivers that are left out in turn, at most.
 const FOLDS: usize = 4;
@@ -28,35 +30,33 @@ pub(crate) struct Folds {
 }
 
 impl Folds {
-    /// Receivers that no fit sees.
-    pub fn never_fitted(baseline: &Baseline, held: &[usize]) -> Self {
+    /// Receivers that no fit sees; `fitted` flags the responses that may be fitted.
+    pub fn never_fitted(responses: &[SurveyedResponse], fitted: &[bool], held: &[usize]) -> Self {
         let groups = held.iter().map(|&r| vec![r]).collect();
-        Self::new(baseline, groups, &|_| baseline.observations.fitted.clone(), true)
+        Self::new(responses, groups, &|_| fitted.to_vec(), true)
     }
 
     /// Groups of the receivers that are fitted, each left out in turn; none with fewer than two.
-    pub fn in_turn(baseline: &Baseline) -> Self {
-        let responses = &baseline.survey().responses;
-        let fitted = responses.iter().zip(&baseline.observations.fitted).filter(|(_, fitted)| **fitted);
-        let mut receivers: Vec<usize> = fitted.map(|(r, _)| r.receiver).collect();
+    pub fn in_turn(responses: &[SurveyedResponse], fitted: &[bool]) -> Self {
+        let seen = responses.iter().zip(fitted).filter(|(_, fitted)| **fitted);
+        let mut receivers: Vec<usize> = seen.map(|(r, _)| r.receiver).collect();
         receivers.sort_unstable();
         receivers.dedup();
         let count = if receivers.len() < 2 { 0 } else { receivers.len().min(FOLDS) };
         let groups = (0..count).map(|g| receivers.iter().copied().skip(g).step_by(count).collect()).collect();
         let rest = |group: &[usize]| {
-            let used = responses.iter().zip(&baseline.observations.fitted);
+            let used = responses.iter().zip(fitted);
             used.map(|(r, fitted)| *fitted && !group.contains(&r.receiver)).collect()
         };
-        Self::new(baseline, groups, &rest, false)
+        Self::new(responses, groups, &rest, false)
     }
 
     fn new(
-        baseline: &Baseline,
+        responses: &[SurveyedResponse],
         groups: Vec<Vec<usize>>,
         used: &dyn Fn(&[usize]) -> Vec<bool>,
         never_fitted: bool,
     ) -> Self {
-        let responses = &baseline.survey().responses;
         let pairs = |group: &[usize]| {
             (0..responses.len()).filter(|&p| group.contains(&responses[p].receiver)).collect()
         };
@@ -92,76 +92,92 @@ pub(crate) fn predict(
     folds: &Folds,
     observer: &dyn Observer,
 ) -> Result<Predicted, Error> {
-    let baseline = search.baseline;
     if folds.splits.is_empty() {
         return Ok(Predicted::default());
     }
-    let free = baseline.free_discrepancy();
     let total = folds.splits.len() as u64;
-    let done = std::sync::atomic::AtomicU64::new(0);
+    let done = AtomicU64::new(0);
     let splits: Vec<SplitGain> = folds
         .splits
         .par_iter()
         .map(|(used, pairs)| {
-            let behind = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-            report(observer, "held-out positions", behind, total)?;
-            let mut whole = used.clone();
-            pairs.iter().for_each(|&p| whole[p] = true);
-            // The logarithm of the predictive density is what the evidence grows by when the new positions come in.
-            let predictive =
-                |chosen: &[usize], free: Option<&dyn Case>| -> Result<(f64, Vec<Compared>), Error> {
-                    let mut cases = search.cases_of(chosen, Observable::Decay);
-                    cases.extend(free);
-                    let arrivals = search.cases_of(chosen, Observable::Arrivals);
-                    let firsts: &[usize] = if *chosen == *state.chosen { &state.energy_firsts } else { &[] };
-                    let before = WarmStart { values: &state.energy.values, firsts };
-                    let (fitted, firsts) = baseline.fit_energy(&cases, used, Some(before))?;
-                    let with = baseline.fit_energy(&cases, &whole, Some(before))?.0;
-                    let energy = with.log_evidence - fitted.log_evidence;
-                    let all_times = baseline.fit_arrivals(&arrivals, &whole)?.0;
-                    let seen_times = baseline.fit_arrivals(&arrivals, used)?.0;
-                    let times = all_times.log_evidence - seen_times.log_evidence;
-                    let single = |energy: &LaplaceFit, arrivals: &LaplaceFit, used: &[bool]| {
-                        let fitted = Fitted { energy, energy_firsts: &firsts, arrivals };
-                        direct_evidence::sum(&direct_evidence::own(search, chosen, fitted, used))
-                    };
-                    let isolated_reflections =
-                        single(&with, &all_times, &whole) - single(&fitted, &seen_times, used);
-                    let all = search.all_cases(chosen);
-                    let signs = polarity::log_likelihood(&baseline.observations.measured, &all, &whole)
-                        - polarity::log_likelihood(&baseline.observations.measured, &all, used);
-                    Ok((
-                        energy + times + signs + isolated_reflections,
-                        compare(baseline, &cases, &fitted.values, pairs),
-                    ))
-                };
-            let (base, before) = predictive(&[], None)?;
-            let (free, discrepant) = predictive(&[], Some(&free))?;
-            let (named, after) = if state.chosen.is_empty() {
-                (base, before.clone())
-            } else {
-                predictive(&state.chosen, None)?
-            };
-            let mut each = Vec::new();
-            let mut without_each = Vec::new();
-            for &c in &state.chosen {
-                let rest: Vec<usize> = state.chosen.iter().copied().filter(|&o| o != c).collect();
-                let (lacking, predicted) =
-                    if rest.is_empty() { (base, before.clone()) } else { predictive(&rest, None)? };
-                each.push(named - lacking);
-                without_each.push(predicted);
-            }
-            let bins = before.iter().map(|c| c.measured.len() as f64).sum();
-            Ok(SplitGain {
-                named: named - base,
-                free: free - base,
-                each,
-                bins,
-                predicted: [before, after, discrepant],
-                without_each,
-            })
+            report(observer, "held-out positions", done.fetch_add(1, Ordering::Relaxed), total)?;
+            split_gain(search, state, used, pairs)
         })
-        .collect::<Result<_, Error>>()?;
+        .collect::<Result<_, _>>()?;
+    Ok(summary(search.baseline, state.chosen.len(), folds, &splits))
+}
+
+/// Predicts the pairs of one split from the responses that are used.
+fn split_gain(
+    search: &Search<'_>,
+    state: &State,
+    used: &[bool],
+    pairs: &[usize],
+) -> Result<SplitGain, Error> {
+    let free = search.baseline.free_discrepancy();
+    let of =
+        |chosen: &[usize], free: Option<&dyn Case>| predictive(search, state, (used, pairs), chosen, free);
+    let (base, before) = of(&[], None)?;
+    let (free, discrepant) = of(&[], Some(&free))?;
+    let (named, after) =
+        if state.chosen.is_empty() { (base, before.clone()) } else { of(&state.chosen, None)? };
+    let mut each = Vec::new();
+    let mut without_each = Vec::new();
+    for &c in &state.chosen {
+        let rest: Vec<usize> = state.chosen.iter().copied().filter(|&o| o != c).collect();
+        let (lacking, predicted) = if rest.is_empty() { (base, before.clone()) } else { of(&rest, None)? };
+        each.push(named - lacking);
+        without_each.push(predicted);
+    }
+    let bins = before.iter().map(|c| c.measured.len() as f64).sum();
+    let predicted = [before, after, discrepant];
+    Ok(SplitGain { named: named - base, free: free - base, each, bins, predicted, without_each })
+}
+
+/// Logarithm of the predictive density of the pairs left out, and their prediction. It is what the evidence grows by when the new positions
+/// come in.
+fn predictive(
+    search: &Search<'_>,
+    state: &State,
+    (used, pairs): (&[bool], &[usize]),
+    chosen: &[usize],
+    free: Option<&dyn Case>,
+) -> Result<(f64, Vec<Compared>), Error> {
+    let baseline = search.baseline;
+    let mut whole = used.to_vec();
+    pairs.iter().for_each(|&p| whole[p] = true);
+    let mut cases = search.cases_of(chosen, Observable::Decay);
+    cases.extend(free);
+    let arrivals = search.cases_of(chosen, Observable::Arrivals);
+    let firsts: &[usize] = if *chosen == *state.chosen { &state.energy_firsts } else { &[] };
+    let before = WarmStart { values: &state.energy.values, firsts };
+    let (fitted, firsts) = baseline.fit_energy(&cases, used, Some(before))?;
+    let with = baseline.fit_energy(&cases, &whole, Some(before))?.0;
+    let energy = with.log_evidence - fitted.log_evidence;
+    let all_times = baseline.fit_arrivals(&arrivals, &whole)?.0;
+    let seen_times = baseline.fit_arrivals(&arrivals, used)?.0;
+    let times = all_times.log_evidence - seen_times.log_evidence;
+    let single = |energy: &LaplaceFit, arrivals: &LaplaceFit, used: &[bool]| {
+        let fitted = Fitted { energy, energy_firsts: &firsts, arrivals };
+        direct_evidence::sum(&direct_evidence::own(
+            baseline,
+            (&search.candidates, &search.used),
+            chosen,
+            fitted,
+            used,
+        ))
+    };
+    let singles = single(&with, &all_times, &whole) - single(&fitted, &seen_times, used);
+    let all = search.all_cases(chosen);
+    let measured = &baseline.observations.measured;
+    let signs =
+        polarity::log_likelihood(measured, &all, &whole) - polarity::log_likelihood(measured, &all, used);
+    Ok((energy + times + signs + singles, compare(baseline, &cases, &fitted.values, pairs)))
+}
+
+/// Gains, errors and curves over all splits.
+fn summary(baseline: &Baseline, causes: usize, folds: &Folds, splits: &[SplitGain]) -> Predicted {
     let bins: f64 = splits.iter().map(|s| s.bins).sum();
     let mean = |gain: &dyn Fn(&SplitGain) -> f64| splits.iter().map(gain).sum::<f64>() / bins;
     let interval = |gain: &dyn Fn(&SplitGain) -> f64| {
@@ -181,7 +197,7 @@ pub(crate) fn predict(
         nats_per_bin: [mean(&|s| s.named), mean(&|s| s.free)],
         nats_interval: [interval(&|s| s.named), interval(&|s| s.free)],
     };
-    let gains = (0..state.chosen.len())
+    let gains = (0..causes)
         .map(|i| {
             let [low, high] = interval(&|s| s.each[i]);
             let before: Vec<Compared> =
@@ -195,9 +211,8 @@ pub(crate) fn predict(
             }
         })
         .collect();
-    let decays =
-        splits.iter().flat_map(|s| decay_curves(baseline, &s.predicted[0], &s.predicted[1], true)).collect();
-    Ok(Predicted { held_out: Some(held_out), gains, decays })
+    let curves = |s: &SplitGain| decay_curves(baseline, &s.predicted[0], &s.predicted[1], true);
+    Predicted { held_out: Some(held_out), gains, decays: splits.iter().flat_map(curves).collect() }
 }
 
 /// Curves of what was measured, and predicted before and after.
@@ -223,4 +238,42 @@ pub(crate) fn decay_curves(
             }
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hand_made;
+    use sabine_acoustics::{Levels, TimeZero};
+
+    #[test]
+    fn every_receiver_that_is_fitted_is_left_out_once_and_never_used_meanwhile() {
+        let mut responses = hand_made::survey(Levels::Common, TimeZero::Emission).responses;
+        let more: Vec<SurveyedResponse> =
+            (3..9).map(|receiver| SurveyedResponse { receiver, ..responses[0].clone() }).collect();
+        responses.extend(more);
+        let fitted: Vec<bool> = (0..responses.len()).map(|r| r != 4).collect();
+        let folds = Folds::in_turn(&responses, &fitted);
+        assert_eq!(folds.splits.len(), FOLDS);
+        let mut left_out: Vec<usize> = Vec::new();
+        for (used, pairs) in &folds.splits {
+            assert!(!used[4] && !pairs.contains(&4), "a receiver that is held out has no say");
+            for pair in (0..responses.len()).filter(|&p| fitted[p]) {
+                assert_eq!(used[pair], !pairs.contains(&pair));
+            }
+            left_out.extend(pairs);
+        }
+        left_out.sort_unstable();
+        assert_eq!(left_out, [0, 1, 2, 3, 5, 6, 7, 8]);
+        assert!(!folds.never_fitted);
+    }
+
+    #[test]
+    fn a_single_receiver_leaves_nothing_to_predict_it_from() {
+        let responses = hand_made::survey(Levels::Common, TimeZero::Emission).responses;
+        assert!(Folds::in_turn(&responses, &[true, false, false]).splits.is_empty());
+        let folds = Folds::never_fitted(&responses, &[true, false, true], &[1]);
+        assert!(folds.never_fitted);
+        assert_eq!(folds.splits, [(vec![true, false, true], vec![1])]);
+    }
 }

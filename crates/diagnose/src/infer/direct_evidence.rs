@@ -1,12 +1,12 @@
 //! Evidence of causes that neither decays nor arrival times can weigh: from single reflections, and from before the direct sound.
 
 use crate::effect::AuxiliaryEvidence;
+use crate::effect::reflection_gate::ReflectionGate;
 use crate::effect::{Case, Observable};
 use crate::infer::baseline::Baseline;
-use crate::infer::search::Search;
+use crate::infer::candidates::{Candidate, cases_of};
 use crate::likelihood::arrivals;
 use crate::likelihood::laplace::LaplaceFit;
-use crate::likelihood::reflection_gates::ReflectionGate;
 use crate::report::diagnosis::FoundParameter;
 
 /// What a fit says of the parameters of its cases.
@@ -18,9 +18,13 @@ pub(crate) struct Fitted<'a> {
 }
 
 /// Gates under the chosen causes.
-fn gates(search: &Search<'_>, chosen: &[usize], fitted: Fitted<'_>) -> Vec<ReflectionGate> {
-    let baseline = search.baseline;
-    let cases = search.cases_of(chosen, Observable::Decay);
+fn gates(
+    baseline: &Baseline,
+    (candidates, fit_used): (&[Candidate<'_>], &[bool]),
+    chosen: &[usize],
+    fitted: Fitted<'_>,
+) -> Vec<ReflectionGate> {
+    let cases = cases_of(candidates, chosen, Observable::Decay);
     let values: Vec<Vec<f64>> = cases
         .iter()
         .zip(fitted.energy_firsts)
@@ -33,10 +37,17 @@ fn gates(search: &Search<'_>, chosen: &[usize], fitted: Fitted<'_>) -> Vec<Refle
     let (cases, values): (Vec<&dyn Case>, Vec<Vec<f64>>) =
         cases.into_iter().zip(values).filter(|(c, _)| !c.weighs_reflections()).unzip();
     let data = baseline.arrival_data();
-    let of_times = search.cases_of(chosen, Observable::Arrivals);
-    let model = arrivals::at_fit(&data, &of_times, &search.used);
+    let of_times = cases_of(candidates, chosen, Observable::Arrivals);
+    let model = arrivals::at_fit(&data, &of_times, fit_used);
     let shift_s = shifts(baseline, &model, &fitted.arrivals.values);
-    crate::likelihood::reflection_gates::gates(baseline, &cases, &values, &fitted.energy.values, &shift_s)
+    crate::likelihood::reflection_gates::gates(
+        &baseline.observations,
+        &baseline.simulation,
+        &cases,
+        &values,
+        &fitted.energy.values,
+        &shift_s,
+    )
 }
 
 fn shifts(baseline: &Baseline, model: &arrivals::ArrivalModel<'_>, values: &[f64]) -> Vec<Vec<f64>> {
@@ -53,34 +64,34 @@ fn shifts(baseline: &Baseline, model: &arrivals::ArrivalModel<'_>, values: &[f64
 
 /// Evidence of each chosen cause from what comes before the direct sound, or from single reflections, of the responses that are used.
 pub(crate) fn own(
-    search: &Search<'_>,
+    baseline: &Baseline,
+    (candidates, fit_used): (&[Candidate<'_>], &[bool]),
     chosen: &[usize],
     fitted: Fitted<'_>,
     used: &[bool],
 ) -> Vec<(usize, AuxiliaryEvidence)> {
-    let pre_arrival = |c: usize| {
-        Some((c, search.candidates[c].case.pre_arrival(&search.baseline.observations.pre_arrival, used)?))
-    };
+    let pre_arrival =
+        |c: usize| Some((c, candidates[c].case.pre_arrival(&baseline.observations.pre_arrival, used)?));
     let mut found: Vec<(usize, AuxiliaryEvidence)> = chosen.iter().copied().filter_map(pre_arrival).collect();
     let weighing: Vec<usize> =
-        chosen.iter().copied().filter(|&c| search.candidates[c].case.weighs_reflections()).collect();
+        chosen.iter().copied().filter(|&c| candidates[c].case.weighs_reflections()).collect();
     if weighing.is_empty() {
         return found;
     }
-    let mut gates = gates(search, chosen, fitted);
+    let mut gates = gates(baseline, (candidates, fit_used), chosen, fitted);
     gates.retain(|g| used[g.response]);
     let of_energy: Vec<usize> = chosen
         .iter()
         .copied()
-        .filter(|&c| search.candidates[c].case.observable().concerns(Observable::Decay))
+        .filter(|&c| candidates[c].case.observable().concerns(Observable::Decay))
         .collect();
     found.extend(weighing.into_iter().filter_map(|c| {
         let order = of_energy.iter().position(|&o| o == c)?;
         let first = *fitted.energy_firsts.get(order)?;
-        let count = search.candidates[c].case.parameters(search.baseline.survey()).len();
+        let count = candidates[c].case.parameters(baseline.survey()).len();
         let own: Vec<(f64, f64)> =
             (first..first + count).map(|i| (fitted.energy.values[i], fitted.energy.sd(i))).collect();
-        Some((c, search.candidates[c].case.among_reflections(&own, &gates)?))
+        Some((c, candidates[c].case.among_reflections(&own, &gates)?))
     }));
     found
 }

@@ -1,14 +1,14 @@
 //! Which effects the positions of a survey can tell apart, from the Jacobians alone.
 
-use crate::effect::{Case, Nuisance, Observable};
+use crate::effect::info::discriminating_measurement;
+use crate::effect::{Case, Effect, Nuisance, Observable};
 use crate::error::Error;
 use crate::infer::baseline::Baseline;
-use crate::infer::search::Candidate;
+use crate::infer::candidates::Candidate;
 use crate::likelihood::arrivals;
 use crate::likelihood::decay::EnergyModel;
 use crate::likelihood::laplace::{Model, Slopes};
 use crate::report::diagnosis::Isolability;
-use crate::report::next_measurement::discriminating_measurement;
 use nalgebra::{DMatrix, DVector};
 
 /// Signatures closer than this cannot be told apart.
@@ -18,6 +18,7 @@ const INDISTINGUISHABLE_COSINE: f64 = 0.95;
 pub(crate) fn isolability(
     baseline: &Baseline,
     candidates: &[Candidate<'_>],
+    effects: &[Box<dyn Effect>],
 ) -> Result<Vec<Isolability>, Error> {
     let mut found = Vec::new();
     for evidence in [Observable::Decay, Observable::Arrivals] {
@@ -35,7 +36,11 @@ pub(crate) fn isolability(
                     effects: [a.id.to_owned(), b.id.to_owned()],
                     cosine,
                     separable: cosine < INDISTINGUISHABLE_COSINE,
-                    would_decide: discriminating_measurement(a.id, b.id).to_string(),
+                    would_decide: discriminating_measurement(
+                        &effects[a.effect].info(),
+                        &effects[b.effect].info(),
+                    )
+                    .to_string(),
                 });
             }
         }

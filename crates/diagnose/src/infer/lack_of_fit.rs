@@ -4,6 +4,7 @@ use crate::effect::Case;
 use crate::error::Error;
 use crate::infer::baseline::Baseline;
 use crate::likelihood::decay::{BinResidual, WarmStart};
+use crate::likelihood::parameters::assignment;
 use crate::observe::observed_response::Measured;
 use crate::statistics::{median, poisson_tail, upper_tail};
 use rand::SeedableRng;
@@ -60,7 +61,7 @@ fn simulate(baseline: &Baseline, cases: &[&dyn Case], values: &[f64], number: u6
         Pcg64Mcg::seed_from_u64(baseline.config.seed ^ (number + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
     let all: Vec<usize> = (0..baseline.pairs()).collect();
     let mut measured = baseline.observations.measured.clone();
-    let assignment = baseline.assignment(cases);
+    let assignment = assignment(baseline.pairs(), cases.iter().copied());
     for r in baseline.residuals(cases, values, &all) {
         let shape = 1.0 / (r.variance * baseline.dispersion[r.band]);
         let mean = r.ln_predicted.exp();

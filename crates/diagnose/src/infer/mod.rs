@@ -1,6 +1,7 @@
 //! Which causes the observations support.
 
 pub(crate) mod baseline;
+pub(crate) mod candidates;
 pub(crate) mod confirmation;
 pub(crate) mod cross_validation;
 pub(crate) mod direct_evidence;

@@ -1,9 +1,10 @@
 //! Which causes the data speak for.
 
 use crate::effect::AuxiliaryEvidence;
-use crate::effect::{Case, Effect, Nuisance, Observable};
+use crate::effect::{Case, Nuisance, Observable};
 use crate::error::Error;
 use crate::infer::baseline::Baseline;
+use crate::infer::candidates::{Candidate, cases_of};
 use crate::infer::direct_evidence;
 use crate::infer::direct_evidence::Fitted;
 use crate::likelihood::decay::WarmStart;
@@ -18,13 +19,6 @@ pub(crate) const RIVAL_NATS: f64 = 3.0;
 const MAX_EXCHANGES: usize = 3;
 /// What an exchange must gain in the direct sounds to be looked at, in nats.
 const EXCHANGE_NATS: f64 = 6.0;
-
-/// One case of one effect of the catalogue.
-pub(crate) struct Candidate<'a> {
-    pub effect: usize,
-    pub id: &'static str,
-    pub case: &'a dyn Case,
-}
 
 /// What a candidate would add.
 #[derive(Clone, Debug)]
@@ -97,7 +91,7 @@ impl<'a> Search<'a> {
     }
 
     pub fn cases_of(&self, chosen: &[usize], part: Observable) -> Vec<&'a dyn Case> {
-        chosen.iter().map(|&c| self.candidates[c].case).filter(|c| c.observable().concerns(part)).collect()
+        cases_of(&self.candidates, chosen, part)
     }
 
     pub fn state(&self, chosen: &[usize], near: Option<&State>) -> Result<State, Error> {
@@ -112,7 +106,8 @@ impl<'a> Search<'a> {
             &self.used,
         );
         let fitted = Fitted { energy: &energy, energy_firsts: &energy_firsts, arrivals: &arrivals };
-        let own = direct_evidence::own(self, chosen, fitted, &self.used);
+        let own =
+            direct_evidence::own(self.baseline, (&self.candidates, &self.used), chosen, fitted, &self.used);
         Ok(State { chosen: chosen.to_vec(), energy, arrivals, polarity, own, energy_firsts, arrival_firsts })
     }
 
@@ -146,7 +141,13 @@ impl<'a> Search<'a> {
         }
         let fitted =
             Fitted { energy: &next.energy, energy_firsts: &next.energy_firsts, arrivals: &next.arrivals };
-        next.own = direct_evidence::own(self, &next.chosen, fitted, &self.used);
+        next.own = direct_evidence::own(
+            self.baseline,
+            (&self.candidates, &self.used),
+            &next.chosen,
+            fitted,
+            &self.used,
+        );
         Ok(next)
     }
 
@@ -301,16 +302,4 @@ impl<'a> Search<'a> {
             }
         }
     }
-}
-
-/// All cases of some effects.
-pub(crate) fn cases(
-    effects: &[Box<dyn Effect>],
-    survey: &crate::Survey,
-) -> Vec<(usize, &'static str, Box<dyn Case>)> {
-    effects
-        .iter()
-        .enumerate()
-        .flat_map(|(i, effect)| effect.cases(survey).into_iter().map(move |case| (i, effect.id(), case)))
-        .collect()
 }

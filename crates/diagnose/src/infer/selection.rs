@@ -1,11 +1,10 @@
 //! The search for causes, one name after the other.
 
-use crate::effect::{Case, Nuisance, Observable};
+use crate::effect::{Case, Observable};
 use crate::error::Error;
+use crate::extend::extension::changes;
 use crate::infer::baseline::Baseline;
 use crate::infer::search::{EffectScore, Search};
-use crate::report::found_parameters::place_of;
-use crate::simulate::simulation::Retracing;
 use sabine_acoustics::Observer;
 
 /// What the search found.
@@ -80,38 +79,17 @@ pub(crate) fn select(
             named.rivals = std::iter::once(best.id).chain(rivals.iter().map(|r| r.id)).collect();
             break;
         }
-        let (moved, warmer_k, resized, absorption) = {
+        let (changes, absorption) = {
             let search = Search::new(baseline, cases, effects, used.to_vec());
             let state = search.state(&named.chosen, None)?;
-            let layout = baseline.arrival_layout();
-            let moved: Vec<(Nuisance, [f64; 3])> = cases[best.best]
-                .2
-                .relaxes()
-                .into_iter()
-                .filter_map(|(place, _)| {
-                    let first = layout.nuisance(place)?.start;
-                    Some((place, std::array::from_fn(|k| state.arrivals.values[first + k])))
-                })
-                .collect();
-            let (maximum, first) = place_of(&search, &state, best.best);
-            let case = &cases[best.best].2;
-            let own = maximum.values.get(first..first + case.parameters(baseline.survey()).len());
-            let warmer_k = own.map_or(0.0, |values| case.warmer_by_k(values, baseline.survey()));
-            let resized = own.and_then(|values| case.resized(values));
-            (moved, warmer_k, resized, state.energy.values)
+            (changes(&search, &state, best.best), state.energy.values)
         };
         // With the cause at work the materials are others: what is compared, and with which spread, follows them.
         if cases[best.best].2.observable().concerns(Observable::Decay) {
             baseline.expand_about(&absorption)?;
         }
-        if warmer_k != 0.0 {
-            baseline.retrace(&Retracing::Warmer(warmer_k))?;
-        }
-        if let Some(dimensions) = resized {
-            baseline.retrace(&Retracing::Dimensions(dimensions))?;
-        }
-        for (place, offset_m) in moved {
-            baseline.retrace(&Retracing::Position(place, offset_m))?;
+        for change in &changes {
+            baseline.retrace(change)?;
         }
         let chosen: Vec<&dyn Case> = named
             .chosen

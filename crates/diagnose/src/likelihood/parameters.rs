@@ -135,6 +135,15 @@ impl ModelTerm<'_> {
     }
 }
 
+/// Which response holds which pair, some having been exchanged.
+pub(crate) fn assignment<'a>(pairs: usize, cases: impl IntoIterator<Item = &'a dyn Case>) -> Vec<usize> {
+    let mut assignment: Vec<usize> = (0..pairs).collect();
+    for (a, b) in cases.into_iter().filter_map(|c| c.exchanged()) {
+        assignment.swap(a, b);
+    }
+    assignment
+}
+
 /// The cases of a model behind its nuisance parameters.
 pub(crate) struct ModelTerms<'a> {
     pub priors: Vec<Prior>,

@@ -3,14 +3,19 @@
 //! What a gate holds is predicted from all exact paths that reach into it, each spread as the octave's filter spreads a pulse; its scatter is that
 //! of pulses with random signs, as for the time bins. Both are relative to the direct sound, gated in the same way.
 
+use crate::effect::reflection_gate::ReflectionGate;
 use crate::effect::{Case, Stage};
-use crate::infer::baseline::Baseline;
+use crate::likelihood::parameters::{DecayLayout, assignment};
 use crate::observe::band_pulse::BandPulse;
 use crate::observe::early_energy::is_fast;
+use crate::observe::observations::Observations;
+use crate::observe::observed_response::Measured;
 use crate::simulate::reflection_reweighting::HitChanges;
+use crate::simulate::simulation::Simulation;
 use crate::simulate::traced_pair::{BandState, IsolatedReflection};
 use crate::simulate::views::BandView;
 use crate::statistics::{add, ln_gamma_density};
+use crate::survey::Survey;
 
 /// Half of a gate, in units of one over the bandwidth.
 const HALF_BANDWIDTH_TIMES: f64 = 0.7;
@@ -27,22 +32,6 @@ const ODD_RANGE: f64 = 9.0;
 /// What is left of a reflection that is missing, as a share of its energy: 13 dB.
 const LEFT: f64 = 0.05;
 
-/// One first-order reflection of one response.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct ReflectionGate {
-    /// Index of its response.
-    pub response: usize,
-    /// Where it is reflected, in metres.
-    pub place_m: [f64; 3],
-    /// Index of its surface among [`Survey::planes`](crate::Survey::planes).
-    pub plane: usize,
-    /// How probable (logarithm, in nats) what was measured is if the surface is as the model says, odd reflections allowed for.
-    pub present_nats: f64,
-    /// The same if the reflection is missing.
-    pub missing_nats: f64,
-}
-
 /// Where the straight lines of departure and arrival meet: the reflection's place.
 fn meeting(source: [f64; 3], receiver: [f64; 3], single: &IsolatedReflection) -> [f64; 3] {
     // With s + x d = r + (L - x) a in the mean over both lines.
@@ -55,117 +44,150 @@ fn meeting(source: [f64; 3], receiver: [f64; 3], single: &IsolatedReflection) ->
 }
 
 /// Gates of all first-order reflections of the pairs that count, under fitted absorption and the causes at work. `shift_s` is how much later
-/// than predicted the direct sound and each single of a pair come by the fit of the arrival times.
+/// than predicted the direct sound and each isolated reflection of a pair come by the fit of the arrival times.
 pub(crate) fn gates(
-    baseline: &Baseline,
+    observations: &Observations,
+    simulation: &Simulation,
     cases: &[&dyn Case],
     values: &[Vec<f64>],
     absorption: &[f64],
     shift_s: &[Vec<f64>],
 ) -> Vec<ReflectionGate> {
-    let survey = baseline.survey();
-    let bands = survey.bands.len();
-    let assignment = baseline.assignment(cases);
+    let survey = &observations.survey;
+    let assignment = assignment(survey.responses.len(), cases.iter().copied());
     let mut found = Vec::new();
-    for (pair, (isolated_reflections, states)) in baseline.simulation.isolated_reflections.iter().enumerate()
-    {
-        if isolated_reflections.first().is_none_or(|s| s.order > 0)
-            || shift_s[pair].len() != isolated_reflections.len()
-        {
+    for (pair, (reflections, _)) in simulation.isolated_reflections.iter().enumerate() {
+        if reflections.first().is_none_or(|s| s.order > 0) || shift_s[pair].len() != reflections.len() {
             continue;
         }
-        let measured = &baseline.observations.measured[assignment[pair]];
-        let response = &survey.responses[pair];
-        let source = survey.sources[response.source].position_m;
-        let receiver = survey.receivers[response.receiver].position_m;
-        // Energies relative to the direct sound, by band and single.
-        let energies: Vec<Vec<f64>> = (0..bands)
+        let measured = &observations.measured[assignment[pair]];
+        // Energies relative to the direct sound, by band and reflection.
+        let energies: Vec<Vec<f64>> = (0..survey.bands.len())
             .map(|band| {
-                if !is_fast(survey.bands, band) {
-                    return Vec::new();
-                }
-                let state = &states[band];
-                let hit_changes = HitChanges::default();
-                let view = BandView {
-                    survey,
-                    pair,
-                    response: assignment[pair],
-                    band,
-                    state,
-                    direct_s: baseline.simulation.direct_s[pair],
-                    reference: baseline.simulation.reference[band],
-                    gain: 1.0,
-                    hit_changes: &hit_changes,
+                let one = || {
+                    relative_energies(
+                        survey,
+                        simulation,
+                        (pair, assignment[pair], band),
+                        (cases, values),
+                        absorption,
+                    )
                 };
-                let mut ln = fitted(state, baseline, absorption, band);
-                for (case, own) in cases.iter().zip(values).filter(|(c, _)| c.stage() == Stage::Room) {
-                    case.energy(own, &view, &mut ln);
-                }
-                let direct = ln[0];
-                ln.iter().map(|l| (l - direct).exp()).collect()
+                if is_fast(survey.bands, band) { one() } else { Vec::new() }
             })
             .collect();
-        let direct_s = measured.direct_s;
         // Times in the file, the direct sound where it was found.
-        let times: Vec<f64> = isolated_reflections
+        let times: Vec<f64> = reflections
             .iter()
             .zip(&shift_s[pair])
-            .map(|(s, shift)| direct_s + s.after_direct_s + shift - shift_s[pair][0])
+            .map(|(s, shift)| measured.direct_s + s.after_direct_s + shift - shift_s[pair][0])
             .collect();
-        for (own, single) in isolated_reflections.iter().enumerate().filter(|(_, s)| s.order == 1) {
-            let place_m = meeting(source, receiver, single);
-            let normal: [f64; 3] = std::array::from_fn(|k| single.departure[k] + single.arrival[k]);
-            let size = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
-            let plane = survey.planes.iter().position(|p| {
-                let along: f64 = (0..3).map(|k| normal[k] * p.axes[0][k]).sum::<f64>() / size.max(1e-9);
-                let [u, v] = p.within(place_m);
-                p.distance_m(place_m) < 0.03
-                    && along.abs() > 0.999
-                    && (p.extent_m[0][0]..=p.extent_m[0][1]).contains(&u)
-                    && (p.extent_m[1][0]..=p.extent_m[1][1]).contains(&v)
-            });
-            let Some(plane) = plane else { continue };
-            let (mut there, mut gone, mut told) = (0.0, 0.0, 0usize);
-            for (band, energies) in energies.iter().enumerate().filter(|(_, e)| !e.is_empty()) {
-                let kernel = &baseline.observations.pulses[band];
-                let half_s = HALF_BANDWIDTH_TIMES / kernel.bandwidth_hz;
-                let at_direct = measured.early.gate(band, direct_s, half_s);
-                let at_own = measured.early.gate(band, times[own], half_s);
-                let (Some(reference), Some(energy)) = (at_direct.filter(|e| *e > 0.0), at_own) else {
-                    continue;
-                };
-                let Some([present, missing]) = expected(kernel, energies, &times, own, half_s) else {
-                    continue;
-                };
-                let of_direct = kernel.before(half_s) - kernel.before(-half_s);
-                let ratio = energy / reference * of_direct;
-                there += ln_gamma_density(ratio, present);
-                gone += ln_gamma_density(ratio, missing);
-                told += 1;
-            }
-            if told > 0 {
-                let even = -(told as f64) * ODD_RANGE.ln();
-                let odd = add(gone, even) + (0.5 * ODD_SHARE).ln();
-                found.push(ReflectionGate {
-                    response: pair,
-                    place_m,
-                    plane,
-                    present_nats: add(there + (1.0 - ODD_SHARE).ln(), odd),
-                    missing_nats: add(gone + (1.0 - ODD_SHARE).ln(), even + ODD_SHARE.ln()),
-                });
+        for (own, reflection) in reflections.iter().enumerate().filter(|(_, s)| s.order == 1) {
+            let Some((place_m, plane)) = place_and_plane(survey, pair, reflection) else { continue };
+            if let Some((present_nats, missing_nats)) = weigh(observations, measured, &energies, &times, own)
+            {
+                found.push(ReflectionGate { response: pair, place_m, plane, present_nats, missing_nats });
             }
         }
     }
     found
 }
 
+/// Energies of the isolated reflections of a pair in one band, over that of the direct sound.
+fn relative_energies(
+    survey: &Survey,
+    simulation: &Simulation,
+    (pair, response, band): (usize, usize, usize),
+    (cases, values): (&[&dyn Case], &[Vec<f64>]),
+    absorption: &[f64],
+) -> Vec<f64> {
+    let state = &simulation.isolated_reflections[pair].1[band];
+    let hit_changes = HitChanges::default();
+    let view = BandView {
+        survey,
+        pair,
+        response,
+        band,
+        state,
+        direct_s: simulation.direct_s[pair],
+        reference: simulation.reference[band],
+        gain: 1.0,
+        hit_changes: &hit_changes,
+    };
+    let mut ln = fitted(state, survey, simulation, absorption, band);
+    for (case, own) in cases.iter().zip(values).filter(|(c, _)| c.stage() == Stage::Room) {
+        case.energy(own, &view, &mut ln);
+    }
+    let direct = ln[0];
+    ln.iter().map(|l| (l - direct).exp()).collect()
+}
+
+/// Where a path is reflected, and the plane in which that is; none if it is in no plane of the survey.
+fn place_and_plane(
+    survey: &Survey,
+    pair: usize,
+    reflection: &IsolatedReflection,
+) -> Option<([f64; 3], usize)> {
+    let response = &survey.responses[pair];
+    let source = survey.sources[response.source].position_m;
+    let receiver = survey.receivers[response.receiver].position_m;
+    let place_m = meeting(source, receiver, reflection);
+    let normal: [f64; 3] = std::array::from_fn(|k| reflection.departure[k] + reflection.arrival[k]);
+    let size = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
+    let plane = survey.planes.iter().position(|p| {
+        let along: f64 = (0..3).map(|k| normal[k] * p.axes[0][k]).sum::<f64>() / size.max(1e-9);
+        let [u, v] = p.within(place_m);
+        p.distance_m(place_m) < 0.03
+            && along.abs() > 0.999
+            && (p.extent_m[0][0]..=p.extent_m[0][1]).contains(&u)
+            && (p.extent_m[1][0]..=p.extent_m[1][1]).contains(&v)
+    })?;
+    Some((place_m, plane))
+}
+
+/// How probable (logarithms, in nats) what a gate holds is with its reflection and without it; none where no band can tell.
+fn weigh(
+    observations: &Observations,
+    measured: &Measured,
+    energies: &[Vec<f64>],
+    times: &[f64],
+    own: usize,
+) -> Option<(f64, f64)> {
+    let (mut there, mut gone, mut told) = (0.0, 0.0, 0usize);
+    for (band, energies) in energies.iter().enumerate().filter(|(_, e)| !e.is_empty()) {
+        let pulse = &observations.pulses[band];
+        let half_s = HALF_BANDWIDTH_TIMES / pulse.bandwidth_hz;
+        let at_direct = measured.early.gate(band, measured.direct_s, half_s);
+        let at_own = measured.early.gate(band, times[own], half_s);
+        let (Some(reference), Some(energy)) = (at_direct.filter(|e| *e > 0.0), at_own) else { continue };
+        let Some([present, missing]) = expected(pulse, energies, times, own, half_s) else { continue };
+        let of_direct = pulse.before(half_s) - pulse.before(-half_s);
+        let ratio = energy / reference * of_direct;
+        there += ln_gamma_density(ratio, present);
+        gone += ln_gamma_density(ratio, missing);
+        told += 1;
+    }
+    if told == 0 {
+        return None;
+    }
+    let even = -(told as f64) * ODD_RANGE.ln();
+    let odd = add(gone, even) + (0.5 * ODD_SHARE).ln();
+    let present_nats = add(there + (1.0 - ODD_SHARE).ln(), odd);
+    Some((present_nats, add(gone + (1.0 - ODD_SHARE).ln(), even + ODD_SHARE.ln())))
+}
+
 /// Logarithms of the isolated reflections' energies at fitted absorption.
-fn fitted(state: &BandState, baseline: &Baseline, absorption: &[f64], band: usize) -> Vec<f64> {
-    let (materials, layout) = (baseline.simulation.absorption.len(), baseline.decay_layout());
+fn fitted(
+    state: &BandState,
+    survey: &Survey,
+    simulation: &Simulation,
+    absorption: &[f64],
+    band: usize,
+) -> Vec<f64> {
+    let (materials, layout) = (simulation.absorption.len(), DecayLayout::of(survey));
     let change: Vec<f64> = (0..materials)
         .map(|m| {
-            ((1.0 - absorption[layout.absorption(m, band)]) / (1.0 - baseline.simulation.absorption[m][band]))
-                .ln()
+            ((1.0 - absorption[layout.absorption(m, band)]) / (1.0 - simulation.absorption[m][band])).ln()
         })
         .collect();
     let one = |(i, l): (usize, &f64)| {

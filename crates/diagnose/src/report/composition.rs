@@ -1,5 +1,6 @@
 //! Puts a diagnosis together from what was found.
 
+use crate::effect::info::discriminating_measurement;
 use crate::effect::{Effect, Observable};
 use crate::error::Error;
 use crate::extend::extension;
@@ -12,7 +13,6 @@ use crate::infer::search::{EffectScore, Search, State};
 use crate::infer::selection::Selection;
 use crate::report::diagnosis::{CandidateScore, Cause, Diagnosis, FittedMaterial, LackOfFit, Verdict};
 use crate::report::found_parameters::{at_bounds, parameters};
-use crate::report::next_measurement::discriminating_measurement;
 use crate::report::notes::{Circumstances, notes};
 use crate::report::residual_map::residual_map;
 use sabine_acoustics::Observer;
@@ -38,7 +38,7 @@ pub(crate) fn compose(
         Verdict::Ambiguous => found.rivals.iter().map(|r| (*r).to_owned()).collect(),
         _ => Vec::new(),
     };
-    let isolability = isolability(baseline, &search.candidates)?;
+    let isolability = isolability(baseline, &search.candidates, effects)?;
     let candidates = candidate_scores(search, state, found, observer)?;
     let cases_now = search.cases_of(&state.chosen, Observable::Decay);
     let (residuals, dispersion) = residual_map(baseline, base, &cases_now, state);
@@ -50,7 +50,7 @@ pub(crate) fn compose(
         let after = compare(baseline, &cases_now, &state.energy.values, &all);
         decay_curves(baseline, &before, &after, false)
     };
-    let model = extension::extended_model(baseline, search, state);
+    let model = extension::extended_model(search, state);
     let notes = notes_on(search, &confirmed, first_dispersion);
     let mut seconds: Vec<(String, f64)> =
         baseline.seconds.iter().map(|(stage, s)| ((*stage).to_owned(), *s)).collect();
@@ -68,7 +68,7 @@ pub(crate) fn compose(
             dispersion,
         },
         causes,
-        would_decide: words_that_decide(&alternatives),
+        would_decide: words_that_decide(effects, &alternatives),
         alternatives,
         candidates,
         isolability,
@@ -96,7 +96,7 @@ fn causes(
         Ok(Cause {
             effect: own.id.to_owned(),
             subject: own.case.subject(),
-            explanation: effects[own.effect].explanation().to_owned(),
+            explanation: effects[own.effect].info().explanation.to_owned(),
             probability: found.probability(candidate),
             nats: without(search, state, candidate)?,
             parameters: parameters(search, state, candidate),
@@ -163,11 +163,13 @@ fn without(search: &Search<'_>, state: &State, candidate: usize) -> Result<f64, 
 }
 
 /// What would tell each two of the alternatives apart.
-fn words_that_decide(alternatives: &[String]) -> Vec<String> {
+fn words_that_decide(effects: &[Box<dyn Effect>], alternatives: &[String]) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     for (i, a) in alternatives.iter().enumerate() {
         for b in &alternatives[i + 1..] {
-            let word = discriminating_measurement(a, b).to_string();
+            let info = |id: &String| effects.iter().map(|e| e.info()).find(|info| info.id == id);
+            let (Some(a), Some(b)) = (info(a), info(b)) else { continue };
+            let word = discriminating_measurement(&a, &b).to_string();
             if !words.contains(&word) {
                 words.push(word);
             }

@@ -2,7 +2,7 @@
 
 pub(crate) mod composition;
 pub(crate) mod diagnosis;
+mod document;
 pub(crate) mod found_parameters;
-pub(crate) mod next_measurement;
 pub(crate) mod notes;
 pub(crate) mod residual_map;

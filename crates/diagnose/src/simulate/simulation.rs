@@ -3,7 +3,6 @@
 mod retracing;
 mod waves;
 
-pub(crate) use retracing::Retracing;
 pub(crate) use waves::bands_of_modes;
 
 use crate::config::DiagnoseConfig;

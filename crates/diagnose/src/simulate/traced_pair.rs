@@ -1,6 +1,7 @@
 //! Traced paths between one source and one receiver, and the energies that they predict.
 
 mod diffracted;
+mod gathering;
 mod isolated_reflections;
 mod local_reaction;
 mod scattering;
@@ -15,7 +16,6 @@ use crate::observe::time_bins::Bins;
 use crate::simulate::hit_groups;
 use rayon::prelude::*;
 use sabine_acoustics::{Air, Conditions, Error, Material, PathSet};
-use std::collections::BTreeMap;
 
 /// Extra scattering at which energies are tabulated.
 pub(crate) const SCATTERING_GRID: [f64; 8] = [-1.0, -0.5, 0.0, 0.1, 0.25, 0.45, 0.7, 0.95];
@@ -321,150 +321,6 @@ impl TracedPair {
         }
         sums
     }
-
-    fn band(
-        &self,
-        band: usize,
-        energies: &[f32],
-        bins: Bins,
-        kernel: &BandPulse,
-        duration_s: f64,
-    ) -> BandState {
-        let m = self.paths.materials();
-        // Of a bin: energy, time, departure, its products. Of a group: energy, hits.
-        const COLUMNS: usize = 11;
-        let width = 1 + m;
-        let count = bins.count(duration_s);
-        let cells = (duration_s / CELL_S).ceil() as usize + 1;
-        let mut gathered = vec![0.0f64; cells * COLUMNS];
-        let mut grouped = vec![0.0f64; cells * hit_groups::MAX_GROUPS * width];
-        let mut sums = vec![0.0f64; count * COLUMNS];
-        // Groups of each bin, by slice of time and number.
-        let mut rows: Vec<BTreeMap<(usize, u8), Vec<f64>>> = vec![BTreeMap::new(); count];
-        // For the spread: energy in cells, exact paths included, and squares of the exact ones in each bin.
-        let mut all_cells = vec![0.0f64; cells];
-        let mut squares = vec![0.0f64; count];
-        let mut exact_cells = vec![0.0f64; cells];
-        let mut timing_variance = vec![0.0f64; count];
-        // Early exact paths by their very times: two that come together add or cancel as a whole.
-        let mut isolated_reflections: Vec<Vec<(f64, f64)>> = vec![Vec::new(); count];
-        let mut isolated_row = vec![0.0f64; width];
-        for (i, &e) in energies.iter().enumerate() {
-            let time_s = f64::from(self.times_s[i]);
-            let cell = (time_s.max(0.0) / CELL_S) as usize;
-            if cell >= cells || e == 0.0 {
-                continue;
-            }
-            let e = f64::from(e);
-            let exact = self.paths.is_exact(i);
-            let [x, y, z] = self.departures[i].map(f64::from);
-            let row = [1.0, time_s, x, y, z, x * x, y * y, z * z, x * y, x * z, y * z].map(|v| v * e);
-            let hits = &self.hits[i * m..(i + 1) * m];
-            let group = self.groups[i];
-            if exact && time_s < ISOLATED_S {
-                isolated_row[0] = e;
-                isolated_row[1..].iter_mut().zip(hits).for_each(|(a, n)| *a = e * f64::from(*n));
-                let slice = hit_groups::slice(self.times_s[i]);
-                let mut moved: BTreeMap<usize, f64> = BTreeMap::new();
-                for (shift_s, sign) in [(TIME_SD_S, 0.5), (-TIME_SD_S, -0.5)] {
-                    Self::shares(time_s + shift_s, bins, kernel, count, |bin, share| {
-                        *moved.entry(bin).or_default() += sign * share;
-                    });
-                }
-                moved.into_iter().for_each(|(bin, change)| timing_variance[bin] += (change * e).powi(2));
-                Self::shares(time_s, bins, kernel, count, |bin, share| {
-                    isolated_reflections[bin].push((time_s, share * e));
-                    add(&mut sums[bin * COLUMNS..(bin + 1) * COLUMNS], &row, share);
-                    let own = rows[bin].entry((slice, group)).or_insert_with(|| vec![0.0; width]);
-                    add(own, &isolated_row, share);
-                });
-                continue;
-            }
-            all_cells[cell] += e;
-            if exact {
-                exact_cells[cell] += e * e;
-            }
-            add(&mut gathered[cell * COLUMNS..(cell + 1) * COLUMNS], &row, 1.0);
-            let own = &mut grouped[(cell * hit_groups::MAX_GROUPS + usize::from(group)) * width..][..width];
-            own[0] += e;
-            own[1..].iter_mut().zip(hits).for_each(|(a, n)| *a += e * f64::from(*n));
-        }
-        // Energy of each cell in each bin, for the spread.
-        let mut weighted: Vec<Vec<(usize, f64)>> = vec![Vec::new(); count];
-        for cell in 0..cells {
-            if all_cells[cell] == 0.0 {
-                continue;
-            }
-            let time_s = (cell as f64 + 0.5) * CELL_S;
-            let slice = hit_groups::slice(time_s as f32);
-            Self::shares(time_s, bins, kernel, count, |bin, share| {
-                weighted[bin].push((cell, share * all_cells[cell]));
-                squares[bin] += share * share * exact_cells[cell];
-                if gathered[cell * COLUMNS] == 0.0 {
-                    return;
-                }
-                let own = &gathered[cell * COLUMNS..(cell + 1) * COLUMNS];
-                add(&mut sums[bin * COLUMNS..(bin + 1) * COLUMNS], own, share);
-                for group in 0..hit_groups::MAX_GROUPS {
-                    let own = &grouped[(cell * hit_groups::MAX_GROUPS + group) * width..][..width];
-                    if own[0] > 0.0 {
-                        let row = rows[bin].entry((slice, group as u8)).or_insert_with(|| vec![0.0; width]);
-                        add(row, own, share);
-                    }
-                }
-            });
-        }
-        let (_, monte_carlo_variance) = self.sums_and_variance(energies, bins, kernel, duration_s);
-        let floor = NOTHING * (0..count).map(|k| sums[k * COLUMNS]).fold(0.0, f64::max).max(1e-30);
-        let mut state = BandState {
-            bins,
-            ln_energy: Vec::with_capacity(count),
-            own_share: kernel.shares[band],
-            leaks: Vec::new(),
-            groups: vec![0],
-            group_energy: Vec::new(),
-            group_hits: Vec::new(),
-            time_s: Vec::with_capacity(count),
-            departure: Vec::with_capacity(count),
-            departure_products: Vec::with_capacity(count),
-            variance: Vec::with_capacity(count),
-            monte_carlo: Vec::with_capacity(count),
-            diffracted: DiffractedEnergy::default(),
-            scattering: Vec::new(),
-            scattering_variance: Vec::new(),
-            local_reaction: Vec::new(),
-            waves: Vec::new(),
-        };
-        for bin in 0..count {
-            let s = &sums[bin * COLUMNS..(bin + 1) * COLUMNS];
-            let e = s[0].max(floor);
-            state.ln_energy.push(e.ln());
-            state.time_s.push(if s[0] > floor { s[1] / e } else { bins.centre_s(bin) });
-            state.departure.push(std::array::from_fn(|k| s[2 + k] / e));
-            state.departure_products.push(std::array::from_fn(|k| s[5 + k] / e));
-            for row in rows[bin].values().filter(|r| r[0] > 0.0) {
-                state.group_energy.push(row[0]);
-                state.group_hits.extend(row[1..].iter().map(|h| h / row[0]));
-            }
-            if s[0] <= floor {
-                state.group_energy.push(floor);
-                state.group_hits.extend(std::iter::repeat_n(0.0, m));
-            }
-            state.groups.push(state.group_energy.len());
-            let interference = interference(&weighted[bin], kernel)
-                - 2.0 * kernel.cell_correlation[0] * squares[bin]
-                + pairwise_interference(&isolated_reflections[bin], kernel)
-                + timing_variance[bin];
-            let monte_carlo = monte_carlo_variance[bin];
-            state.monte_carlo.push(monte_carlo / (e * e));
-            let coherent = bins.centre_s(bin) < COHERENT_BANDWIDTH_TIMES / kernel.bandwidth_hz;
-            let model_sd = if coherent { COHERENT_SD } else { MODEL_SD };
-            let variance = (interference.max(0.0) + monte_carlo) / (e * e) + model_sd * model_sd;
-            // Nothing scatters more than the square of one Gaussian sample.
-            state.variance.push(variance.min(2.0));
-        }
-        state
-    }
 }
 
 /// Cell of each path, and the paths that are in none.
@@ -483,35 +339,4 @@ fn in_cells(paths: &PathSet, times_s: &[f32]) -> (Vec<u16>, Vec<u32>) {
         })
         .collect();
     (cells, isolated)
-}
-
-/// Variance of the energy of single pulses of random sign: four times the sum over pairs of w_i w_j r_ij^2.
-fn pairwise_interference(isolated_reflections: &[(f64, f64)], kernel: &BandPulse) -> f64 {
-    let mut sum = 0.0;
-    for (i, &(time_s, energy)) in isolated_reflections.iter().enumerate() {
-        for &(other_s, more) in &isolated_reflections[i + 1..] {
-            sum += energy * more * kernel.correlation_sq(other_s - time_s);
-        }
-    }
-    4.0 * sum
-}
-
-fn add(target: &mut [f64], more: &[f64], share: f64) {
-    target.iter_mut().zip(more).for_each(|(t, x)| *t += share * x);
-}
-
-/// Variance of the energy in a bin if all pulses had random signs: twice the sum of w_i w_j r_ij^2 over all i and j, two paths of
-/// one cell being as alike as two times in it are on the average, a path and itself no more.
-fn interference(cells: &[(usize, f64)], kernel: &BandPulse) -> f64 {
-    let mut sum = 0.0;
-    for (i, &(cell, energy)) in cells.iter().enumerate() {
-        sum += energy * energy * kernel.cell_correlation[0];
-        for &(other, more) in &cells[i + 1..] {
-            match kernel.cell_correlation.get(other - cell) {
-                Some(cell_correlation) => sum += 2.0 * energy * more * cell_correlation,
-                None => break,
-            }
-        }
-    }
-    2.0 * sum
 }

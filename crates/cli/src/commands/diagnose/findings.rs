@@ -5,7 +5,6 @@ use sabine::diagnose::{
     ResidualCell, Verdict,
 };
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value, json};
 
 /// Everything that is told: the parts of a [`Diagnosis`], and what the program knows besides.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -68,31 +67,28 @@ impl Findings {
     pub fn total_s(&self) -> f64 {
         self.seconds.iter().filter(|(stage, _)| stage != "waves").map(|(_, s)| s).sum()
     }
+}
 
-    /// The contents of `diagnosis.json`: parameters and materials by name, residuals as the mean over all positions.
-    pub fn json(&self) -> serde_json::Result<String> {
-        let mut value = serde_json::to_value(self)?;
-        let by_name =
-            |pairs: &mut dyn Iterator<Item = (String, Value)>| Value::Object(pairs.collect::<Map<_, _>>());
-        let causes = self.causes.iter().map(|cause| {
-            let parameters = cause.parameters.iter().map(|p| {
-                let told = json!({ "value": p.value, "low": p.low, "high": p.high, "unit": p.unit });
-                (p.name.clone(), told)
-            });
-            let mut told = serde_json::to_value(cause)?;
-            told["parameters"] = by_name(&mut parameters.into_iter());
-            Ok(told)
-        });
-        value["causes"] = causes.collect::<serde_json::Result<Value>>()?;
-        let materials = self.materials.iter().map(|(name, m)| Ok((name.clone(), serde_json::to_value(m)?)));
-        let materials = materials.collect::<serde_json::Result<Vec<_>>>()?;
-        value["materials"] = by_name(&mut materials.into_iter());
-        value["seconds"] = by_name(&mut self.seconds.iter().map(|(stage, s)| (stage.clone(), json!(s))));
-        let mean: Vec<&ResidualCell> = self.residuals.iter().filter(|c| c.response.is_none()).collect();
-        value["residuals"] = serde_json::to_value(mean)?;
-        if let Some(told) = value.as_object_mut() {
-            told.remove("decays");
-        }
-        serde_json::to_string_pretty(&value)
-    }
+/// What the program adds to a diagnosis in `diagnosis.json`.
+#[derive(Serialize)]
+struct Document<'a> {
+    room: &'a str,
+    responses: usize,
+    receivers: usize,
+    threshold_nats: f64,
+    #[serde(flatten)]
+    diagnosis: &'a Diagnosis,
+}
+
+/// The contents of `diagnosis.json`.
+pub fn json(
+    diagnosis: &Diagnosis,
+    room: &str,
+    responses: usize,
+    receivers: usize,
+    threshold_nats: f64,
+) -> serde_json::Result<String> {
+    let document = Document { room, responses, receivers, threshold_nats, diagnosis };
+    // By way of a value: its keys are in alphabetical order.
+    serde_json::to_string_pretty(&serde_json::to_value(document)?)
 }

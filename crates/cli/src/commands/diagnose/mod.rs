@@ -83,8 +83,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     receivers.sort_unstable();
     receivers.dedup();
     let model = diagnosis.model.to_toml()?;
-    let findings = Findings::new(diagnosis, name, room.responses().len(), receivers.len(), threshold_nats);
-    out.write("diagnosis.json", findings.json()?.as_bytes())?;
+    let (responses, receivers) = (room.responses().len(), receivers.len());
+    let json = findings::json(&diagnosis, &name, responses, receivers, threshold_nats)?;
+    out.write("diagnosis.json", json.as_bytes())?;
+    let findings = Findings::new(diagnosis, name, responses, receivers, threshold_nats);
     out.write("report.html", report::html(&findings)?.as_bytes())?;
     out.write("extended_model.toml", model.as_bytes())?;
     out.finish()?;

@@ -36,7 +36,7 @@ fn findings(verdict: &str, changes: &Value) -> Findings {
 fn a_named_cause_is_told_with_its_figures() {
     let page = html(&findings("explained", &json!({}))).unwrap();
     for part in [
-        "Found: Air drier or damper than stated.",
+        "Found: Air drier or more humid than stated.",
         "It was &lt;dry&gt;.",
         "17.0 %",
         "15.0 and 19.0",
@@ -44,7 +44,7 @@ fn a_named_cause_is_told_with_its_figures() {
         "7.0 dB below",
         "2.00 dB off before, 0.50 dB after",
         "too few microphone positions",
-        "nothing speaks for: Latency left in",
+        "nothing speaks for: Latency not removed",
         "To tell them apart: Read a thermometer.",
     ] {
         assert!(page.contains(part), "{part}");

@@ -1,37 +1,15 @@
 //! The catalogue's identifiers in plain words.
 
 use super::findings::Findings;
-use sabine::diagnose::{Cause, FoundParameter, Verdict};
+use sabine::diagnose::{Cause, FoundParameter, Verdict, catalogue};
 
 /// Below this probability chance is not believed, as by default in the diagnosis.
 const UNLIKELY: f64 = 0.01;
 
-/// What an effect is called.
+/// The title of an effect; one that is not in the catalogue is called by its identifier.
 pub fn effect(id: &str) -> String {
-    let known = match id {
-        "transducer_response" => "Loudspeaker or microphone not flat",
-        "air_absorption" => "Air drier or damper than stated",
-        "source_directivity" => "Directional loudspeaker",
-        "scattering" => "Surfaces scatter otherwise",
-        "surface_absorption" => "One surface absorbs otherwise",
-        "background_noise" => "Background noise",
-        "coupled_volume" => "A second space that rings on",
-        "truncation" => "Responses cut off early",
-        "sound_speed" => "Air warmer or colder than stated",
-        "sampling_clock" => "Sampling clock off",
-        "room_dimensions" => "Room dimensions off",
-        "position_error" => "A position off",
-        "time_zero" => "Latency left in",
-        "channel_fault" => "Fault of one channel",
-        "extra_reflector" => "A surface that the model lacks",
-        "angle_dependent_absorption" => "Walls absorb by angle",
-        "open_patch" => "An opening in a wall",
-        "nonlinear_distortion" => "Loudspeaker overdriven",
-        "edge_diffraction" => "Sound bends around edges",
-        "room_modes" => "Standing waves in the lowest octaves",
-        other => return other.replace('_', " "),
-    };
-    known.to_owned()
+    let title = catalogue().iter().map(|e| e.info()).find(|info| info.id == id).map(|info| info.title);
+    title.map_or_else(|| id.replace('_', " "), str::to_owned)
 }
 
 /// An effect and what it concerns.

@@ -2,6 +2,8 @@
 
 mod harmonics;
 
+use crate::effect::EffectInfo;
+use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{AuxiliaryEvidence, Case, Effect, Observable, Parameter};
 use crate::observe::pre_arrival::PreArrival;
 use crate::survey::Survey;
@@ -24,12 +26,13 @@ use std::sync::{Mutex, PoisonError};
 pub struct NonlinearDistortion;
 
 impl Effect for NonlinearDistortion {
-    fn id(&self) -> &'static str {
-        "nonlinear_distortion"
-    }
-
-    fn explanation(&self) -> &'static str {
-        "The loudspeaker (or an amplifier) was overdriven: harmonics of the sweep come before the direct sound."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(
+            "nonlinear_distortion",
+            "Loudspeaker overdriven",
+            "The loudspeaker or an amplifier was overdriven: harmonics of the sweep come before the direct sound.",
+        )
+        .decided_by(9, NextMeasurement::Quieter)
     }
 
     fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {

@@ -1,13 +1,15 @@
 //! Reflections that the mesh does not have: what effects add, where peaks point, and the fit from there.
 
 use super::{ArrivalData, ArrivalModel, PEAKS_S, REFLECTION_SD_S, STRAY_SHARE, WIDTHS_S, at_fit, normal};
-use crate::effect::{Case, Nuisance};
+use crate::effect::{Case, FittedCase, Nuisance};
 use crate::error::Error;
+use crate::extend::model_change::ModelChange;
 use crate::likelihood::laplace::{LaplaceFit, maximise};
 use crate::likelihood::multilateration::{UnassignedPeak, UnassignedPeaks};
 use crate::likelihood::parameters::ModelTerm;
 use crate::simulate::traced_pair::{Arrival, IsolatedReflection};
 use crate::simulate::views::ArrivalView;
+use crate::survey::Survey;
 
 /// Images nearer to each other than this are one, in metres.
 const SAME_M: f64 = 0.3;
@@ -118,7 +120,7 @@ impl<'a> ArrivalModel<'a> {
         let mut later_s = 0.0;
         for placed in &self.terms {
             let own = placed.own(values);
-            if placed.case.warmer_by_k(own, self.data.survey) == 0.0 {
+            if !is_warmer(placed.case, own, self.data.survey) {
                 later_s += placed.case.delay_s(own, &view);
             }
         }
@@ -140,6 +142,13 @@ impl<'a> ArrivalModel<'a> {
         }
         later_s
     }
+}
+
+/// Whether a case changes the temperature, which is in the times of paths once they are traced again.
+fn is_warmer(case: &dyn Case, own: &[f64], survey: &Survey) -> bool {
+    let stated = survey.air.temperature_c();
+    let changes = case.model_changes(&FittedCase::of_values(survey, own));
+    changes.iter().any(|change| matches!(change, ModelChange::Temperature(celsius) if *celsius != stated))
 }
 
 /// Fits without the case at `place`, then with it from wherever the peaks that are left point; the best end counts.

@@ -3,53 +3,46 @@
 use super::Simulation;
 use crate::effect::Nuisance;
 use crate::error::Error;
-use crate::extend::extended_model::Dimensions;
+use crate::extend::model_change::ModelChange;
 use crate::simulate::edges::Edges;
 use crate::simulate::traced_pair::TracedPair;
 use crate::survey::Survey;
 use sabine_acoustics::Air;
 
-/// A change that moves paths. Arrival times stay relative to what is stated.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Retracing {
-    /// A source or receiver stands so many metres off along each axis.
-    Position(Nuisance, [f64; 3]),
-    /// The air is so many kelvin warmer.
-    Warmer(f64),
-    /// The room has another size.
-    Dimensions(Dimensions),
-}
-
 impl Simulation {
-    /// Takes the change into all paths that it concerns. Energies follow with the next expansion.
-    pub fn apply(&mut self, change: &Retracing, survey: &Survey) -> Result<(), Error> {
-        let moved = |position: [f64; 3], by: &[f64; 3]| std::array::from_fn(|k| position[k] + by[k]);
+    /// Takes a change into all paths that it moves, and says whether there are any. Energies follow with the next expansion; arrival times
+    /// stay relative to what is stated.
+    pub fn apply(&mut self, change: &ModelChange, survey: &Survey) -> Result<bool, Error> {
         match change {
-            Retracing::Position(place, offset_m) => {
-                match *place {
-                    Nuisance::SourcePosition(i) => {
-                        self.sources[i].position_m = moved(survey.sources[i].position_m, offset_m);
-                    }
-                    Nuisance::ReceiverPosition(i) => {
-                        self.receivers[i].position_m = moved(survey.receivers[i].position_m, offset_m);
-                    }
-                    Nuisance::Absorption(_) | Nuisance::ResponseGain(_) => return Ok(()),
+            ModelChange::Position { id, position_m } => {
+                if let Some(i) = self.sources.iter().position(|s| s.id == *id) {
+                    self.sources[i].position_m = *position_m;
+                    self.retrace(Nuisance::SourcePosition(i), survey)?;
+                } else if let Some(i) = self.receivers.iter().position(|r| r.id == *id) {
+                    self.receivers[i].position_m = *position_m;
+                    self.retrace(Nuisance::ReceiverPosition(i), survey)?;
                 }
-                self.retrace(*place, survey)
             }
-            Retracing::Warmer(kelvin) => {
-                self.warmer_k = *kelvin;
-                (0..self.pairs.len()).try_for_each(|pair| self.set_air(pair, survey))
+            ModelChange::Temperature(celsius) => {
+                let warmer_k = celsius - survey.air.temperature_c();
+                if warmer_k == 0.0 {
+                    return Ok(false);
+                }
+                self.warmer_k = warmer_k;
+                (0..self.pairs.len()).try_for_each(|pair| self.set_air(pair, survey))?;
             }
-            Retracing::Dimensions(dimensions) => {
+            ModelChange::Dimensions(dimensions) => {
                 let resized = dimensions.applied(&self.scene)?;
                 self.prepared = self.tracer.prepare(&resized, self.traced_until_s)?;
                 self.edges = Edges::find(&resized)?;
                 self.resized = Some(resized);
-                (0..self.sources.len())
-                    .try_for_each(|source| self.retrace(Nuisance::SourcePosition(source), survey))
+                for source in 0..self.sources.len() {
+                    self.retrace(Nuisance::SourcePosition(source), survey)?;
+                }
             }
+            _ => return Ok(false),
         }
+        Ok(true)
     }
 
     /// Traces the pairs of a place again. If the fitted position lies outside the room, the paths from the stated one are kept.

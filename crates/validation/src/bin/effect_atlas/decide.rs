@@ -4,7 +4,9 @@ use crate::AnyError;
 use crate::trial::{Task, named};
 use rand::seq::IndexedRandom;
 use rand::{SeedableRng, rngs::SmallRng};
-use sabine::diagnose::{Diagnosis, NextMeasurement, Verdict, discriminating_measurement};
+use sabine::diagnose::{
+    Diagnosis, EffectInfo, NextMeasurement, Verdict, catalogue, discriminating_measurement,
+};
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
 use std::path::Path;
 
@@ -77,7 +79,10 @@ pub fn follow_up(
     folder: &Path,
 ) -> Result<FollowUp, AnyError> {
     let rival = set.iter().find(|s| *s != hidden.id()).ok_or("a set of one")?;
-    let asked = discriminating_measurement(hidden.id(), rival);
+    let effects = catalogue();
+    let info = |id: &str| effects.iter().map(|e| e.info()).find(|info| info.id == id);
+    let info = |id: &str| info(id).unwrap_or(EffectInfo::new("", "", ""));
+    let asked = discriminating_measurement(&info(hidden.id()), &info(rival));
     let rest: Vec<NextMeasurement> = ALL.into_iter().filter(|m| *m != asked).collect();
     let mut random = SmallRng::seed_from_u64(task.seed);
     let other = *rest.choose(&mut random).ok_or("no other measurement")?;

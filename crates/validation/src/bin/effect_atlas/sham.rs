@@ -1,6 +1,6 @@
 //! Effects that mean nothing: a control. Whatever names one of them names by chance.
 
-use sabine::diagnose::{BandView, Case, Effect, Parameter, Survey};
+use sabine::diagnose::{BandView, Case, Effect, EffectInfo, Parameter, Survey};
 
 /// Identifiers of the shams.
 pub const IDS: [&str; 14] = [
@@ -37,12 +37,8 @@ impl Sham {
 }
 
 impl Effect for Sham {
-    fn id(&self) -> &'static str {
-        IDS[self.number]
-    }
-
-    fn explanation(&self) -> &'static str {
-        "Nothing: this is a control."
+    fn info(&self) -> EffectInfo {
+        EffectInfo::new(IDS[self.number], "Control", "Nothing: this is a control.")
     }
 
     fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {

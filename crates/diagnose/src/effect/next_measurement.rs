@@ -38,6 +38,8 @@ pub enum NextMeasurement {
     MorePositions,
     /// More positions, and the source in another place.
     MorePositionsAndSource,
+    /// Anything else, in one sentence.
+    Other(&'static str),
 }
 
 impl fmt::Display for NextMeasurement {
@@ -78,48 +80,8 @@ impl fmt::Display for NextMeasurement {
                 "Measure with the source in another place: standing waves change with it, loudspeakers and walls do not."
             }
             Self::MorePositions => "Measure at more positions, some of them close to the walls.",
+            Self::Other(text) => text,
             Self::MorePositionsAndSource => "Measure at more positions, with the source in another place.",
         })
     }
-}
-
-/// What would tell two effects of the catalogue apart.
-///
-/// ```
-/// use sabine_diagnose::{NextMeasurement, discriminating_measurement};
-/// assert_eq!(discriminating_measurement("sampling_clock", "sound_speed"), NextMeasurement::ClockOrThermometer);
-/// assert_eq!(discriminating_measurement("coupled_volume", "background_noise"), discriminating_measurement("background_noise", "coupled_volume"));
-/// ```
-pub fn discriminating_measurement(a: &str, b: &str) -> NextMeasurement {
-    let is = |x: &str, y: &str| (a == x && b == y) || (a == y && b == x);
-    let has = |x: &str| a == x || b == x;
-    if is("sound_speed", "sampling_clock") {
-        return NextMeasurement::ClockOrThermometer;
-    }
-    if is("air_absorption", "surface_absorption") || is("air_absorption", "scattering") {
-        return NextMeasurement::OtherHumidity;
-    }
-    if is("coupled_volume", "background_noise") {
-        return NextMeasurement::LouderAndLonger;
-    }
-    // The first of these that is among the two.
-    let by_effect = [
-        ("coupled_volume", NextMeasurement::DoorsClosed),
-        ("background_noise", NextMeasurement::LongerWithSilence),
-        ("truncation", NextMeasurement::LongerWithSilence),
-        ("source_directivity", NextMeasurement::TurnedSource),
-        ("time_zero", NextMeasurement::Loopback),
-        ("position_error", NextMeasurement::Distances),
-        ("room_dimensions", NextMeasurement::Distances),
-        ("sound_speed", NextMeasurement::Distances),
-        ("channel_fault", NextMeasurement::ExchangedChannel),
-        ("nonlinear_distortion", NextMeasurement::Quieter),
-        ("angle_dependent_absorption", NextMeasurement::AlongWalls),
-        ("open_patch", NextMeasurement::PatchClosed),
-        ("extra_reflector", NextMeasurement::ObjectsRemoved),
-        ("room_modes", NextMeasurement::OtherSourcePlace),
-        ("scattering", NextMeasurement::MorePositions),
-    ];
-    let found = by_effect.iter().find(|(effect, _)| has(effect));
-    found.map_or(NextMeasurement::MorePositionsAndSource, |(_, measurement)| *measurement)
 }

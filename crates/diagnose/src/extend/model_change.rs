@@ -1,0 +1,155 @@
+//! A change of the model: what a named cause does to the room and to the recording.
+
+use crate::extend::extended_model::{CoupledDecay, Dimensions, ExtendedModel, GainOverTime, ThinPanel};
+use std::collections::BTreeMap;
+
+/// One change of the model. [`ExtendedModel`] holds all of them and renders; those that move paths are traced again while the search goes
+/// on.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ModelChange {
+    /// Gain of loudspeaker and microphone by band, in dB.
+    BandGains(Vec<f64>),
+    /// Relative humidity in percent.
+    RelativeHumidity(f64),
+    /// Temperature in degrees Celsius.
+    Temperature(f64),
+    /// First-order pattern of the sources: directed share by band, 0 to 1, and the axis of each source by name.
+    SourcePattern {
+        /// Directed share by band.
+        directed_share: Vec<f64>,
+        /// Axis of each source.
+        axis: BTreeMap<String, [f64; 3]>,
+    },
+    /// Scattering by material and band.
+    Scattering(BTreeMap<String, Vec<f64>>),
+    /// Noise by band: energy per second relative to that of the direct sound at 1 m.
+    Noise(Vec<f64>),
+    /// The decay of a coupled volume.
+    CoupledVolume(CoupledDecay),
+    /// Below this frequency in Hz responses are those of the wave equation.
+    WaveBelow(f64),
+    /// End of the response and length of its fade, in seconds from the first sample.
+    Truncation([f64; 2]),
+    /// Deviation of the sampling clock in parts per million.
+    Clock(f64),
+    /// Size of the room.
+    Dimensions(Dimensions),
+    /// A flat surface that the mesh lacks.
+    Panel(ThinPanel),
+    /// Sound is diffracted at the edges of the mesh.
+    Diffraction,
+    /// Latency of all responses in seconds.
+    Latency(f64),
+    /// Position of a source or receiver, by name, in metres.
+    Position {
+        /// Its name.
+        id: String,
+        /// Metres.
+        position_m: [f64; 3],
+    },
+    /// A response (SOURCE-RECEIVER) whose sign is turned.
+    Inverted(String),
+    /// Gain of one response (SOURCE-RECEIVER) in dB.
+    ResponseGain {
+        /// The response.
+        response: String,
+        /// Its gain in dB.
+        gain_db: f64,
+    },
+    /// Two responses that were exchanged.
+    Exchanged([String; 2]),
+    /// Gain of all responses over the time of the file.
+    GainOverTime(GainOverTime),
+}
+
+impl ExtendedModel {
+    /// Takes a change into the model.
+    pub fn apply(&mut self, change: ModelChange) {
+        match change {
+            ModelChange::BandGains(gain_db) => self.gain_db = gain_db,
+            ModelChange::RelativeHumidity(percent) => self.relative_humidity_percent = Some(percent),
+            ModelChange::Temperature(celsius) => self.temperature_c = Some(celsius),
+            ModelChange::SourcePattern { directed_share, axis } => {
+                self.directed_share = directed_share;
+                self.axis = axis;
+            }
+            ModelChange::Scattering(scattering) => self.scattering = scattering,
+            ModelChange::Noise(energy_per_s) => self.noise_per_s = energy_per_s,
+            ModelChange::CoupledVolume(decay) => self.coupled = Some(decay),
+            ModelChange::WaveBelow(hz) => self.wave_below_hz = Some(hz),
+            ModelChange::Truncation(end_and_fade_s) => self.truncation = Some(end_and_fade_s),
+            ModelChange::Clock(ppm) => self.clock_ppm = Some(ppm),
+            ModelChange::Dimensions(dimensions) => self.dimensions = Some(dimensions),
+            ModelChange::Panel(panel) => self.sheets.push(panel),
+            ModelChange::Diffraction => self.diffraction = true,
+            ModelChange::Latency(seconds) => self.latency_s = Some(seconds),
+            ModelChange::Position { id, position_m } => {
+                self.position_m.insert(id, position_m);
+            }
+            ModelChange::Inverted(response) => self.inverted.push(response),
+            ModelChange::ResponseGain { response, gain_db } => {
+                self.response_gain_db.insert(response, gain_db);
+            }
+            ModelChange::Exchanged(responses) => self.exchanged.push(responses),
+            ModelChange::GainOverTime(gain) => self.gain_over_time = Some(gain),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::{Effect, FittedCase, Nuisance};
+    use crate::effects::{ChannelFault, PositionError, SoundSpeed, TransducerResponse};
+    use crate::hand_made;
+    use sabine_acoustics::{Levels, TimeZero};
+
+    #[test]
+    fn changes_of_one_kind_that_concern_different_things_add_up() {
+        let survey = hand_made::survey(Levels::Common, TimeZero::Emission);
+        let mut model = ExtendedModel::default();
+        for (response, gain_db) in [(0, 3.0), (2, -4.0)] {
+            for case in ChannelFault.cases(&survey) {
+                let relaxed = Nuisance::ResponseGain(response);
+                if case.relaxes().iter().any(|(nuisance, _)| *nuisance == relaxed) {
+                    let mut fitted = FittedCase::of_values(&survey, &[]);
+                    fitted.relaxed.push((relaxed, vec![gain_db]));
+                    case.model_changes(&fitted).into_iter().for_each(|change| model.apply(change));
+                }
+            }
+        }
+        let expected = [("s0-r0".to_owned(), 3.0), ("s0-r2".to_owned(), -4.0)];
+        assert_eq!(model.response_gain_db, BTreeMap::from(expected));
+        let case = &PositionError.cases(&survey)[1];
+        let mut fitted = FittedCase::of_values(&survey, &[]);
+        fitted.relaxed.push((Nuisance::ReceiverPosition(0), vec![0.1, -0.2, 0.0]));
+        case.model_changes(&fitted).into_iter().for_each(|change| model.apply(change));
+        assert_eq!(model.position_m["r0"], [3.1, 1.3, 1.2]);
+    }
+
+    #[test]
+    fn every_case_of_the_catalogue_that_is_fitted_changes_the_model_or_says_why_not() {
+        let survey = hand_made::survey(Levels::Absolute, TimeZero::Emission);
+        // Absorption is always part of the model; the other two are named and not rendered.
+        let silent = ["surface_absorption", "angle_dependent_absorption", "nonlinear_distortion"];
+        for effect in crate::effects::catalogue() {
+            for case in effect.cases(&survey) {
+                let values: Vec<f64> = case.parameters(&survey).iter().map(|p| p.typical).collect();
+                let mut fitted = FittedCase::of_values(&survey, &values);
+                fitted.relaxed = case.relaxes().into_iter().map(|(n, _)| (n, vec![0.1; 3])).collect();
+                fitted.level_per_s = vec![1.0; survey.bands().len()];
+                fitted.confirmed = (0..survey.responses().len()).collect();
+                let changes = case.model_changes(&fitted).len();
+                assert_eq!(changes == 0, silent.contains(&effect.id()), "{}", effect.id());
+            }
+        }
+        assert_eq!(
+            SoundSpeed.cases(&survey)[0].model_changes(&FittedCase::of_values(&survey, &[23.0])),
+            [ModelChange::Temperature(23.0)]
+        );
+        let gains =
+            TransducerResponse.cases(&survey)[0].model_changes(&FittedCase::of_values(&survey, &[1.0, 2.0]));
+        assert_eq!(gains, [ModelChange::BandGains(vec![1.0, 2.0])]);
+    }
+}
