@@ -24,26 +24,42 @@ pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<(), Error> {
-    let failed = |source| Error::Io { path: path.to_owned(), source };
-    let (temporary, file) = create_beside(path).map_err(failed)?;
-    let written = fill(file, write).and_then(|()| std::fs::rename(&temporary, path));
-    written.map_err(|source| {
-        // The first error is the one to report; a fragment that cannot be removed either has the same cause.
-        let _ = std::fs::remove_file(&temporary);
-        failed(source)
-    })
-}
-
-fn fill(file: File, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
+    let (unfinished, file) = UnfinishedFile::create(path)?;
     let mut writer = BufWriter::new(file);
-    write(&mut writer)?;
-    writer.flush()?;
-    // Some file systems tell of a full disk only now.
-    writer.get_ref().sync_all()
+    let written = write(&mut writer).and_then(|()| writer.flush());
+    unfinished.finish(written.map(|()| writer.get_ref()))
 }
 
-fn create_beside(path: &Path) -> io::Result<(PathBuf, File)> {
-    take_name_beside(path, |name| OpenOptions::new().write(true).create_new(true).open(name))
+/// A file under a temporary name; dropped before it is finished, it goes.
+#[derive(Debug)]
+pub(crate) struct UnfinishedFile {
+    path: PathBuf,
+    temporary: PathBuf,
+}
+
+impl UnfinishedFile {
+    /// Creates a file beside `path`.
+    pub(crate) fn create(path: &Path) -> Result<(Self, File), Error> {
+        let make = |name: &Path| OpenOptions::new().write(true).create_new(true).open(name);
+        let (temporary, file) =
+            take_name_beside(path, make).map_err(|source| Error::Io { path: path.to_owned(), source })?;
+        Ok((Self { path: path.to_owned(), temporary }, file))
+    }
+
+    /// Brings what was written to the disk and gives the file its name. Some file systems tell of a full disk only now.
+    pub(crate) fn finish(self, written: io::Result<&File>) -> Result<(), Error> {
+        let done =
+            written.and_then(File::sync_all).and_then(|()| std::fs::rename(&self.temporary, &self.path));
+        done.map_err(|source| Error::Io { path: self.path.clone(), source })
+    }
+}
+
+impl Drop for UnfinishedFile {
+    fn drop(&mut self) {
+        // After the renaming there is none. Else the first error is the one to report: a fragment that cannot be removed has the
+        // same cause.
+        let _ = std::fs::remove_file(&self.temporary);
+    }
 }
 
 /// Makes a folder beside `path` that nothing else uses: hidden, so that nobody takes it for what it is to become.

@@ -105,13 +105,23 @@ pub enum Error {
         /// What is wrong with it.
         source: Box<Error>,
     },
-    /// A file that is no WAV. Other formats need the feature `symphonia`.
-    #[error("{}: not a WAV file (FLAC, Ogg and others need the feature `symphonia`)", path.display())]
-    NotWav {
+    /// A folder, a named pipe or a device where a file is needed.
+    #[error("{}: is {found}; a file is needed", path.display())]
+    NotAFile {
+        /// Its name.
+        path: PathBuf,
+        /// What it is, in words.
+        found: &'static str,
+    },
+    /// A file that is no sound, or sound in a format that is not read.
+    #[error("{}: this is {found}; sound is read from {}", path.display(), crate::audio::READ_FORMATS)]
+    AudioKind {
         /// The file.
         path: PathBuf,
+        /// What its first bytes, or its header, say that it is.
+        found: crate::FileKind,
     },
-    /// An audio file whose format cannot be decoded.
+    /// An audio file that contradicts itself, breaks off or holds what cannot be decoded.
     #[error("{}: {source}", path.display())]
     AudioFormat {
         /// The file.
@@ -128,6 +138,19 @@ pub enum Error {
         promised_bytes: u64,
         /// Length of the file.
         file_bytes: u64,
+    },
+    /// Speech, music or several measurements where one impulse response was expected.
+    #[error(
+        "{}: no impulse response: {bursts} bursts of sound in {duration_s:.1} s, where a response has one onset and a decay. Speech is for `sabine estimate`; several responses in one file must be cut apart",
+        path.display()
+    )]
+    NotAResponse {
+        /// The file.
+        path: PathBuf,
+        /// Times that the level rises by 10 dB to within 20 dB of the loudest.
+        bursts: usize,
+        /// Length of the file in seconds.
+        duration_s: f64,
     },
     /// A file of several channels where one was expected.
     #[error("{}: {channels} channels where one is needed: choose one, counted from 0, or their mean", path.display())]

@@ -38,7 +38,8 @@
 //!
 //! # Contents
 //! - [`Bands`], octaves or third octaves, and [`PerBand`] (IEC 61260-1).
-//! - Sound: [`Signal`], [`ImpulseResponse`] (**pressure**), [`read_audio`], [`write_wav`], [`resample()`].
+//! - Sound: [`Signal`], [`ImpulseResponse`] (**pressure**), [`read_audio`], [`write_wav`], [`resample()`]; for files of any length
+//!   [`AudioReader`], [`WavWriter`] and [`BlockResampler`], which work in blocks; [`read_response`].
 //! - Measures: [`RoomParameters`], [`BandParameters`] (full band and third octaves), [`DecayFit`], [`EnergyDecayCurve`],
 //!   [`equalisation()`], [`Onset`], [`FilterBank`]. A number comes as a [`Reading`]: an [`Estimate`] with its standard error, or
 //!   the reason ([`NoReading`]) why there is none.
@@ -93,8 +94,6 @@
 mod air;
 mod atomic_file;
 mod audio;
-#[cfg(feature = "symphonia")]
-mod audio_symphonia;
 mod band_energy;
 mod bands;
 mod conditions;
@@ -121,7 +120,9 @@ mod parameters;
 mod path_parameters;
 mod paths;
 mod progress;
+mod regular_file;
 mod resample;
+mod response_file;
 mod reweighting;
 mod scene;
 mod signal;
@@ -135,8 +136,8 @@ mod weld;
 pub use air::Air;
 pub use atomic_file::write_atomically;
 pub use audio::{
-    AudioInfo, Channel, SampleFormat, encode_wav, encode_wav_channels, probe_wav, read_audio, write_wav,
-    write_wav_channels,
+    AudioInfo, AudioReader, Channel, FileKind, SampleFormat, WavWriter, encode_wav, encode_wav_channels,
+    probe_audio, read_audio, write_wav, write_wav_channels,
 };
 pub use bands::{Bands, PerBand};
 pub use conditions::Conditions;
@@ -164,7 +165,9 @@ pub use parameters::{BandParameters, RoomParameters};
 pub use path_parameters::PathParameters;
 pub use paths::{Contribution, Incidence, PathSet, Reflection};
 pub use progress::{Observer, report};
-pub use resample::{resample, resample_response};
+pub use regular_file::open_file;
+pub use resample::{BlockResampler, resample, resample_response};
+pub use response_file::{LocatedResponse, read_response};
 pub use scene::{NamedMaterial, Receiver, Scene, Source, Triangle};
 pub use signal::{ImpulseResponse, Signal};
 pub use targets::RoomTargets;

@@ -13,7 +13,7 @@ pub use drawn_room::DrawnRoom;
 pub use notes::RoomNote;
 pub use write::{NewResponse, NewRoom};
 
-use crate::audio::{Channel, probe_wav, read_audio};
+use crate::audio::{Channel, probe_audio, read_audio};
 use crate::error::check_range;
 use crate::inside_folder::check_inside;
 use crate::{
@@ -173,7 +173,7 @@ impl MeasuredRoom {
     /// [`Error::TableWithoutMaterial`], [`Error::BandCount`], [`Error::Length`], [`Error::OutOfRange`],
     /// [`Error::UnknownBand`], [`Error::BandOrder`], [`Error::DuplicateId`], [`Error::UnknownId`], [`Error::UnknownMaterial`],
     /// [`Error::TwoTables`], [`Error::TurnedMesh`], [`Error::OutsideFolder`] or [`Error::Empty`]; for
-    /// the responses what [`probe_wav`] gives and, where sample 0 is the emission,
+    /// the responses what [`probe_audio`] gives and, where sample 0 is the emission,
     /// [`Error::ShorterThanDirectSound`].
     pub fn read_with(folder: impl AsRef<Path>, options: &ReadOptions) -> Result<Self, Error> {
         let folder = folder.as_ref();
@@ -283,7 +283,7 @@ impl MeasuredRoom {
             let id = table.file.display().to_string();
             return Err(in_file("file")(Error::DuplicateId { id }));
         }
-        let info = probe_wav(&path)?;
+        let info = probe_audio(&path)?;
         if info.channels != 1 {
             return Err(Error::ManyChannels { path, channels: info.channels });
         }

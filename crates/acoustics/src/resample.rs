@@ -52,32 +52,153 @@ pub fn resample_response(response: &ImpulseResponse, sample_rate_hz: u32) -> Res
 }
 
 fn convert(samples: &[f32], old_hz: u32, new_hz: u32, gain: f64) -> Result<Vec<f32>, Error> {
-    check_range("sample rate (Hz)", f64::from(new_hz), 1e3, 768e3, "between 1 kHz and 768 kHz")?;
-    let failed = |error: Box<dyn std::error::Error + Send + Sync>| Error::implementation("resampling", error);
+    let mut resampler = BlockResampler::with_gain(old_hz, new_hz, gain)?;
+    let mut converted = Vec::with_capacity(resampler.length(samples.len() as u64) as usize);
+    resampler.push(samples, &mut converted)?;
+    resampler.finish(&mut converted)?;
+    Ok(converted)
+}
+
+/// Changes the sample rate of a stream, block by block: what comes out is, sample by sample, what [`resample`] makes of the
+/// whole.
+///
+/// ```
+/// use sabine_acoustics::{BlockResampler, Signal, resample};
+/// let sound: Vec<f32> = (0..48_000).map(|i| (0.01 * i as f32).sin()).collect();
+/// let mut resampler = BlockResampler::new(48_000, 16_000)?;
+/// let mut low = Vec::new();
+/// for block in sound.chunks(1000) {
+///     resampler.push(block, &mut low)?;
+/// }
+/// resampler.finish(&mut low)?;
+/// assert_eq!(low, resample(&Signal::new(sound, 48_000)?, 16_000)?.samples());
+/// # Ok::<(), sabine_acoustics::Error>(())
+/// ```
+pub struct BlockResampler {
+    /// None where the rates are equal.
+    filter: Option<Fft<f64>>,
+    old_hz: u32,
+    new_hz: u32,
+    gain: f64,
+    /// Samples that wait for a whole block of the filter.
+    waiting: Vec<f64>,
+    block: usize,
+    output: Vec<f64>,
+    /// Samples of the filter's delay that are still to come out.
+    delay: usize,
+    taken: u64,
+    given: u64,
+}
+
+impl std::fmt::Debug for BlockResampler {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("BlockResampler")
+            .field("old_hz", &self.old_hz)
+            .field("new_hz", &self.new_hz)
+            .field("taken", &self.taken)
+            .finish_non_exhaustive()
+    }
+}
+
+impl BlockResampler {
+    /// Plans the filter.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for a rate outside 1 kHz to 768 kHz.
+    pub fn new(old_hz: u32, new_hz: u32) -> Result<Self, Error> {
+        Self::with_gain(old_hz, new_hz, 1.0)
+    }
+
+    fn with_gain(old_hz: u32, new_hz: u32, gain: f64) -> Result<Self, Error> {
+        for rate_hz in [old_hz, new_hz] {
+            check_range("sample rate (Hz)", f64::from(rate_hz), 1e3, 768e3, "between 1 kHz and 768 kHz")?;
+        }
+        let filter = if old_hz == new_hz { None } else { Some(filter(old_hz, new_hz)?) };
+        let of = |length: fn(&Fft<f64>) -> usize| filter.as_ref().map_or(0, length);
+        Ok(Self {
+            block: of(Fft::input_frames_next),
+            output: vec![0.0; of(Fft::output_frames_next)],
+            delay: of(Fft::output_delay),
+            filter,
+            old_hz,
+            new_hz,
+            gain,
+            waiting: Vec::new(),
+            taken: 0,
+            given: 0,
+        })
+    }
+
+    /// Samples that come out of so many: rounded up.
+    pub fn length(&self, samples: u64) -> u64 {
+        (samples * u64::from(self.new_hz)).div_ceil(u64::from(self.old_hz))
+    }
+
+    /// Takes samples and appends those that they complete to `resampled`.
+    ///
+    /// # Errors
+    /// [`Error::Implementation`] if the filter fails, which lengths that agree do not cause.
+    pub fn push(&mut self, samples: &[f32], resampled: &mut Vec<f32>) -> Result<(), Error> {
+        self.taken += samples.len() as u64;
+        if self.filter.is_none() {
+            resampled.extend_from_slice(samples);
+            return Ok(());
+        }
+        let mut rest = samples;
+        while !rest.is_empty() {
+            let (now, later) = rest.split_at((self.block - self.waiting.len()).min(rest.len()));
+            self.waiting.extend(now.iter().map(|&s| f64::from(s)));
+            rest = later;
+            if self.waiting.len() == self.block {
+                self.process(resampled)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Appends what is still in the filter.
+    ///
+    /// # Errors
+    /// As [`BlockResampler::push`].
+    pub fn finish(mut self, resampled: &mut Vec<f32>) -> Result<(), Error> {
+        while self.filter.is_some() && self.given < self.length(self.taken) {
+            self.waiting.resize(self.block, 0.0);
+            self.process(resampled)?;
+        }
+        Ok(())
+    }
+
+    /// Filters one block; never gives more samples than belong to those taken.
+    fn process(&mut self, resampled: &mut Vec<f32>) -> Result<(), Error> {
+        let Some(filter) = &mut self.filter else { return Ok(()) };
+        let failed =
+            |error: Box<dyn std::error::Error + Send + Sync>| Error::implementation("resampling", error);
+        let frames = self.output.len();
+        let input = InterleavedSlice::new(&self.waiting, 1, self.block).map_err(|e| failed(e.into()))?;
+        let mut output =
+            InterleavedSlice::new_mut(&mut self.output, 1, frames).map_err(|e| failed(e.into()))?;
+        filter.process_into_buffer(&input, &mut output, None).map_err(|e| failed(e.into()))?;
+        self.waiting.clear();
+        let late = self.delay.min(frames);
+        self.delay -= late;
+        let left = (self.length(self.taken) - self.given) as usize;
+        let ready = &self.output[late..late + (frames - late).min(left)];
+        resampled.extend(ready.iter().map(|s| (s * self.gain) as f32));
+        self.given += ready.len() as u64;
+        Ok(())
+    }
+}
+
+/// Blocks of `unit` old samples become blocks of whole new samples. An even number of units makes the delay of half a block a
+/// whole number of samples on both sides.
+fn filter(old_hz: u32, new_hz: u32) -> Result<Fft<f64>, Error> {
     let divisor = u64::from(greatest_common_divisor(old_hz, new_hz));
-    // Blocks of `unit` old samples become blocks of whole new samples. An even number of units makes the delay of half a block
-    // a whole number of samples on both sides.
     let unit = u64::from(old_hz) / divisor;
     let lower = u64::from(old_hz.min(new_hz)) / divisor;
-    let block = 2 * FILTER_SAMPLES.div_ceil(2 * lower) * unit;
-    let mut resampler = Fft::<f64>::new_custom(
-        old_hz as usize,
-        new_hz as usize,
-        block as usize,
-        1,
-        1,
-        WindowFunction::BlackmanHarris2,
-        FixedSync::Both,
-    )
-    .map_err(|error| failed(error.into()))?;
-    let input: Vec<f64> = samples.iter().map(|&s| f64::from(s)).collect();
-    let buffer = InterleavedSlice::new(&input, 1, input.len()).map_err(|error| failed(error.into()))?;
-    let mut output =
-        resampler.process_all(&buffer, input.len(), None).map_err(|error| failed(error.into()))?.take_data();
-    // rubato rounds the length up in floating point, which may give one sample too many.
-    let exact = (samples.len() as u64 * u64::from(new_hz)).div_ceil(u64::from(old_hz));
-    output.resize(exact as usize, 0.0);
-    Ok(output.into_iter().map(|s| (s * gain) as f32).collect())
+    let block = (2 * FILTER_SAMPLES.div_ceil(2 * lower) * unit) as usize;
+    let (old, new) = (old_hz as usize, new_hz as usize);
+    Fft::new_custom(old, new, block, 1, 1, WindowFunction::BlackmanHarris2, FixedSync::Both)
+        .map_err(|error| Error::implementation("resampling", error))
 }
 
 fn greatest_common_divisor(a: u32, b: u32) -> u32 {

@@ -7,7 +7,7 @@
 #[path = "faults/process.rs"]
 mod process;
 
-use sabine_acoustics::{Channel, Mesh, probe_wav, read_audio};
+use sabine_acoustics::{Channel, Mesh, probe_audio, read_audio};
 use std::path::Path;
 
 /// A WAV file of 16-bit samples that says what it likes about itself.
@@ -55,7 +55,7 @@ fn child_reads() {
     ] {
         std::fs::write(&sound, bytes).unwrap();
         refused(what, &sound, &read_audio(&sound, Channel::Mean).unwrap_err().to_string(), part);
-        refused(what, &sound, &probe_wav(&sound).unwrap_err().to_string(), part);
+        refused(what, &sound, &probe_audio(&sound).unwrap_err().to_string(), part);
     }
     let mesh = folder.join("room.obj");
     let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";

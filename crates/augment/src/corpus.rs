@@ -5,7 +5,7 @@ use crate::direct::Direct;
 use crate::error::Error;
 use crate::labels::Labels;
 use sabine_acoustics::{
-    Channel, ImpulseResponse, Observer, Signal, probe_wav, read_audio, report, resample, resample_response,
+    Channel, ImpulseResponse, Observer, Signal, probe_audio, read_audio, report, resample, resample_response,
 };
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -173,7 +173,7 @@ impl ResponseCorpus {
                 corpus.left_out.push(LeftOut { path, reason: "excluded by request".to_owned() });
                 continue;
             }
-            let channels = probe_wav(file)?.channels;
+            let channels = probe_audio(file)?.channels;
             let mut used = false;
             for channel in 0..if channels <= 2 { channels } else { 1 } {
                 let native = ImpulseResponse::from(read_audio(file, Channel::Index(channel))?);

@@ -72,6 +72,12 @@ pub enum Error {
         /// Samples given.
         found: usize,
     },
+    /// A response with a sample that is NaN or infinite.
+    #[error("sample {index} of the response is not finite")]
+    NotFinite {
+        /// Index of the first such sample.
+        index: usize,
+    },
     /// A value of the vocabulary that cannot be built: a signal that overflowed, an unknown band.
     #[error(transparent)]
     Acoustics(#[from] sabine_acoustics::Error),
@@ -87,4 +93,15 @@ pub(crate) fn check_range(
 ) -> Result<(), Error> {
     // Written so that NaN fails.
     if value >= low && value <= high { Ok(()) } else { Err(Error::OutOfRange { field, value, range }) }
+}
+
+/// Checks that a response has between 1 and `most` samples, all of them finite.
+pub(crate) fn check_taps(response: &[f32], most: usize) -> Result<(), Error> {
+    if response.is_empty() || response.len() > most {
+        return Err(Error::ResponseLength { most, found: response.len() });
+    }
+    match response.iter().position(|tap| !tap.is_finite()) {
+        Some(index) => Err(Error::NotFinite { index }),
+        None => Ok(()),
+    }
 }

@@ -32,6 +32,7 @@
 //! | random colouration, no gain guaranteed | [`EqFilter::window_method`] |
 //! | filtering a signal | [`EqFilter::apply`] (aligned), [`EqFilter::apply_with_delay`] (whole) |
 //! | convolving two signals | [`convolve`] |
+//! | convolving a file of any length in little memory | [`BlockConvolver`] |
 //! | convolving a live stream with a room | [`PartitionedConvolver`] |
 //!
 //! # Units and conventions
@@ -60,6 +61,7 @@
 //! - A. V. Oppenheim, R. W. Schafer, "Discrete-time signal processing", 3rd ed., 2010: minimum phase by the cepstrum.
 //! - W. G. Gardner, "Efficient convolution without input-output delay", J. Audio Eng. Soc. 43(3), 1995: partitions of growing size.
 
+mod block_convolver;
 mod config;
 mod convolve;
 mod designer;
@@ -73,6 +75,7 @@ mod solve;
 mod uniform;
 mod variants;
 
+pub use block_convolver::BlockConvolver;
 pub use config::{AboveBand, EqFilterConfig};
 pub use convolve::convolve;
 pub use designer::EqDesigner;

@@ -1,7 +1,7 @@
 //! Convolution in real time.
 
 use crate::Error;
-use crate::error::check_range;
+use crate::error::{check_range, check_taps};
 use crate::uniform::{BlockTransform, Stage};
 use realfft::num_complex::Complex;
 
@@ -61,10 +61,7 @@ impl Layout {
     }
 
     fn prepare(&self, response: &[f32]) -> Result<PreparedResponse, Error> {
-        let most = self.config.longest_response;
-        if response.is_empty() || response.len() > most {
-            return Err(Error::ResponseLength { most, found: response.len() });
-        }
+        check_taps(response, self.config.longest_response)?;
         let (head, tail) = response.split_at(response.len().min(self.head_partitions * self.config.block));
         Ok(PreparedResponse {
             config: self.config,
@@ -92,7 +89,7 @@ impl ResponsePreparer {
     /// Transforms a response. This allocates: not for the audio thread.
     ///
     /// # Errors
-    /// [`Error::ResponseLength`] if it is empty or longer than the convolver's longest.
+    /// [`Error::ResponseLength`] if it is empty or longer than the convolver's longest, [`Error::NotFinite`].
     pub fn prepare(&self, response: &[f32]) -> Result<Box<PreparedResponse>, Error> {
         Ok(Box::new(self.layout.prepare(response)?))
     }
@@ -174,7 +171,7 @@ impl PartitionedConvolver {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a setting out of its range, [`Error::ResponseLength`] for a response that is empty or longer than
-    /// `config.longest_response`.
+    /// `config.longest_response`, [`Error::NotFinite`] for one with a sample that is NaN or infinite.
     pub fn new(response: &[f32], config: PartitionedConfig) -> Result<Self, Error> {
         let layout = Layout::new(config)?;
         let current = Box::new(layout.prepare(response)?);
@@ -358,5 +355,22 @@ impl Tail {
 fn add(sum: &mut [f32], more: &[f32]) {
     for (sum, more) in sum.iter_mut().zip(more) {
         *sum += more;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn responses_that_are_no_numbers_are_refused() {
+        for wrong in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let response = [0.5, 0.25, wrong];
+            let new = PartitionedConvolver::new(&response, PartitionedConfig::default());
+            assert!(matches!(new, Err(Error::NotFinite { index: 2 })), "{wrong}");
+            let good = PartitionedConvolver::new(&[1.0], PartitionedConfig::default()).unwrap();
+            let prepared = good.preparer().prepare(&response);
+            assert!(matches!(prepared, Err(Error::NotFinite { index: 2 })), "{wrong}");
+        }
     }
 }

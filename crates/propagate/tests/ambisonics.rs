@@ -190,7 +190,7 @@ fn a_response_is_written_with_all_its_channels() {
         let read = read_audio(&path, Channel::Index(n)).unwrap();
         assert_eq!((read.samples(), read.sample_rate_hz()), (&channel[..], 16_000));
     }
-    assert_eq!(probe_wav(&path).unwrap().channels, 9);
+    assert_eq!(probe_audio(&path).unwrap().channels, 9);
     std::fs::remove_file(&path).unwrap();
 }
 

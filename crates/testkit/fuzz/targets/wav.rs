@@ -5,11 +5,11 @@
 mod scratch;
 
 use libfuzzer_sys::fuzz_target;
-use sabine_acoustics::{Channel, probe_wav, read_audio};
+use sabine_acoustics::{Channel, probe_audio, read_audio};
 
 fuzz_target!(|bytes: &[u8]| {
     let path = scratch::file("sound.wav", bytes);
-    let Ok(info) = probe_wav(&path) else {
+    let Ok(info) = probe_audio(&path) else {
         assert!(read_audio(&path, Channel::Mean).is_err(), "read although the header is refused");
         return;
     };
