@@ -1,12 +1,24 @@
 //! A folder of results that appear together or not at all.
 
+use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Beginning of the names of folders that are being written.
+const UNFINISHED: &str = ".unfinished-";
+/// File in them that their process holds locked: the lock ends with the process, however it ends.
+const LOCK: &str = "lock";
+/// Age from which a folder without a lock counts as left behind: older versions made none.
+const LEFT_BEHIND: Duration = Duration::from_secs(3600);
 
 /// Files are written beside their final place under a temporary name; [`OutputFolder::finish`] renames them. Dropped before
-/// that, it leaves nothing behind. A process that is killed leaves its `.unfinished-...` folder, and only that.
+/// that, it leaves nothing behind. A process that is killed leaves its `.unfinished-...` folder, and only that; the next that
+/// writes to the same place removes it.
 pub struct OutputFolder {
     folder: PathBuf,
+    /// Held until the end.
+    _lock: File,
     created: bool,
     waiting: PathBuf,
     names: Vec<String>,
@@ -35,14 +47,23 @@ impl OutputFolder {
     pub fn create(folder: &Path) -> Result<Self, OutputError> {
         let created = !folder.exists();
         std::fs::create_dir_all(folder).map_err(at(folder))?;
-        let waiting = folder.join(format!(".unfinished-{}", std::process::id()));
-        if let Err(error) = std::fs::create_dir_all(&waiting) {
+        remove_left_behind(folder);
+        let waiting = folder.join(format!("{UNFINISHED}{}", std::process::id()));
+        let locked = || {
+            std::fs::create_dir_all(&waiting)?;
+            let lock = File::create(waiting.join(LOCK))?;
+            // Where there are no locks, the age of the folder has to do.
+            let _ = lock.try_lock();
+            Ok(lock)
+        };
+        let lock = locked().map_err(|error| {
+            let _ = std::fs::remove_dir(&waiting);
             if created {
                 let _ = std::fs::remove_dir(folder);
             }
-            return Err(at(folder)(error));
-        }
-        Ok(Self { folder: folder.to_owned(), created, waiting, names: Vec::new() })
+            at(folder)(error)
+        })?;
+        Ok(Self { folder: folder.to_owned(), _lock: lock, created, waiting, names: Vec::new() })
     }
 
     /// Writes a file of the folder, to the disk and not only to its cache.
@@ -59,6 +80,12 @@ impl OutputFolder {
         write().map_err(at(&self.folder.join(name)))?;
         self.names.push(name.to_owned());
         Ok(())
+    }
+
+    /// Where a file of the folder is to be written by somebody else, whole, before [`OutputFolder::finish`].
+    pub fn path_of(&mut self, name: &str) -> PathBuf {
+        self.names.push(name.to_owned());
+        self.waiting.join(name)
     }
 
     /// Moves all files to their names. If one cannot take its name, those before it give theirs back, and what was there before is
@@ -115,6 +142,35 @@ impl Drop for OutputFolder {
     }
 }
 
+/// Removes what killed processes left in the folder. That it cannot be removed is no reason to refuse the work.
+fn remove_left_behind(folder: &Path) {
+    let Ok(entries) = std::fs::read_dir(folder) else { return };
+    for entry in entries.flatten() {
+        let path = entry.path();
+        let is_unfinished = entry.file_name().to_string_lossy().starts_with(UNFINISHED);
+        if is_unfinished && is_left_behind(&path) {
+            let _ = std::fs::remove_dir_all(&path);
+        }
+    }
+}
+
+/// Whether the process that made an unfinished folder is gone.
+fn is_left_behind(unfinished: &Path) -> bool {
+    if let Ok(lock) = File::open(unfinished.join(LOCK)) {
+        return match lock.try_lock() {
+            Ok(()) => true,
+            Err(TryLockError::WouldBlock) => false,
+            Err(TryLockError::Error(_)) => is_old(unfinished),
+        };
+    }
+    is_old(unfinished)
+}
+
+fn is_old(folder: &Path) -> bool {
+    let age = folder.metadata().and_then(|data| data.modified()).map(|time| time.elapsed());
+    matches!(age, Ok(Ok(age)) if age > LEFT_BEHIND)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -168,5 +224,29 @@ mod tests {
         std::fs::write(&file, b"x").unwrap();
         let error = OutputFolder::create(&file).err().unwrap();
         assert_eq!(error.path, file);
+    }
+
+    #[test]
+    fn what_a_killed_process_left_is_removed_and_what_a_living_one_writes_is_not() {
+        let parent = tempfile::tempdir().unwrap();
+        let unfinished = |name: &str| {
+            let folder = parent.path().join(name);
+            std::fs::create_dir(&folder).unwrap();
+            std::fs::write(folder.join("a.txt"), b"a").unwrap();
+            folder
+        };
+        let (killed, living) = (unfinished(".unfinished-1"), unfinished(".unfinished-2"));
+        let unlocked = unfinished(".unfinished-3");
+        std::fs::write(killed.join(LOCK), b"").unwrap();
+        let lock = File::create(living.join(LOCK)).unwrap();
+        lock.try_lock().unwrap();
+        OutputFolder::create(parent.path()).unwrap().finish().unwrap();
+        assert!(!killed.exists(), "left");
+        // One without a lock may have been made this very moment.
+        assert!(living.exists() && unlocked.exists());
+        let before = std::time::SystemTime::now() - 2 * LEFT_BEHIND;
+        File::open(&unlocked).unwrap().set_modified(before).unwrap();
+        OutputFolder::create(parent.path()).unwrap().finish().unwrap();
+        assert!(living.exists() && !unlocked.exists());
     }
 }

@@ -1,6 +1,7 @@
 //! The state of a training after an epoch.
 
 use crate::adam::Adam;
+use crate::checksum::{seal, verify};
 use crate::config::NetworkConfig;
 use crate::parameters::Parameters;
 use crate::trainer::{EpochRecord, TrainConfig};
@@ -74,10 +75,13 @@ impl Checkpoint {
             serde_json::to_string(&header).map_err(|_| fault(WeightsFault::Metadata { field: FIELD }))?;
         let views = arrays
             .iter()
-            .map(|(name, bytes)| Ok((name, TensorView::new(Dtype::F32, vec![bytes.len() / 4], bytes)?)))
+            .map(|(name, bytes)| {
+                Ok((name.clone(), TensorView::new(Dtype::F32, vec![bytes.len() / 4], bytes)?))
+            })
             .collect::<Result<Vec<_>, _>>()
             .map_err(|source| fault(WeightsFault::Container { source }))?;
-        let bytes = safetensors::serialize(views, Some(HashMap::from([(FIELD.to_owned(), header)])))
+        let sealed = HashMap::from([(FIELD.to_owned(), seal(&header, &views))]);
+        let bytes = safetensors::serialize(views, Some(sealed))
             .map_err(|source| fault(WeightsFault::Container { source }))?;
         Ok(write_atomically(path, |file| file.write_all(&bytes))?)
     }
@@ -89,12 +93,10 @@ impl Checkpoint {
         let container = |source| fault(WeightsFault::Container { source });
         let (_, metadata) = SafeTensors::read_metadata(&bytes).map_err(container)?;
         let tensors = SafeTensors::deserialize(&bytes).map_err(container)?;
-        let header: Header = metadata
-            .metadata()
-            .as_ref()
-            .and_then(|fields| fields.get(FIELD))
-            .and_then(|text| serde_json::from_str(text).ok())
-            .ok_or_else(|| fault(WeightsFault::Metadata { field: FIELD }))?;
+        let missing = || fault(WeightsFault::Metadata { field: FIELD });
+        let text = metadata.metadata().as_ref().and_then(|fields| fields.get(FIELD)).ok_or_else(missing)?;
+        let header: Header = serde_json::from_str(text).map_err(|_| missing())?;
+        verify(text, &tensors).map_err(fault)?;
         if let Some(field) = difference(&header.config, config) {
             return Err(Error::Checkpoint { path: path.to_owned(), field });
         }

@@ -28,6 +28,12 @@ pub enum Error {
         /// Largest magnitude; full scale is 1.
         peak: f32,
     },
+    /// The recording is beyond anything that is sound.
+    #[error("the recording's peak is {peak:.1e} of full scale; at most 1e10 (200 dB) can be heard")]
+    TooLoud {
+        /// Largest magnitude; full scale is 1.
+        peak: f32,
+    },
     /// A sample of a stream that is no number.
     #[error("sample {index} of the stream is not a finite number")]
     NotFinite {
@@ -132,6 +138,19 @@ pub enum WeightsFault {
         #[from]
         source: safetensors::SafeTensorError,
     },
+    /// The file was damaged after it was written.
+    #[error("damaged: SHA-256 of its contents is {found}; it was written with {expected}")]
+    Checksum {
+        /// As found.
+        found: String,
+        /// As the file has it.
+        expected: String,
+    },
+    /// Nothing says whether the file is as it was written: older versions wrote none.
+    #[error(
+        "there is no checksum in it; `cargo run -p sabine-estimator --example add_checksum -- FILE` adds one to a file that is known to be good"
+    )]
+    NoChecksum,
     /// A tensor is missing.
     #[error("tensor `{tensor}` is missing")]
     Missing {

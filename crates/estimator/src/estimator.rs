@@ -20,6 +20,8 @@ const PRETRAINED: &[u8] = include_bytes!("../weights/room.safetensors");
 pub const LEAST_DURATION_S: f64 = 1.0;
 /// Peak below which a recording is silent; full scale is 1 (the last bit of 24-bit samples is 1.2e-7).
 const SILENT_PEAK: f32 = 1e-6;
+/// Peak above which powers would leave single precision, 200 dB beyond full scale.
+const LOUDEST_PEAK: f32 = 1e10;
 /// Share of samples on flat tops above which a recording counts as clipped.
 const CLIPPED_SHARE: f64 = 1e-4;
 
@@ -116,7 +118,7 @@ impl Estimator {
     ///
     /// # Errors
     /// [`Error::SampleRate`] below the network's rate, [`Error::TooShort`] below [`LEAST_DURATION_S`] or a frame of the features,
-    /// [`Error::Silent`], or [`Error::Weights`] where the network's output is not finite.
+    /// [`Error::Silent`], [`Error::TooLoud`], or [`Error::Weights`] where the network's output is not finite.
     pub fn estimate_detailed(&self, speech: &Signal) -> Result<DetailedEstimate, Error> {
         let prepared = self.prepare(speech)?;
         let heard = self.hear_all(&prepared.windows().collect::<Vec<_>>());
@@ -184,6 +186,9 @@ impl Estimator {
         }
         if tops.peak() < SILENT_PEAK {
             return Err(Error::Silent { peak: tops.peak() });
+        }
+        if tops.peak() > LOUDEST_PEAK {
+            return Err(Error::TooLoud { peak: tops.peak() });
         }
         let mut warnings = Vec::new();
         if tops.share() > CLIPPED_SHARE {

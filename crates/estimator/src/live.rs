@@ -4,6 +4,7 @@ use crate::Error;
 use crate::estimator::{DetailedEstimate, Estimator};
 use crate::joint::HeardWindow;
 use crate::network::Scratch;
+use crate::warning::Warning;
 use crate::windows::{FlatTops, window_hop};
 use sabine_features::LogMelStream;
 
@@ -117,6 +118,26 @@ impl LiveEstimator {
             }
         }
         Ok(())
+    }
+
+    /// As [`LiveEstimator::push`] without estimates on the way; every window counts from now on.
+    pub(crate) fn listen(&mut self, samples: &[f32]) {
+        self.most = usize::MAX;
+        let mut rest = samples;
+        while !rest.is_empty() {
+            let (now, later) = rest.split_at(self.until_window().min(rest.len()));
+            rest = later;
+            self.take(now);
+        }
+    }
+
+    /// The estimate of all windows, the last one at the end of the samples included.
+    pub(crate) fn conclude(mut self, warnings: Vec<Warning>) -> Result<DetailedEstimate, Error> {
+        let first = self.frames.saturating_sub(self.estimator.model().layout.frames);
+        if self.heard.last().is_none_or(|last| last.first != first) {
+            self.hear(first);
+        }
+        self.estimator.judge(&self.heard, warnings)
     }
 
     /// The estimate of all samples so far, those after the last full window included: what

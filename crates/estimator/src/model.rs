@@ -1,5 +1,6 @@
 //! Everything that an estimator needs to know, in one file.
 
+use crate::checksum::{seal, verify};
 use crate::config::NetworkConfig;
 use crate::labels::{LABEL_COUNT, LabelScale, T60_COUNT, T60Scale};
 use crate::layout::{FeatureLayout, Normalisation};
@@ -14,7 +15,7 @@ use std::collections::{BTreeMap, HashMap};
 /// Name and version of the format.
 const FORMAT: &str = "sabine-estimator-2";
 /// The one metadata field.
-const FIELD: &str = "sabine";
+pub(crate) const FIELD: &str = "sabine";
 
 /// How far the estimates can be trusted, learned on rooms that the training did not see.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,7 +69,8 @@ impl Model {
         self.parameters.config().outputs == 2 * LABEL_COUNT
     }
 
-    /// Writes the model as safetensors; network weights in half precision if `half`.
+    /// Writes the model as safetensors with a checksum (SHA-256 over header, names and tensors); network weights in half
+    /// precision if `half`.
     ///
     /// # Errors
     /// [`Error::Weights`] if a number is not finite or the container cannot be made.
@@ -106,7 +108,7 @@ impl Model {
             })
             .collect::<Result<Vec<_>, _>>()
             .map_err(|source| fault(WeightsFault::Container { source }))?;
-        let metadata = HashMap::from([(FIELD.to_owned(), header)]);
+        let metadata = HashMap::from([(FIELD.to_owned(), seal(&header, &views))]);
         safetensors::serialize(views, Some(metadata))
             .map_err(|source| fault(WeightsFault::Container { source }))
     }
@@ -131,7 +133,7 @@ impl Model {
     /// Reads a model and checks every part of it. `name` says in errors where the bytes came from.
     ///
     /// # Errors
-    /// [`Error::Weights`] with the reason: truncated, of another layout, a tensor missing or of another shape, NaN, ...
+    /// [`Error::Weights`] with the reason: truncated, without a checksum or with one that does not fit, of another layout, a tensor missing or of another shape, NaN, ...
     pub fn from_safetensors(name: &str, bytes: &[u8]) -> Result<Self, Error> {
         Self::read(bytes).map_err(|fault| match fault {
             ReadFault::Weights(fault) => Error::Weights { name: name.into(), fault: Box::new(fault) },
@@ -142,13 +144,11 @@ impl Model {
     fn read(bytes: &[u8]) -> Result<Self, ReadFault> {
         let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(WeightsFault::from)?;
         let tensors = SafeTensors::deserialize(bytes).map_err(WeightsFault::from)?;
-        let header: Header = metadata
-            .metadata()
-            .as_ref()
-            .and_then(|fields| fields.get(FIELD))
-            .and_then(|text| serde_json::from_str(text).ok())
-            .ok_or(WeightsFault::Metadata { field: FIELD })?;
+        let missing = || WeightsFault::Metadata { field: FIELD };
+        let text = metadata.metadata().as_ref().and_then(|fields| fields.get(FIELD)).ok_or_else(missing)?;
+        let header: Header = serde_json::from_str(text).map_err(|_| missing())?;
         check_layout("format", &header.format, &FORMAT.to_owned())?;
+        verify(text, &tensors)?;
         let network = header.network;
         network.check().map_err(ReadFault::Other)?;
         check_layout("network.mels", &network.mels, &header.layout.mels)?;

@@ -3,23 +3,29 @@
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
 use sabine_acoustics::Signal;
-use sabine_estimator::{Error, Estimator, LiveEstimator};
+use sabine_estimator::{Error, Estimator, LiveEstimator, WeightsFault, add_checksum};
 use serde_json::{Value, json};
 
 const WEIGHTS: &[u8] = include_bytes!("../weights/room.safetensors");
 
 /// The pretrained file with some fields of its header changed.
 fn changed(changes: &[(&str, Value)]) -> Vec<u8> {
-    let length = u64::from_le_bytes(WEIGHTS[..8].try_into().unwrap()) as usize;
-    let (header, arrays) = WEIGHTS[8..].split_at(length);
+    resealed(WEIGHTS, changes)
+}
+
+/// A file with some fields of its header changed, and a checksum that fits.
+fn resealed(bytes: &[u8], changes: &[(&str, Value)]) -> Vec<u8> {
+    let length = u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+    let (header, arrays) = bytes[8..].split_at(length);
     let mut header: Value = serde_json::from_slice(header).unwrap();
     let mut own: Value = serde_json::from_str(header["__metadata__"]["sabine"].as_str().unwrap()).unwrap();
     for (pointer, value) in changes {
         *own.pointer_mut(pointer).unwrap() = value.clone();
     }
+    own.as_object_mut().unwrap().remove("sha256");
     header["__metadata__"]["sabine"] = own.to_string().into();
     let header = header.to_string();
-    [&(header.len() as u64).to_le_bytes(), header.as_bytes(), arrays].concat()
+    add_checksum(&[&(header.len() as u64).to_le_bytes(), header.as_bytes(), arrays].concat()).unwrap()
 }
 
 /// Three seconds of bursts that decay.
@@ -110,11 +116,26 @@ fn enormous_numbers_are_refused_or_give_finite_estimates() {
                 value.to_le_bytes().to_vec()
             };
             bytes[offset(0)..offset(1)].chunks_exact_mut(piece.len()).for_each(|c| c.copy_from_slice(&piece));
-            if let Ok(estimator) = Estimator::from_safetensors(&bytes) {
+            if let Ok(estimator) = Estimator::from_safetensors(&resealed(&bytes, &[])) {
                 accepted += 1;
                 hears(&format!("{name} = {value}"), &estimator);
             }
         }
     }
     assert!(accepted > 50, "{accepted}");
+}
+
+/// One bit anywhere in the numbers or in the header.
+#[test]
+fn a_flipped_bit_is_found() {
+    let length = 8 + u64::from_le_bytes(WEIGHTS[..8].try_into().unwrap()) as usize;
+    let text = WEIGHTS.windows(13).position(|bytes| bytes == b"novelty_limit").unwrap();
+    for at in [text + 18, length, length + 1_001, WEIGHTS.len() - 1] {
+        let mut bytes = WEIGHTS.to_vec();
+        bytes[at] ^= 1;
+        let Err(Error::Weights { fault, .. }) = Estimator::from_safetensors(&bytes) else { panic!("{at}") };
+        assert!(matches!(*fault, WeightsFault::Checksum { .. }), "{at}: {fault}");
+        assert!(add_checksum(&bytes).is_err(), "{at}");
+    }
+    assert_eq!(add_checksum(WEIGHTS).unwrap(), WEIGHTS);
 }

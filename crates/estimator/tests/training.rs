@@ -207,3 +207,19 @@ fn settings_out_of_range_are_refused() {
         assert!(matches!(found, Some(Error::Config { field: f, .. }) if f == field), "{field}: {found:?}");
     }
 }
+
+#[test]
+fn a_checkpoint_with_a_flipped_bit_is_refused() {
+    let (data, out) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    support::usual(data.path());
+    let dataset = Dataset::open(data.path()).unwrap();
+    let trainer = Trainer::new(TrainConfig { epochs: 1, ..config(1) }, &dataset, Some(out.path())).unwrap();
+    trainer.train(false, &()).unwrap();
+    let path = out.path().join("checkpoint.safetensors");
+    let mut bytes = std::fs::read(&path).unwrap();
+    let middle = bytes.len() - 1000;
+    bytes[middle] ^= 1;
+    std::fs::write(&path, &bytes).unwrap();
+    let error = trainer.train(true, &()).unwrap_err().to_string();
+    assert!(error.contains("checkpoint.safetensors") && error.contains("SHA-256"), "{error}");
+}

@@ -17,6 +17,7 @@
 //! | I have ... | go to |
 //! |---|---|
 //! | a phone recording and a rough model of the room | below; step by step in the [`guide`] |
+//! | recordings of any length | [`match_room_files`], which reads and writes in blocks |
 //! | impulse responses | [`acoustics::RoomParameters`] |
 //! | impulse responses and a model | [`optimize::MaterialFitter`], [`diagnose::Diagnoser`] |
 //! | a mesh with materials | [`propagate::PathTracer`] |
@@ -90,14 +91,18 @@ pub mod guide;
 
 mod error;
 mod low_end;
+mod match_files;
 mod matching;
 mod recording;
+mod room_renderer;
 mod summary;
 mod warning;
 
 pub use error::Error;
 pub use low_end::JoinedWaves;
+pub use match_files::{EXCERPT_S, Excerpt, FileMatch, MatchFiles, match_room_files};
 pub use matching::{DECAY_STEP_S, MatchConfig, MatchInput, RoomMatch, match_room, match_room_with};
 pub use recording::Recording;
+pub use room_renderer::{RenderedFile, RoomRenderer};
 pub use summary::{MatchSummary, MaterialChange, UnreachableBand, materials_toml};
 pub use warning::Warning;

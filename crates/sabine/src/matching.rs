@@ -1,6 +1,7 @@
 //! The main job: from speech and a rough room to sound that belongs there.
 
 use crate::low_end::{JoinedWaves, LowEnd};
+use crate::room_renderer::RoomRenderer;
 use crate::{Error, Recording, Warning};
 use sabine_acoustics::{
     Air, Bands, EnergyDecayCurve, Estimate, FilterBank, ImpulseResponse, Material, MeasuredRoom, Observer,
@@ -97,8 +98,8 @@ pub struct RoomMatch {
     pub eq_filter: EqFilter,
     /// The dry sound in the room, aligned with the dry sound (the filter's own delay is taken out).
     pub matched: Signal,
-    /// By how much `matched` was scaled to fit full scale, in dB; 0 for a source of the level of the dry sound at 1 m.
-    pub level_db: f64,
+    /// By how much `matched` was scaled to fit full scale, in dB, 0 or below: 0 for a source of the level of the dry sound at 1 m.
+    pub matched_gain_db: f64,
     /// Stages with the seconds that they took, in order.
     pub seconds: Vec<(&'static str, f64)>,
     /// What a user should know before trusting the result.
@@ -108,8 +109,6 @@ pub struct RoomMatch {
 /// Time step of [`RoomMatch::decay`], in seconds.
 pub const DECAY_STEP_S: f64 = 0.005;
 
-/// Highest magnitude of the matched sound.
-const FULL_SCALE: f32 = 0.95;
 /// How often the fit is corrected by what the rendered response shows.
 const CORRECTIONS: usize = 3;
 /// The rendered response is close enough to its target when every reachable octave is this near.
@@ -147,14 +146,24 @@ pub fn match_room(
     warnings.extend(heard.warnings.into_iter().map(Warning::Speech));
     report(observer, "listening", 1, 1)?;
     clock.lap("estimate");
-    let tracer = |duration_s: f64| -> Result<Box<dyn Propagator>, Error> {
+    let place = input.place();
+    warn_of_mesh(&place, &mut warnings)?;
+    let tracer = path_tracer(config);
+    input.match_targets(heard.targets, warnings, clock, &tracer, config, observer)
+}
+
+/// The tracer of the workspace, for paths of up to the given duration in seconds.
+pub(crate) fn path_tracer(config: &MatchConfig) -> impl Fn(f64) -> Result<Box<dyn Propagator>, Error> {
+    |duration_s| {
         let settings = TracerConfig { duration_s, seed: config.seed, ..config.tracer.clone() };
         Ok(Box::new(PathTracer::new(settings)?))
-    };
-    let source = input.room.source(input.source)?;
-    let mesh = MeshReport::inspect(input.room.scene(), source.position_m)?;
+    }
+}
+
+pub(crate) fn warn_of_mesh(place: &Place<'_>, warnings: &mut Vec<Warning>) -> Result<(), Error> {
+    let mesh = MeshReport::inspect(place.room.scene(), place.room.source(place.source)?.position_m)?;
     warnings.extend(mesh.warnings().into_iter().map(Warning::Mesh));
-    match_targets(heard.targets, warnings, clock, &tracer, input, config, observer)
+    Ok(())
 }
 
 /// Matches a room with an estimator and a tracer of one's own; the estimator hears the recording at its own sample rate,
@@ -175,7 +184,7 @@ pub fn match_room_with(
     let targets = estimator.estimate(input.speech.signal)?;
     report(observer, "listening", 1, 1)?;
     clock.lap("estimate");
-    match_targets(targets, warnings, clock, tracer, input, config, observer)
+    input.match_targets(targets, warnings, clock, tracer, config, observer)
 }
 
 impl MatchInput<'_> {
@@ -187,9 +196,43 @@ impl MatchInput<'_> {
             warnings.push(Warning::SlightlyClipped { percent: 100.0 * clipped });
         }
         self.dry.check_not_silent()?;
+        warnings.extend(self.place().check()?);
+        Ok(warnings)
+    }
+
+    fn place(&self) -> Place<'_> {
+        Place { room: self.room, source: self.source, receiver: self.receiver }
+    }
+
+    fn match_targets(
+        &self,
+        targets: RoomTargets,
+        warnings: Vec<Warning>,
+        clock: Clock,
+        tracer: &dyn Fn(f64) -> Result<Box<dyn Propagator>, Error>,
+        config: &MatchConfig,
+        observer: &dyn Observer,
+    ) -> Result<RoomMatch, Error> {
+        let render =
+            |renderer: &RoomRenderer| renderer.render(&resample(self.dry.signal, renderer.sample_rate_hz())?);
+        let dry = DrySound { sample_rate_hz: self.dry.signal.sample_rate_hz(), render: &render };
+        match_targets(targets, warnings, clock, tracer, &self.place(), &dry, config, observer)
+    }
+}
+
+/// Where the sound comes from and where it is heard.
+pub(crate) struct Place<'a> {
+    pub room: &'a MeasuredRoom,
+    pub source: &'a str,
+    pub receiver: &'a str,
+}
+
+impl Place<'_> {
+    /// That there are such a source and receiver, and what should be known of the room.
+    pub(crate) fn check(&self) -> Result<Vec<Warning>, Error> {
         self.room.source(self.source)?;
         self.room.receiver(self.receiver)?;
-        warnings.extend(self.room.notes().into_iter().map(Warning::Room));
+        let mut warnings: Vec<Warning> = self.room.notes().into_iter().map(Warning::Room).collect();
         if self.room.air_assumed() {
             warnings.push(Warning::AirAssumed);
         }
@@ -197,21 +240,31 @@ impl MatchInput<'_> {
     }
 }
 
+/// What is to be placed in the room: in memory or in a file.
+pub(crate) struct DrySound<'a> {
+    /// Its sample rate.
+    pub sample_rate_hz: u32,
+    /// Renders it; gives the sound and the gain in dB that keeps it within full scale.
+    pub render: &'a dyn Fn(&RoomRenderer) -> Result<(Signal, f64), Error>,
+}
+
 /// Deviation of an octave's gain from the one wanted that is said, in dB: half of what is heard.
 const EQ_MISSED_DB: f64 = 0.5;
 
 /// Everything after listening.
-fn match_targets(
+#[allow(clippy::too_many_arguments)] // the state of a match, handed on once
+pub(crate) fn match_targets(
     targets: RoomTargets,
     mut warnings: Vec<Warning>,
     mut clock: Clock,
     tracer: &dyn Fn(f64) -> Result<Box<dyn Propagator>, Error>,
-    input: &MatchInput<'_>,
+    place: &Place<'_>,
+    dry: &DrySound<'_>,
     config: &MatchConfig,
     observer: &dyn Observer,
 ) -> Result<RoomMatch, Error> {
-    let room = input.room;
-    let (source, receiver) = (room.source(input.source)?, room.receiver(input.receiver)?);
+    let room = place.room;
+    let (source, receiver) = (room.source(place.source)?, room.receiver(place.receiver)?);
     let bands = Bands::SIMULATION;
     let air = room.air();
     let materials_before: Vec<Material> =
@@ -220,7 +273,7 @@ fn match_targets(
     let scene = room.scene().with_materials(materials_before.clone())?;
     let longest_s = targets.t60_s().values().iter().map(|t| t.value).fold(0.0, f64::max);
     let duration_s = (config.duration_factor * longest_s).clamp(DURATION_S.0, DURATION_S.1);
-    let sample_rate_hz = match input.dry.signal.sample_rate_hz() {
+    let sample_rate_hz = match dry.sample_rate_hz {
         rate if rate >= LOWEST_RATE_HZ => rate,
         from_hz => {
             warnings.push(Warning::DryResampled { from_hz, to_hz: STANDARD_RATE_HZ });
@@ -279,10 +332,7 @@ fn match_targets(
     warn_of_eq(&eq_filter, &mut warnings);
     let filtered = eq_filter.apply(&Signal::from(response.clone()))?;
     let eq_reached_db = levels(&ImpulseResponse::from(filtered))?;
-    let dry = resample(input.dry.signal, sample_rate_hz)?;
-    let wet = sabine_eqfilter::convolve(dry.samples(), response.samples());
-    let matched = eq_filter.apply(&Signal::new(wet, sample_rate_hz)?)?;
-    let (matched, level_db) = to_full_scale(matched)?;
+    let (matched, matched_gain_db) = (dry.render)(&RoomRenderer::new(&response, &eq_filter))?;
     clock.lap("filter");
     let decay = decay_curves(&response)?;
     Ok(RoomMatch {
@@ -300,7 +350,7 @@ fn match_targets(
         waves,
         eq_filter,
         matched,
-        level_db,
+        matched_gain_db,
         seconds: clock.stages,
         warnings,
     })
@@ -416,17 +466,6 @@ fn eq_gains(
     }))
 }
 
-fn to_full_scale(sound: Signal) -> Result<(Signal, f64), Error> {
-    let peak = sound.peak();
-    if peak <= FULL_SCALE {
-        return Ok((sound, 0.0));
-    }
-    let gain = FULL_SCALE / peak;
-    let rate = sound.sample_rate_hz();
-    let samples = sound.into_samples().into_iter().map(|s| s * gain).collect();
-    Ok((Signal::new(samples, rate)?, 20.0 * f64::from(gain).log10()))
-}
-
 /// Energy decay of a response in each octave of the targets.
 fn decay_curves(response: &ImpulseResponse) -> Result<PerBand<EnergyDecayCurve>, Error> {
     let rate = response.sample_rate_hz();
@@ -440,17 +479,17 @@ fn decay_curves(response: &ImpulseResponse) -> Result<PerBand<EnergyDecayCurve>,
 }
 
 /// Adds up what each stage takes.
-struct Clock {
+pub(crate) struct Clock {
     since: Instant,
     stages: Vec<(&'static str, f64)>,
 }
 
 impl Clock {
-    fn start() -> Self {
+    pub(crate) fn start() -> Self {
         Self { since: Instant::now(), stages: Vec::new() }
     }
 
-    fn lap(&mut self, stage: &'static str) {
+    pub(crate) fn lap(&mut self, stage: &'static str) {
         let now = Instant::now();
         let seconds = now.duration_since(self.since).as_secs_f64();
         self.since = now;

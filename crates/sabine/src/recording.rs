@@ -27,17 +27,12 @@ impl Recording<'_> {
     /// # Errors
     /// [`Error::TooShort`] below one second, [`Error::Silent`], [`Error::Clipped`] where more than 1 % of the samples are cut off.
     pub fn check(&self) -> Result<f64, Error> {
-        let recording = || self.name.to_owned();
-        let duration_s = self.signal.duration_s();
-        if duration_s < SHORTEST_S {
-            return Err(Error::TooShort { recording: recording(), duration_s, needed_s: SHORTEST_S });
-        }
-        self.check_not_silent()?;
-        let share = self.clipped_share();
-        if share > MOST_CLIPPED {
-            return Err(Error::Clipped { recording: recording(), percent: 100.0 * share });
-        }
-        Ok(share)
+        let peak = self.signal.peak();
+        judge(self.name, self.signal.duration_s(), peak, || {
+            let mut counter = ClipCounter::new(peak);
+            counter.push(self.signal.samples());
+            Ok(counter.share())
+        })
     }
 
     /// That there is any sound.
@@ -45,32 +40,69 @@ impl Recording<'_> {
     /// # Errors
     /// [`Error::Silent`].
     pub fn check_not_silent(&self) -> Result<(), Error> {
-        let peak = self.signal.peak();
-        if peak < SILENCE { Err(Error::Silent { recording: self.name.to_owned(), peak }) } else { Ok(()) }
+        check_not_silent(self.name, self.signal.peak())
+    }
+}
+
+/// The share of clipped samples, if a recording can be used at all.
+pub(crate) fn judge(
+    name: &str,
+    duration_s: f64,
+    peak: f32,
+    clipped_share: impl FnOnce() -> Result<f64, Error>,
+) -> Result<f64, Error> {
+    if duration_s < SHORTEST_S {
+        return Err(Error::TooShort { recording: name.to_owned(), duration_s, needed_s: SHORTEST_S });
+    }
+    check_not_silent(name, peak)?;
+    let share = clipped_share()?;
+    if share > MOST_CLIPPED {
+        return Err(Error::Clipped { recording: name.to_owned(), percent: 100.0 * share });
+    }
+    Ok(share)
+}
+
+pub(crate) fn check_not_silent(name: &str, peak: f32) -> Result<(), Error> {
+    if peak < SILENCE { Err(Error::Silent { recording: name.to_owned(), peak }) } else { Ok(()) }
+}
+
+/// Counts samples in flat tops as they come in; the peak of the whole must be known.
+pub(crate) struct ClipCounter {
+    /// Converters and conversions cut just below full scale, too: what counts is a flat top at the extreme.
+    limit: f32,
+    before: f32,
+    run: usize,
+    clipped: u64,
+    samples: u64,
+}
+
+impl ClipCounter {
+    pub(crate) fn new(peak: f32) -> Self {
+        Self { limit: 0.999 * peak, before: 0.0, run: 0, clipped: 0, samples: 0 }
     }
 
-    fn clipped_share(&self) -> f64 {
-        // Converters and conversions cut just below full scale, too: what counts is a flat top at the extreme.
-        let limit = 0.999 * self.signal.peak();
-        let samples = self.signal.samples();
-        let mut clipped = 0;
-        let mut run = 0;
-        for (i, &s) in samples.iter().enumerate() {
-            let same_side = i > 0 && s.signum() == samples[i - 1].signum();
-            run = if s.abs() < limit {
+    pub(crate) fn push(&mut self, samples: &[f32]) {
+        for &s in samples {
+            let same_side = self.samples > 0 && s.signum() == self.before.signum();
+            self.run = if s.abs() < self.limit {
                 0
             } else if same_side {
-                run + 1
+                self.run + 1
             } else {
                 1
             };
-            clipped += match run {
+            self.clipped += match self.run {
                 0..FLAT_TOP => 0,
-                FLAT_TOP => FLAT_TOP,
+                FLAT_TOP => FLAT_TOP as u64,
                 _ => 1,
             };
+            self.before = s;
+            self.samples += 1;
         }
-        clipped as f64 / samples.len() as f64
+    }
+
+    pub(crate) fn share(&self) -> f64 {
+        self.clipped as f64 / self.samples.max(1) as f64
     }
 }
 

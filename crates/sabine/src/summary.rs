@@ -34,8 +34,9 @@ pub struct MatchSummary {
     pub not_determined: Vec<String>,
     /// Delay of the equalisation filter, in seconds; it is taken out of the matched sound.
     pub eq_filter_delay_s: f64,
-    /// Scale of the matched sound, in dB.
-    pub level_db: f64,
+    /// By how much the matched sound was scaled to fit full scale, in dB, 0 or below: 0 for a source of the level of the dry sound
+    /// at 1 m.
+    pub matched_gain_db: f64,
     /// Sample rate of the sounds, in Hz.
     pub sample_rate_hz: u32,
     /// What joining waves to paths found, where that was asked for.
@@ -109,7 +110,7 @@ impl MatchSummary {
             materials,
             not_determined: matched.fit.not_determined.iter().map(|u| u.describe(&names)).collect(),
             eq_filter_delay_s: matched.eq_filter.delay_s(),
-            level_db: matched.level_db,
+            matched_gain_db: matched.matched_gain_db,
             sample_rate_hz: matched.matched.sample_rate_hz(),
             waves: matched.waves,
             seconds: matched.seconds.iter().map(|(stage, s)| ((*stage).to_owned(), *s)).collect(),

@@ -5,7 +5,7 @@
 use crate::channel::channel;
 use crate::failure::Failure;
 use clap::Args;
-use sabine::acoustics::{Channel, read_audio, write_atomically};
+use sabine::acoustics::{AudioReader, Channel, write_atomically};
 use sabine::estimator::{DetailedEstimate, Estimator, LABEL_COUNT, T60_COUNT, label_hz};
 use serde::Serialize;
 use std::io::Write;
@@ -51,8 +51,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut entries = Vec::new();
     for file in &arguments.files {
         let name = |error: &dyn std::fmt::Display| format!("{}: {error}", file.display());
-        let speech = read_audio(file, arguments.channel.unwrap_or_default())?;
-        let estimate = estimator.estimate_detailed(&speech).map_err(|error| name(&error))?;
+        let channel = arguments.channel.unwrap_or_default();
+        let estimate = match estimator.estimate_reader(&mut AudioReader::open(file, channel)?) {
+            // It names the file already.
+            Err(error @ sabine::estimator::Error::Acoustics(_)) => return Err(error.into()),
+            other => other.map_err(|error| name(&error))?,
+        };
         let entry = entry(file.clone(), &estimate);
         print(&entry);
         entries.push(entry);

@@ -6,8 +6,8 @@ use crate::failure::Failure;
 use crate::output::OutputFolder;
 use clap::Args;
 use sabine::acoustics::{
-    BandParameters, Bands, Channel, DecayFit, FilterBank, ImpulseResponse, NoReading, PerBand, Reading,
-    RoomParameters, equalisation, read_audio, write_atomically,
+    BandParameters, Bands, Channel, DecayFit, FilterBank, ImpulseResponse, LocatedResponse, NoReading,
+    PerBand, Reading, RoomParameters, equalisation, read_response, write_atomically,
 };
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -57,25 +57,32 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let channel = arguments.channel.unwrap_or_default();
     let (mut results, mut plots) = (Vec::new(), Vec::new());
     for path in &arguments.files {
-        let response = ImpulseResponse::from(read_audio(path, channel)?);
+        let found = read_response(path, channel)?;
+        let response = &found.response;
         let start = Instant::now();
-        let room = RoomParameters::measure(&response, bands)?;
+        let room = RoomParameters::measure(response, bands)?;
         let octaves_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let whole = BandParameters::full_band(&response);
+        let whole = BandParameters::full_band(response);
         let whole_seconds = start.elapsed().as_secs_f64();
-        let eq_db = equalisation(&response, bands)?;
+        let eq_db = equalisation(response, bands)?;
         print!("{}", table(path, &room, &whole));
         println!(
             "eq_db re 1k   {}\n",
             eq_db.values().iter().map(|e| format!("{:>9}", cell(e))).collect::<String>()
         );
+        let notes = notes(&found);
+        for note in &notes {
+            println!("note: {note}");
+        }
         let mut result = as_json(path, &room, &whole);
+        result["start_s"] = json!(found.start_s);
+        result["notes"] = json!(notes);
         result["eq_db"] = eq_db.values().iter().map(|e| e.as_ref().ok().map(|e| e.value)).collect();
         result["seconds"] = json!({ "octaves": octaves_seconds, "full_band": whole_seconds });
         results.push(result);
         if arguments.plots.is_some() {
-            plots.push((plot_name(path, plots.len()), plot(&response, &room)?));
+            plots.push((plot_name(path, plots.len()), plot(response, &room)?));
         }
     }
     if let Some(folder) = &arguments.plots {
@@ -90,6 +97,27 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         write_atomically(path, |file| writeln!(file, "{text}"))?;
     }
     Ok(())
+}
+
+/// What should be known of how the response was found in its file.
+fn notes(found: &LocatedResponse) -> Vec<String> {
+    let mut notes = Vec::new();
+    let measured_s = found.response.duration_s();
+    if measured_s < found.file_duration_s {
+        notes.push(format!(
+            "{measured_s:.1} s from {:.1} s on were measured, of {:.1} s",
+            found.start_s, found.file_duration_s
+        ));
+    }
+    if found.bursts_s.len() > 1 {
+        let times: Vec<String> = found.bursts_s.iter().map(|time| format!("{time:.2} s")).collect();
+        notes.push(format!(
+            "sound sets in {} times (at {}): a strong echo, or several responses in one file, which must be cut apart",
+            times.len(),
+            times.join(", ")
+        ));
+    }
+    notes
 }
 
 /// The quantities that are read per band, by name.

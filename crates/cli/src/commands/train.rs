@@ -38,6 +38,9 @@ pub struct Arguments {
     /// Go on from the checkpoint in the folder.
     #[arg(long)]
     resume: bool,
+    /// Begin anew in a folder that holds a model or a checkpoint, and replace them.
+    #[arg(long, conflicts_with = "resume")]
+    overwrite: bool,
     /// Passes over the training set.
     #[arg(long, default_value_t = 60)]
     epochs: usize,
@@ -85,6 +88,7 @@ pub struct Arguments {
 /// Whatever stands in the way, in words for the user.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     std::fs::create_dir_all(&arguments.out)?;
+    refuse_to_overwrite(arguments)?;
     println!("checking {}", arguments.data.display());
     let dataset = Dataset::open(&arguments.data)?;
     let trainer = Trainer::new(config(arguments), &dataset, Some(&arguments.out))?;
@@ -116,6 +120,24 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         best.validation_eq_db,
         100.0 * best.validation_error
     );
+    Ok(())
+}
+
+/// Hours of training are not replaced by accident.
+fn refuse_to_overwrite(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.resume || arguments.overwrite {
+        return Ok(());
+    }
+    for name in ["model.safetensors", "checkpoint.safetensors"] {
+        let path = arguments.out.join(name);
+        if path.exists() {
+            return Err(format!(
+                "{} is there already: go on from it with --resume, or replace it with --overwrite",
+                path.display()
+            )
+            .into());
+        }
+    }
     Ok(())
 }
 

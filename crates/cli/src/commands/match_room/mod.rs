@@ -11,10 +11,15 @@ use crate::failure::Failure;
 use crate::output::OutputFolder;
 use crate::room::RoomArguments;
 use clap::Args;
-use sabine::acoustics::{Channel, SampleFormat, Signal, encode_wav, read_audio};
+use sabine::acoustics::{Channel, SampleFormat, Signal, encode_wav};
 use sabine::diagnose::ExtendedModel;
-use sabine::{MatchConfig, MatchInput, MatchSummary, Recording, RoomMatch, match_room, materials_toml};
+use sabine::{
+    FileMatch, MatchConfig, MatchFiles, MatchInput, MatchSummary, Recording, match_room_files, materials_toml,
+};
 use std::path::{Path, PathBuf};
+
+/// Name of the rendered sound in the folder of results.
+const MATCHED: &str = "matched.wav";
 
 /// Match a simulated room to a recording of speech, and render dry sound in it.
 #[derive(Args)]
@@ -69,8 +74,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     // A folder that cannot be written to should not cost the user a computation first.
     let mut out = OutputFolder::create(&arguments.out)?;
     let channel = arguments.channel.unwrap_or_default();
-    let speech = read_audio(&speech_path, channel)?;
-    let dry = read_audio(&dry_path, channel)?;
     let (mut room, room_name) = arguments.room.read(&mut demo)?;
     let mut diffraction = false;
     let mut wave_below_hz = arguments.wave_below;
@@ -87,12 +90,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         .receiver
         .clone()
         .unwrap_or_else(|| first(room.receivers().iter().map(|r| &*r.id).collect()));
-    let input = MatchInput {
-        speech: Recording { name: &speech_name, signal: &speech },
-        dry: Recording { name: &dry_name, signal: &dry },
+    let matched = out.path_of(MATCHED);
+    let files = MatchFiles {
+        speech: &speech_path,
+        dry: &dry_path,
+        channel,
         room: &room,
         source: &source,
         receiver: &receiver,
+        matched: &matched,
     };
     let mut config = MatchConfig { seed: arguments.seed, wave_below_hz, ..MatchConfig::default() };
     config.tracer.diffraction |= diffraction;
@@ -100,11 +106,18 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         config.tracer.rays = rays;
     }
     let bar = Bar::new();
-    let matched = match_room(&input, &config, &bar)?;
+    let found = match_room_files(&files, &config, &bar)?;
     bar.finish();
 
-    let summary = MatchSummary::new(&matched);
-    write_results(&mut out, &input, &room_name, &matched, &summary)?;
+    let input = MatchInput {
+        speech: Recording { name: &speech_name, signal: &found.speech.sound },
+        dry: Recording { name: &dry_name, signal: &found.dry.sound },
+        room: &room,
+        source: &source,
+        receiver: &receiver,
+    };
+    let summary = MatchSummary::new(&found.matched);
+    write_results(&mut out, &input, &room_name, &found, &summary)?;
     out.finish()?;
     let known: Vec<String> = room.notes().iter().map(ToString::to_string).collect();
     print_summary(&summary, &known, &arguments.out);
@@ -115,17 +128,19 @@ fn write_results(
     out: &mut OutputFolder,
     input: &MatchInput<'_>,
     room_name: &str,
-    matched: &RoomMatch,
+    found: &FileMatch,
     summary: &MatchSummary,
 ) -> Result<(), Failure> {
+    let matched = &found.matched;
     let response = Signal::from(matched.response.clone());
     let filter = Signal::new(matched.eq_filter.taps().to_vec(), matched.eq_filter.sample_rate_hz())?;
-    out.write("matched.wav", &encode_wav(&matched.matched, SampleFormat::Int24)?)?;
     out.write("impulse_response.wav", &encode_wav(&response, SampleFormat::Float32)?)?;
     out.write("eq_filter.wav", &encode_wav(&filter, SampleFormat::Float32)?)?;
     out.write("materials.toml", materials_toml(matched)?.as_bytes())?;
     out.write("match.json", summary.to_json()?.as_bytes())?;
-    out.write("report.html", report::html(input, room_name, matched, summary)?.as_bytes())?;
+    let excerpts = report::Excerpts { speech: &found.speech, dry: &found.dry, matched: MATCHED };
+    let page = report::html_of_files(input, room_name, matched, summary, &excerpts)?;
+    out.write("report.html", page.as_bytes())?;
     Ok(())
 }
 
@@ -142,6 +157,7 @@ fn print_summary(summary: &MatchSummary, known: &[String], out: &Path) {
             waves.below_hz, waves.voxels, waves.level_difference_db, waves.gain_db
         );
     }
+    println!("{}", report::level(summary));
     // What concerns the room was printed when it was read.
     for warning in summary.warnings.iter().filter(|warning| !known.contains(warning)) {
         println!("note: {warning}");

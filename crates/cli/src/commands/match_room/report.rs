@@ -6,7 +6,7 @@ use crate::page::{Page, escape};
 use crate::spectrogram::spectrogram_png;
 use sabine::acoustics::{EnergyDecayCurve, Estimate, PerBand, SampleFormat, Signal, encode_wav, resample};
 use sabine::eqfilter::convolve;
-use sabine::{DECAY_STEP_S, MatchInput, MatchSummary, MaterialChange, RoomMatch};
+use sabine::{DECAY_STEP_S, Excerpt, MatchInput, MatchSummary, MaterialChange, RoomMatch};
 
 type Result<T> = std::result::Result<T, Failure>;
 
@@ -15,7 +15,18 @@ const NORMAL_90: f64 = 1.645;
 /// Lowest level of the decay plot.
 const DECAY_FLOOR_DB: f64 = -50.0;
 
-/// The report as one HTML file.
+/// The files that a match was made from and wrote; the page holds no more of each than an excerpt.
+#[derive(Clone, Copy, Debug)]
+pub struct Excerpts<'a> {
+    /// Of the recording.
+    pub speech: &'a Excerpt,
+    /// Of the dry sound.
+    pub dry: &'a Excerpt,
+    /// Name of the rendered file, beside the page.
+    pub matched: &'a str,
+}
+
+/// The report as one HTML file, for sounds that are whole in memory.
 ///
 /// # Errors
 /// A chart, a picture or a sound cannot be drawn or encoded.
@@ -25,10 +36,61 @@ pub fn html(
     matched: &RoomMatch,
     summary: &MatchSummary,
 ) -> Result<String> {
+    page(input, room_name, matched, summary, None)
+}
+
+/// The report as one HTML file, for recordings of any length: `input` and `matched` hold the excerpts.
+///
+/// # Errors
+/// As [`html`].
+pub fn html_of_files(
+    input: &MatchInput<'_>,
+    room_name: &str,
+    matched: &RoomMatch,
+    summary: &MatchSummary,
+    excerpts: &Excerpts<'_>,
+) -> Result<String> {
+    page(input, room_name, matched, summary, Some(excerpts))
+}
+
+/// What was done to the level of the rendered sound, in a sentence.
+pub fn level(summary: &MatchSummary) -> String {
+    let gain_db = summary.matched_gain_db;
+    if gain_db < 0.0 {
+        return format!(
+            "The sound in the room was turned down by {:.1} dB to stay within full scale; without that it would have the level of a source whose sound at 1 m is the dry sound.",
+            -gain_db
+        );
+    }
+    "The level of the sound in the room is that of a source whose sound at 1 m is the dry sound; it was not scaled."
+        .to_owned()
+}
+
+/// Which part of a file is on the page, if not all of it.
+fn part(excerpt: Option<&Excerpt>) -> String {
+    match excerpt {
+        Some(excerpt) if excerpt.is_part() => format!(
+            " (its loudest {}, from {} on)",
+            seconds(excerpt.sound.duration_s()),
+            seconds(excerpt.start_s)
+        ),
+        _ => String::new(),
+    }
+}
+
+fn page(
+    input: &MatchInput<'_>,
+    room_name: &str,
+    matched: &RoomMatch,
+    summary: &MatchSummary,
+    excerpts: Option<&Excerpts<'_>>,
+) -> Result<String> {
+    let (speech_part, dry_part) = (part(excerpts.map(|e| e.speech)), part(excerpts.map(|e| e.dry)));
+    let speech_s = excerpts.map_or(input.speech.signal.duration_s(), |e| e.speech.file_duration_s);
     let mut page = Page::new("Your room, matched");
     page.paragraph(&format!(
         "From {} of speech in {} the room's sound was estimated, the materials of its model ({}) were fitted, and {} was placed at \"{}\" and heard at \"{}\".",
-        seconds(input.speech.signal.duration_s()),
+        seconds(speech_s),
         file_name(input.speech.name),
         file_name(room_name),
         file_name(input.dry.name),
@@ -41,14 +103,23 @@ pub fn html(
     page.heading("Listen");
     let before = in_room_before(input, matched)?;
     page.markup("<div class=\"small\"><section>");
-    page.player(&player_wav(input.speech.signal)?, "The recording: what the room sounds like");
+    page.player(
+        &player_wav(input.speech.signal)?,
+        &format!("The recording: what the room sounds like{speech_part}"),
+    );
     page.markup("</section><section>");
-    page.player(&player_wav(input.dry.signal)?, "The dry sound");
+    page.player(&player_wav(input.dry.signal)?, &format!("The dry sound{dry_part}"));
     page.markup("</section><section>");
-    page.player(&player_wav(&before)?, "The dry sound in the simulation before matching");
+    page.player(&player_wav(&before)?, &format!("The dry sound in the simulation before matching{dry_part}"));
     page.markup("</section><section>");
-    page.player(&player_wav(&matched.matched)?, "The dry sound, placed in the matched room");
-    page.markup("</section></div><div class=\"grid\"><section>");
+    page.player(&player_wav(&matched.matched)?, &format!("The dry sound, placed in the matched room{dry_part}"));
+    if let Some(excerpts) = excerpts.filter(|e| e.dry.is_part()) {
+        let (name, length) = (escape(excerpts.matched), seconds(excerpts.dry.file_duration_s));
+        page.markup(&format!("<p>The whole, {length}: <a href=\"{name}\">{name}</a></p>"));
+    }
+    page.markup("</section></div>");
+    page.paragraph(&level(summary));
+    page.markup("<div class=\"grid\"><section>");
     page.heading("Reverberation time: heard and reached");
     page.markup(&t60_chart(matched, summary).svg()?);
     page.markup("</section><section>");

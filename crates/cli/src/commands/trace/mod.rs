@@ -101,13 +101,37 @@ enum Pattern {
     FigureOfEight,
 }
 
+/// Threads for each processor beyond which more of them only cost memory and time.
+const MOST_THREADS_EACH: usize = 8;
+
+/// More threads were asked for than could be of use.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "--threads is {asked}; at most {most} are started here, {MOST_THREADS_EACH} for each of {processors} processors"
+)]
+struct TooManyThreads {
+    asked: usize,
+    most: usize,
+    processors: usize,
+}
+
+/// Computes on so many threads; 0 for one on each processor.
+fn use_threads(asked: usize) -> Result<(), Failure> {
+    let processors = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let most = MOST_THREADS_EACH * processors;
+    if asked > most {
+        return Err(TooManyThreads { asked, most, processors }.into());
+    }
+    Ok(rayon::ThreadPoolBuilder::new().num_threads(asked).build_global()?)
+}
+
 /// Runs the command.
 ///
 /// # Errors
 /// Whatever stands in the way, in words for the user.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(threads) = arguments.threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
+        use_threads(threads)?;
     }
     // A folder that cannot be written to should not cost the user a computation first.
     let out = arguments.out.as_deref().map(OutputFolder::create).transpose()?;
