@@ -8,7 +8,7 @@ use std::path::Path;
 ///
 /// ```
 /// let error = sabine_acoustics::open_file(std::env::temp_dir()).unwrap_err();
-/// assert!(error.to_string().ends_with("is a folder; a file is needed"));
+/// assert!(error.to_string().ends_with("is a directory; a file is needed"));
 /// ```
 ///
 /// # Errors
@@ -28,7 +28,7 @@ pub fn open_file(path: impl AsRef<Path>) -> Result<File, Error> {
 fn name(kind: FileType) -> &'static str {
     use std::os::unix::fs::FileTypeExt;
     if kind.is_dir() {
-        "a folder"
+        "a directory"
     } else if kind.is_fifo() {
         "a named pipe"
     } else if kind.is_socket() {
@@ -40,5 +40,5 @@ fn name(kind: FileType) -> &'static str {
 
 #[cfg(not(unix))]
 fn name(kind: FileType) -> &'static str {
-    if kind.is_dir() { "a folder" } else { "a device" }
+    if kind.is_dir() { "a directory" } else { "a device" }
 }

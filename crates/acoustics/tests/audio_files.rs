@@ -93,7 +93,7 @@ fn channels_are_chosen_never_guessed() {
 fn bad_files_are_refused_by_name() {
     let folder = TempDir::new().unwrap();
     refused(&folder.path().join("missing.wav"), Channel::Mono, |e| matches!(e, Error::Io { .. }));
-    refused(folder.path(), Channel::Mono, |e| matches!(e, Error::NotAFile { found: "a folder", .. }));
+    refused(folder.path(), Channel::Mono, |e| matches!(e, Error::NotAFile { found: "a directory", .. }));
     refused(&put(&folder, "empty.wav", b""), Channel::Mono, |e| matches!(e, Error::Empty { .. }));
     let bare_header = put(&folder, "header.wav", b"RIFF\x04\0\0\0WAVE");
     refused(&bare_header, Channel::Mono, |e| matches!(e, Error::AudioFormat { .. }));

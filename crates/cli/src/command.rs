@@ -128,7 +128,12 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> 
 fn hint(error: &(dyn Error + 'static)) -> String {
     let mut cause = Some(error);
     while let Some(error) = cause {
-        if matches!(error.downcast_ref(), Some(sabine::acoustics::Error::ManyChannels { .. })) {
+        // An error that passes another on in its place is asked for it: its own source lies behind that.
+        let own = match error.downcast_ref() {
+            Some(sabine::Error::Acoustics(inner)) => Some(inner),
+            _ => error.downcast_ref(),
+        };
+        if matches!(own, Some(sabine::acoustics::Error::ManyChannels { .. })) {
             return format!(" {}", channel::HINT);
         }
         cause = error.source();

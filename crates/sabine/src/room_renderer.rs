@@ -140,3 +140,49 @@ impl RoomRenderer {
 fn full_scale_gain(peak: f32) -> f32 {
     if peak <= FULL_SCALE { 1.0 } else { FULL_SCALE / peak }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sabine_acoustics::{Bands, PerBand, read_audio, resample, write_wav};
+    use sabine_eqfilter::EqFilterConfig;
+
+    fn noise(count: usize, gain: f32) -> Vec<f32> {
+        let mut state = 1_u32;
+        let mut next = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 8_388_608.0 - 1.0
+        };
+        (0..count).map(|_| gain * next()).collect()
+    }
+
+    /// From a file, resampled on the way, as from memory by the plain chain of convolution and filter.
+    #[test]
+    fn blocks_are_the_chain_of_convolution_and_filter() {
+        let response: Vec<f32> =
+            noise(9000, 1.0).iter().enumerate().map(|(i, n)| n * (-(i as f32) / 1500.0).exp()).collect();
+        let response = ImpulseResponse::new(response, 48_000).unwrap();
+        let gains = PerBand::new(Bands::EQ, vec![-6.0, 3.0, 0.0, 1.0, 0.0, -2.0, -8.0]).unwrap();
+        let filter = EqFilter::design(&gains, 48_000, EqFilterConfig::default()).unwrap();
+        let renderer = RoomRenderer::new(&response, &filter);
+        let folder = tempfile::tempdir().unwrap();
+        let (dry, wet) = (folder.path().join("dry.wav"), folder.path().join("wet.wav"));
+        for (samples, gain) in [(70_001, 0.5), (2, 1e-3)] {
+            write_wav(&dry, &noise(samples, gain), 16_000, SampleFormat::Float32).unwrap();
+            let done = renderer.render_file(&dry, Channel::Mono, &wet, SampleFormat::Float32).unwrap();
+            let read = read_audio(&wet, Channel::Mono).unwrap();
+            let sound = resample(&read_audio(&dry, Channel::Mono).unwrap(), 48_000).unwrap();
+            let plain = Signal::new(convolve(sound.samples(), response.samples()), 48_000).unwrap();
+            let plain = filter.apply(&plain).unwrap();
+            let gain = 10_f64.powf(done.gain_db / 20.0) as f32;
+            assert!((gain < 1.0) == (plain.peak() > FULL_SCALE), "{gain}");
+            let (in_memory, _) = renderer.render(&sound).unwrap();
+            for found in [&read, &in_memory] {
+                assert_eq!(found.samples().len(), plain.samples().len());
+                for (found, plain) in found.samples().iter().zip(plain.samples()) {
+                    assert!((found - gain * plain).abs() < 1e-5, "{found} for {}", gain * plain);
+                }
+            }
+        }
+    }
+}

@@ -7,6 +7,7 @@ mod diagnose;
 mod fit;
 mod listen;
 mod live;
+mod long_files;
 mod match_room;
 mod replace;
 mod rooms;

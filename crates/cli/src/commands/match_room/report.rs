@@ -112,7 +112,10 @@ fn page(
     page.markup("</section><section>");
     page.player(&player_wav(&before)?, &format!("The dry sound in the simulation before matching{dry_part}"));
     page.markup("</section><section>");
-    page.player(&player_wav(&matched.matched)?, &format!("The dry sound, placed in the matched room{dry_part}"));
+    page.player(
+        &player_wav(&matched.matched)?,
+        &format!("The dry sound, placed in the matched room{dry_part}"),
+    );
     if let Some(excerpts) = excerpts.filter(|e| e.dry.is_part()) {
         let (name, length) = (escape(excerpts.matched), seconds(excerpts.dry.file_duration_s));
         page.markup(&format!("<p>The whole, {length}: <a href=\"{name}\">{name}</a></p>"));
