@@ -139,19 +139,6 @@ pub enum Error {
         /// Length of the file.
         file_bytes: u64,
     },
-    /// Speech, music or several measurements where one impulse response was expected.
-    #[error(
-        "{}: no impulse response: {bursts} bursts of sound in {duration_s:.1} s, where a response has one onset and a decay. Speech is for `sabine estimate`; several responses in one file must be cut apart",
-        path.display()
-    )]
-    NotAResponse {
-        /// The file.
-        path: PathBuf,
-        /// Times that the level rises by 10 dB to within 20 dB of the loudest.
-        bursts: usize,
-        /// Length of the file in seconds.
-        duration_s: f64,
-    },
     /// A file of several channels where one was expected.
     #[error("{}: {channels} channels where one is needed: choose one, counted from 0, or their mean", path.display())]
     ManyChannels {
@@ -214,15 +201,15 @@ pub enum Error {
         /// Why.
         source: NoReading,
     },
-    /// A recording where an impulse response was expected.
+    /// Speech, music or several measurements where one impulse response was expected.
     #[error(
-        "no impulse response: its level falls by {fall_db} dB and rises again {rises} times, as speech or music does"
+        "no impulse response: {bursts} bursts of sound in {duration_s:.1} s, where a response has one onset and a decay. Speech is for `sabine estimate`; several responses in one file must be cut apart"
     )]
     NotAResponse {
-        /// How often the level rises again.
-        rises: usize,
-        /// How far it falls and rises each time, in dB.
-        fall_db: f64,
+        /// Times that the level rises by 10 dB to within 20 dB of the loudest.
+        bursts: usize,
+        /// Length of the sound in seconds.
+        duration_s: f64,
     },
     /// A line of an OBJ file that cannot be understood.
     #[error("cannot read `{text}` as {expected}")]

@@ -56,22 +56,23 @@ pub struct LocatedResponse {
 /// ```
 ///
 /// # Errors
-/// [`Error::NotAResponse`], and as [`read_audio`](crate::read_audio).
+/// [`Error::InFile`] with the cause [`Error::NotAResponse`], and as [`read_audio`](crate::read_audio).
 pub fn read_response(path: impl AsRef<Path>, channel: Channel) -> Result<LocatedResponse, Error> {
     let path = path.as_ref();
     let mut reader = AudioReader::open(path, channel)?;
     let rate_hz = reader.sample_rate_hz();
     let rate = f64::from(rate_hz);
     let block = ((BLOCK_S * rate) as usize).max(1);
-    let levels = levels_db(&mut reader, block)?;
+    let mut power = Vec::new();
+    let mut samples = Vec::new();
+    while reader.read_block(&mut samples, block)? > 0 {
+        power.push(block_power(&samples, block));
+    }
     let file_duration_s = reader.position() as f64 / rate;
-    let starts = bursts(&levels);
+    let starts = bursts(&levels_db(&power));
+    check_bursts(starts.len(), file_duration_s).map_err(|error| error.in_file(path, "samples"))?;
     let seconds = |index: usize| index as f64 * block as f64 / rate;
     let bursts_s: Vec<f64> = starts.iter().map(|&start| seconds(start)).collect();
-    if bursts_s.len() >= TOO_MANY {
-        let (path, bursts) = (path.to_owned(), bursts_s.len());
-        return Err(Error::NotAResponse { path, bursts, duration_s: file_duration_s });
-    }
     let (mut start, mut most) = (0, u64::MAX);
     if file_duration_s > LONGEST_S {
         let before = ((BEFORE_S / BLOCK_S) as usize).saturating_add(1);
@@ -92,16 +93,27 @@ pub fn read_response(path: impl AsRef<Path>, channel: Channel) -> Result<Located
     Ok(LocatedResponse { response, start_s: start as f64 / rate, file_duration_s, bursts_s })
 }
 
+/// That a sound may be an impulse response by the number of its bursts: the rule of [`read_response`].
+pub(crate) fn check_one_onset(samples: &[f32], sample_rate_hz: u32) -> Result<(), Error> {
+    let rate = f64::from(sample_rate_hz);
+    let block = ((BLOCK_S * rate) as usize).max(1);
+    let power: Vec<f64> = samples.chunks(block).map(|chunk| block_power(chunk, block)).collect();
+    check_bursts(bursts(&levels_db(&power)).len(), samples.len() as f64 / rate)
+}
+
+fn check_bursts(bursts: usize, duration_s: f64) -> Result<(), Error> {
+    if bursts < TOO_MANY { Ok(()) } else { Err(Error::NotAResponse { bursts, duration_s }) }
+}
+
+fn block_power(samples: &[f32], block: usize) -> f64 {
+    samples.iter().map(|&s| f64::from(s).powi(2)).sum::<f64>() / block as f64
+}
+
 /// Level of each block in dB, averaged over itself and its neighbours.
-fn levels_db(reader: &mut AudioReader, block: usize) -> Result<Vec<f32>, Error> {
-    let (mut power, mut samples) = (Vec::new(), Vec::new());
-    while reader.read_block(&mut samples, block)? > 0 {
-        let sum: f64 = samples.iter().map(|&s| f64::from(s).powi(2)).sum();
-        power.push(sum / block as f64);
-    }
+fn levels_db(power: &[f64]) -> Vec<f32> {
     let around = |i: usize| &power[i.saturating_sub(1)..(i + 2).min(power.len())];
     let level = |i: usize| 10.0 * (around(i).iter().sum::<f64>() / 3.0 + f64::MIN_POSITIVE).log10();
-    Ok((0..power.len()).map(|i| level(i) as f32).collect())
+    (0..power.len()).map(|i| level(i) as f32).collect()
 }
 
 /// First blocks of the bursts of sound.

@@ -25,9 +25,13 @@ fn files_below(folder: &str) -> Vec<PathBuf> {
     found
 }
 
+fn refused(error: &Error) -> bool {
+    matches!(error, Error::InFile { source, .. } if matches!(**source, Error::NotAResponse { .. }))
+}
+
 fn is_speech(path: &Path) {
     match read_response(path, Channel::Index(0)) {
-        Err(error @ Error::NotAResponse { .. }) => {
+        Err(error) if refused(&error) => {
             assert!(error.to_string().contains("sabine estimate"), "{error}");
         }
         other => panic!("{}: {:?}", path.display(), other.map(|found| found.bursts_s)),
@@ -55,7 +59,7 @@ fn published_measurements_are_told_apart() {
         for path in files_below(&format!("../shared/data/{folder}")) {
             match read_response(&path, Channel::Index(0)) {
                 Ok(found) => several += usize::from(found.bursts_s.len() > 1),
-                Err(error @ Error::NotAResponse { .. }) => panic!("{error}"),
+                Err(error) if refused(&error) => panic!("{error}"),
                 Err(error) => eprintln!("left out: {error}"),
             }
         }
@@ -92,5 +96,5 @@ fn a_response_is_found_in_a_long_recording() {
     let early = write(&[2]).unwrap();
     assert_eq!(early.response.duration_s(), 60.0);
     assert_eq!(write(&[2, 20]).unwrap().bursts_s.len(), 2);
-    assert!(matches!(write(&[2, 20, 40, 60]), Err(Error::NotAResponse { bursts: 4, .. })));
+    assert!(refused(&write(&[2, 20, 40, 60]).unwrap_err()));
 }

@@ -1,15 +1,7 @@
 //! Whether a file that is said to hold an impulse response does.
 
+use crate::response_file::check_one_onset;
 use crate::{Error, NoReading, Onset};
-
-/// Blocks in which the level is followed, in seconds: longer than the gaps between single reflections.
-const BLOCK_S: f64 = 0.025;
-/// A level that falls and rises again by this much (dB) ...
-const FALL_DB: f64 = 12.0;
-/// ... to no more than this below the loudest block (dB) ...
-const BELOW_PEAK_DB: f64 = 20.0;
-/// ... so many times belongs to speech or music: a response decays, but for a few late echoes.
-const RISES: usize = 4;
 
 /// Refuses silence, noise without direct sound, and speech or music.
 pub(super) fn check(samples: &[f32], sample_rate_hz: u32) -> Result<(), Error> {
@@ -21,37 +13,7 @@ pub(super) fn check(samples: &[f32], sample_rate_hz: u32) -> Result<(), Error> {
         Ok(_) | Err(NoReading::TooShort { .. }) => {}
         Err(source) => return Err(Error::NoDirectSound { source }),
     }
-    match rises(samples, sample_rate_hz) {
-        rises if rises >= RISES => Err(Error::NotAResponse { rises, fall_db: FALL_DB }),
-        _ => Ok(()),
-    }
-}
-
-/// How often the level falls and rises again, near the level of the loudest block.
-fn rises(samples: &[f32], sample_rate_hz: u32) -> usize {
-    let block = ((BLOCK_S * f64::from(sample_rate_hz)) as usize).max(1);
-    let power = |chunk: &[f32]| chunk.iter().map(|&x| f64::from(x).powi(2)).sum::<f64>() / chunk.len() as f64;
-    let levels_db: Vec<f64> =
-        samples.chunks_exact(block).map(|c| 10.0 * (power(c) + 1e-30).log10()).collect();
-    let loudest_db = levels_db.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let (mut count, mut fallen) = (0, false);
-    // The extreme level since the last turn.
-    let mut extreme_db = levels_db.first().copied().unwrap_or(loudest_db);
-    for &level_db in &levels_db {
-        if fallen {
-            extreme_db = extreme_db.min(level_db);
-            if level_db > extreme_db + FALL_DB && level_db > loudest_db - BELOW_PEAK_DB {
-                count += 1;
-                (fallen, extreme_db) = (false, level_db);
-            }
-        } else {
-            extreme_db = extreme_db.max(level_db);
-            if level_db < extreme_db - FALL_DB {
-                (fallen, extreme_db) = (true, level_db);
-            }
-        }
-    }
-    count
+    check_one_onset(samples, sample_rate_hz)
 }
 
 #[cfg(test)]
@@ -84,7 +46,7 @@ mod tests {
         assert!(matches!(check(&decays(&[], 1.0, 1.0), 16_000), Err(Error::NoDirectSound { .. })));
         let syllables: Vec<f64> = (0..12).map(|i| 0.3 * f64::from(i)).collect();
         let talk = check(&decays(&syllables, 0.3, 4.0), 16_000);
-        assert!(matches!(talk, Err(Error::NotAResponse { rises, .. }) if rises > 6), "{talk:?}");
+        assert!(matches!(talk, Err(Error::NotAResponse { bursts, .. }) if bursts > 6), "{talk:?}");
     }
 
     #[test]

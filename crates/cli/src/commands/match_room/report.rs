@@ -369,5 +369,8 @@ fn file_name(path: &str) -> String {
 /// Players need no more than 16 bits, and no more than 24 kHz keeps the page small.
 fn player_wav(sound: &Signal) -> Result<Vec<u8>> {
     let small = if sound.sample_rate_hz() > 24_000 { resample(sound, 24_000)? } else { sound.clone() };
-    Ok(encode_wav(&small, SampleFormat::Int16)?)
+    // Between the samples of a sound at full scale lie higher peaks.
+    let (peak, rate_hz) = (small.peak().max(1.0), small.sample_rate_hz());
+    let within = small.into_samples().into_iter().map(|s| s / peak).collect();
+    Ok(encode_wav(&Signal::new(within, rate_hz)?, SampleFormat::Int16)?)
 }
