@@ -62,12 +62,3 @@ fn each_verdict_says_what_it_means() {
     assert!(page.contains("none of the known causes explains"));
     assert!(!page.contains("After: with what was found"));
 }
-
-#[test]
-fn the_json_has_parameters_and_materials_by_name() {
-    let json: Value = serde_json::from_str(&findings("explained", &json!({})).json().unwrap()).unwrap();
-    assert_eq!(json["verdict"], "explained");
-    assert_eq!(json["causes"][0]["parameters"]["relative_humidity"]["value"], 17.0);
-    assert_eq!(json["materials"]["wall"]["absorption_before"][1], 0.2);
-    assert_eq!(json["seconds"]["trace"], 1.0);
-}
