@@ -115,7 +115,7 @@ impl MeasuredRoom {
     ///
     /// ```
     /// let room = sabine_acoustics::MeasuredRoom::read("../../fixtures/room")?;
-    /// assert_eq!(room.size_line(), "room: 8 x 6.8 x 3 m (along x, y, z), volume 145.7 m3, surface 213.7 m2");
+    /// assert_eq!(room.size_line(), "room: 8 x 6.8 x 3.96 m (along x, y, z), volume 145.7 m3, surface 187.3 m2");
     /// # Ok::<(), sabine_acoustics::Error>(())
     /// ```
     pub fn size_line(&self) -> String {

@@ -166,7 +166,7 @@ fn guessed_materials_and_both_uncertainties_are_printed() {
         let (rays, materials) = (at_1k(value, "t30_sd_s"), at_1k(value, "t30_materials_sd_s"));
         assert!(materials > 2.0 * rays, "{rays} {materials}");
     }
-    assert_eq!(stated["size_m"], serde_json::json!([8.0, 6.8, 3.0]));
+    assert_eq!(stated["size_m"], serde_json::json!([8.0, 6.8, 3.96]));
 }
 
 #[test]
@@ -183,7 +183,7 @@ fn units_and_axes_are_questioned() {
         |obj| corners(obj, |p| p.map(|c| 100.0 * c)),
     );
     let text = printed(&run("trace", &arguments(path(&stated))));
-    assert!(text.starts_with("room: 8 x 6.8 x 3 m") && !text.contains("centimetres"), "{text}");
+    assert!(text.starts_with("room: 8 x 6.8 x 3.96 m") && !text.contains("centimetres"), "{text}");
     let y_up = changed(|toml| toml, |obj| corners(obj, |[x, y, z]| [x, z, -y]));
     let error = refused(&run("trace", &arguments(path(&y_up))));
     assert!(
@@ -240,5 +240,8 @@ fn a_walk_into_a_wall_is_refused_at_once() {
     assert!(!out.exists());
     std::fs::write(&corners, "6.2 2.6 1.3\n6.2 2.8 1.3\n").unwrap();
     let text = printed(&run("walk", &arguments));
-    assert!(text.starts_with("room: 8 x 6.8 x 3 m") && text.contains("walk: 1 leg, 0.2 m, 0.2 s"), "{text}");
+    assert!(
+        text.starts_with("room: 8 x 6.8 x 3.96 m") && text.contains("walk: 1 leg, 0.2 m, 0.2 s"),
+        "{text}"
+    );
 }
