@@ -30,3 +30,90 @@ pub(crate) fn cases_of<'a>(
 ) -> Vec<&'a dyn Case> {
     chosen.iter().map(|&c| candidates[c].case).filter(|c| c.observable().concerns(part)).collect()
 }
+
+/// What a candidate would add.
+#[derive(Clone, Debug)]
+pub(crate) struct Score {
+    pub candidate: usize,
+    /// Evidence that it adds, in nats.
+    pub nats: f64,
+    /// Its size in units of its standard deviation, everything else left free.
+    pub d_prime: f64,
+}
+
+/// The evidence of one effect: its best case, and all cases together.
+#[derive(Clone, Debug)]
+pub(crate) struct EffectScore {
+    pub effect: usize,
+    pub id: &'static str,
+    pub best: usize,
+    /// Log odds against its absence, corrected for the number of cases, in nats.
+    pub nats: f64,
+    /// Size of the best case in units of its standard deviation.
+    pub d_prime: f64,
+}
+
+/// Evidence by effect, the strongest first. An effect with many cases pays for their number.
+pub(crate) fn by_effect(candidates: &[Candidate<'_>], effects: usize, scores: &[Score]) -> Vec<EffectScore> {
+    let mut found: Vec<EffectScore> = Vec::new();
+    for effect in 0..effects {
+        let own: Vec<&Score> = scores.iter().filter(|s| candidates[s.candidate].effect == effect).collect();
+        let count = candidates.iter().filter(|c| c.effect == effect).count();
+        let Some(best) = own.iter().max_by(|a, b| a.nats.total_cmp(&b.nats)) else { continue };
+        let sum: f64 = own.iter().map(|s| (s.nats - best.nats).exp()).sum();
+        found.push(EffectScore {
+            effect,
+            id: candidates[best.candidate].id,
+            best: best.candidate,
+            nats: best.nats + sum.ln() - (count as f64).ln(),
+            d_prime: best.d_prime,
+        });
+    }
+    found.sort_by(|a, b| b.nats.total_cmp(&a.nats));
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::{PositionError, TimeZeroOffset};
+    use crate::hand_made;
+    use sabine_acoustics::{Levels, TimeZero};
+
+    #[test]
+    fn an_effect_with_many_cases_pays_for_their_number() {
+        let survey = hand_made::survey(Levels::Common, TimeZero::Emission);
+        let effects: Vec<Box<dyn Effect>> = vec![Box::new(PositionError), Box::new(TimeZeroOffset)];
+        let all = cases(&effects, &survey);
+        let candidates: Vec<Candidate<'_>> =
+            all.iter().map(|(effect, id, case)| Candidate { effect: *effect, id, case: &**case }).collect();
+        // One source and three receivers; one latency.
+        assert_eq!(candidates.len(), 5);
+        let scored = |nats: [f64; 5]| {
+            let one = |(candidate, nats): (usize, f64)| Score { candidate, nats, d_prime: 1.0 };
+            by_effect(&candidates, 2, &nats.into_iter().enumerate().map(one).collect::<Vec<_>>())
+        };
+        let found = scored([0.0, 10.0, -200.0, -200.0, 9.0]);
+        // 10 nats over one of four places are less than 9 nats over none.
+        assert_eq!(found[0].id, "time_zero");
+        assert!((found[1].nats - (10.0 - 4f64.ln())).abs() < 1e-3 && found[1].best == 1);
+        // Four places that explain as much as each other are four times as probable as one.
+        let found = scored([10.0, 10.0, 10.0, 10.0, 9.0]);
+        assert!(found[0].id == "position_error" && (found[0].nats - 10.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn cases_take_part_in_the_fits_that_they_bear_on() {
+        let survey = hand_made::survey(Levels::Common, TimeZero::Emission);
+        let effects = crate::effects::catalogue();
+        let all = cases(&effects, &survey);
+        let candidates: Vec<Candidate<'_>> =
+            all.iter().map(|(effect, id, case)| Candidate { effect: *effect, id, case: &**case }).collect();
+        let chosen: Vec<usize> = (0..candidates.len()).collect();
+        let [decays, arrivals] =
+            [Observable::Decay, Observable::Arrivals].map(|part| cases_of(&candidates, &chosen, part).len());
+        let both = candidates.iter().filter(|c| c.case.observable() == Observable::Channels).count();
+        let neither = candidates.iter().filter(|c| c.case.observable() == Observable::PreArrival).count();
+        assert!(both > 0 && decays + arrivals - both + neither == candidates.len());
+    }
+}

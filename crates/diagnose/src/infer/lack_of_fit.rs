@@ -89,3 +89,28 @@ pub(crate) fn odd_bins(residuals: &[BinResidual], bands: usize) -> usize {
         })
         .sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bin_that_no_spread_of_its_band_explains_is_odd() {
+        let bin = |bin: usize, ln_ratio: f64| BinResidual {
+            pair: 0,
+            band: 0,
+            bin,
+            ln_ratio,
+            ln_predicted: 0.0,
+            variance: 0.2,
+        };
+        let scatter = |i: usize| 0.4 * (1.7 * i as f64).sin();
+        let mut residuals: Vec<BinResidual> = (0..50).map(|i| bin(i, scatter(i))).collect();
+        assert_eq!(odd_bins(&residuals, 1), 0);
+        residuals[20].ln_ratio = 4.0;
+        assert_eq!(odd_bins(&residuals, 1), 1);
+        // Where all bins scatter as far, none of them is odd.
+        let wide: Vec<BinResidual> = (0..50).map(|i| bin(i, 4.0 * scatter(i))).collect();
+        assert_eq!(odd_bins(&wide, 1), 0);
+    }
+}

@@ -4,7 +4,7 @@ use crate::effect::AuxiliaryEvidence;
 use crate::effect::{Case, Nuisance, Observable};
 use crate::error::Error;
 use crate::infer::baseline::Baseline;
-use crate::infer::candidates::{Candidate, cases_of};
+use crate::infer::candidates::{Candidate, EffectScore, Score, by_effect, cases_of};
 use crate::infer::direct_evidence;
 use crate::infer::direct_evidence::Fitted;
 use crate::likelihood::decay::WarmStart;
@@ -19,16 +19,6 @@ pub(crate) const RIVAL_NATS: f64 = 3.0;
 const MAX_EXCHANGES: usize = 3;
 /// What an exchange must gain in the direct sounds to be looked at, in nats.
 const EXCHANGE_NATS: f64 = 6.0;
-
-/// What a candidate would add.
-#[derive(Clone, Debug)]
-pub(crate) struct Score {
-    pub candidate: usize,
-    /// Evidence that it adds, in nats.
-    pub nats: f64,
-    /// Its size in units of its standard deviation, everything else left free.
-    pub d_prime: f64,
-}
 
 /// The present state: chosen candidates and the evidence of each part.
 #[derive(Clone)]
@@ -64,18 +54,6 @@ pub(crate) struct Search<'a> {
     /// Number of effects, for the correction for how many were tried.
     pub effects: usize,
     pub used: Vec<bool>,
-}
-
-/// The evidence of one effect: its best case, and all cases together.
-#[derive(Clone, Debug)]
-pub(crate) struct EffectScore {
-    pub effect: usize,
-    pub id: &'static str,
-    pub best: usize,
-    /// Log odds against its absence, corrected for the number of cases, in nats.
-    pub nats: f64,
-    /// Size of the best case in units of its standard deviation.
-    pub d_prime: f64,
 }
 
 impl<'a> Search<'a> {
@@ -229,25 +207,9 @@ impl<'a> Search<'a> {
         (2.0 * (likelihood(next) - likelihood(state)) - free as f64).max(0.0).sqrt()
     }
 
-    /// Evidence by effect, the strongest first. An effect with many cases pays for their number.
+    /// [`by_effect`] of all candidates.
     pub fn by_effect(&self, scores: &[Score]) -> Vec<EffectScore> {
-        let mut found: Vec<EffectScore> = Vec::new();
-        for effect in 0..self.effects {
-            let own: Vec<&Score> =
-                scores.iter().filter(|s| self.candidates[s.candidate].effect == effect).collect();
-            let count = self.candidates.iter().filter(|c| c.effect == effect).count();
-            let Some(best) = own.iter().max_by(|a, b| a.nats.total_cmp(&b.nats)) else { continue };
-            let sum: f64 = own.iter().map(|s| (s.nats - best.nats).exp()).sum();
-            found.push(EffectScore {
-                effect,
-                id: self.candidates[best.candidate].id,
-                best: best.candidate,
-                nats: best.nats + sum.ln() - (count as f64).ln(),
-                d_prime: best.d_prime,
-            });
-        }
-        found.sort_by(|a, b| b.nats.total_cmp(&a.nats));
-        found
+        by_effect(&self.candidates, self.effects, scores)
     }
 
     /// What must be reached for a name.

@@ -4,7 +4,8 @@ use crate::effect::{Case, Observable};
 use crate::error::Error;
 use crate::extend::extension::changes;
 use crate::infer::baseline::Baseline;
-use crate::infer::search::{EffectScore, Search};
+use crate::infer::candidates::EffectScore;
+use crate::infer::search::Search;
 use sabine_acoustics::Observer;
 
 /// What the search found.
@@ -107,4 +108,20 @@ pub(crate) fn select(
     }
     named.chosen = state.chosen;
     Ok(named)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_set_falls_with_the_cause_that_stands_for_it_and_with_no_other() {
+        let all = || Selection { chosen: vec![4, 7], rivals: vec!["a", "b"], ..Selection::default() };
+        let mut without_last = all();
+        without_last.drop(7);
+        assert!(without_last.chosen == [4] && without_last.rivals.is_empty());
+        let mut without_first = all();
+        without_first.drop(4);
+        assert!(without_first.chosen == [7] && without_first.rivals == ["a", "b"]);
+    }
 }

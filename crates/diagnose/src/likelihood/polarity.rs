@@ -64,3 +64,32 @@ fn signs(measured: &[Measured]) -> Vec<Option<f64>> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::Effect;
+    use crate::effects::ChannelFault;
+    use crate::hand_made::Tables;
+    use sabine_acoustics::{Levels, TimeZero};
+
+    #[test]
+    fn the_response_whose_pulse_is_turned_is_found() {
+        let mut tables = Tables::new(Levels::PerResponse, TimeZero::Emission);
+        let pulse: Vec<f64> =
+            (0..40).map(|i| (-0.1 * f64::from(i)).exp() * (0.8 * f64::from(i)).cos()).collect();
+        for (i, measured) in tables.measured.iter_mut().enumerate() {
+            let sign = if i == 1 { -1.0 } else { 1.0 };
+            measured.pulse = pulse.iter().map(|x| sign * x).collect();
+        }
+        let used = [true; 3];
+        let none = log_likelihood(&tables.measured, &[], &used);
+        let gains = ChannelFault.cases(&tables.survey).into_iter().filter_map(|case| {
+            let inverted = case.inverted()?;
+            Some((inverted, log_likelihood(&tables.measured, &[&*case], &used) - none))
+        });
+        for (response, gain) in gains {
+            assert_eq!(gain > 10.0, response == 1, "{response}: {gain} nats");
+        }
+    }
+}
