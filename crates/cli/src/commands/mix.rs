@@ -55,7 +55,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         samples += block.len() as u64;
         Ok(())
     })?;
-    if !(peak > 0.0) {
+    if peak <= 0.0 {
         return Err("the speech, heard through the response, is silent".into());
     }
     let scale = SPEECH_PEAK / peak;
@@ -93,7 +93,7 @@ fn noise(arguments: &Arguments, speech_power: f64) -> Result<Vec<f32>, Failure> 
     let noise = resample(&Signal::new(samples, reader.sample_rate_hz())?, arguments.rate)?;
     let mut samples = noise.into_samples();
     let power = samples.iter().map(|s| f64::from(*s).powi(2)).sum::<f64>() / samples.len() as f64;
-    if !(power > 0.0) {
+    if power <= 0.0 {
         return Err(silent(path));
     }
     let gain = (speech_power / power / 10f64.powf(arguments.snr / 10.0)).sqrt() as f32;
