@@ -182,7 +182,9 @@ impl AudioReader {
 
     /// That what was just decoded is sound.
     fn check(&self) -> Result<(), Error> {
-        let Some(at) = self.mixed.iter().position(|s| !(s.abs() <= GREATEST)) else { return Ok(()) };
+        let Some(at) = self.mixed.iter().position(|s| s.is_nan() || s.abs() > GREATEST) else {
+            return Ok(());
+        };
         let (sample, index) = (self.mixed[at], self.position as usize + at);
         let error = if sample.is_finite() {
             let range = "within 200 dB of full scale (1)";
