@@ -4,9 +4,22 @@
 //! cargo run --release --example match_room [-- OUT_FOLDER]
 //! ```
 //!
-//! On your own recording and room: `sabine match --speech F.wav --room DIR --dry F.wav --out DIR`.
+//! It writes `matched.wav`, `report.html` and what led to them into the folder (`out/match_room`), and prints
+//! ```text
+//! octave (Hz)    T60 heard    T60 reached
+//!         125       0.84 s         0.82 s
+//! ...
+//!        1000       0.74 s         0.75 s
+//! ...
+//!        8000       0.56 s         0.56 s
+//! listen to and look at out/match_room/report.html
+//! ```
+//!
+//! On your own recording and room: `sabine match --speech F.wav --room DIR --dry F.wav --out DIR`. Step by step: the guide of the crate
+//! `sabine`; how close it comes: `docs/validation/match_room.md`.
 
 use sabine::acoustics::{Channel, MeasuredRoom, SampleFormat, Signal, encode_wav, read_audio};
+use sabine::propagate::TracerConfig;
 use sabine::{MatchConfig, MatchInput, MatchSummary, Recording, match_room, materials_toml};
 use sabine_cli::bar::Bar;
 use sabine_cli::output::OutputFolder;
@@ -29,7 +42,9 @@ fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
         receiver: "microphone",
     };
     let bar = Bar::new();
-    let matched = match_room(&input, &MatchConfig::default(), &bar)?;
+    // A quarter of the default's rays, for a quick look.
+    let tracer = TracerConfig { rays: 10_000, ..TracerConfig::default() };
+    let matched = match_room(&input, &MatchConfig { tracer, ..MatchConfig::default() }, &bar)?;
     bar.finish();
 
     let summary = MatchSummary::new(&matched);

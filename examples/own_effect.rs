@@ -1,13 +1,22 @@
 //! An effect of one's own in the catalogue: a recorder whose automatic gain rises and falls while it records.
 //!
-//! The laboratory of the tests hides it in a small room; the whole catalogue and the new effect compete to explain the responses.
-//! `docs/how-to/own-effect.md` goes through it.
+//! ```text
+//! cargo run --release --example own_effect [-- ROOM_FOLDER]
+//! ```
+//!
+//! The laboratory of the tests hides it in a small room; the catalogue explains the responses without it, then with it. It prints
+//! ```text
+//! without the effect: unexplained
+//! with it: explained
+//! gain_drift (1064 nats): The gain rises and falls while a response is recorded: is an automatic gain control on?
+//! ...
+//! ```
+//! What must hold for an effect, line by line: `docs/how-to/own-effect.md`. With the effects of the project: `sabine diagnose`.
 
-use clap::Parser;
 use sabine::acoustics::MeasuredRoom;
 use sabine::diagnose::{
-    BandView, Case, DiagnoseConfig, Diagnoser, Diagnosis, Effect, EffectInfo, FittedCase, GainOverTime,
-    ModelChange, Parameter, Stage, Survey, catalogue,
+    BandView, Case, DiagnoseConfig, Diagnoser, Effect, EffectInfo, FittedCase, GainOverTime, ModelChange,
+    Parameter, Stage, Survey, catalogue,
 };
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
 use std::f64::consts::{LN_10, TAU};
@@ -66,43 +75,26 @@ impl Case for GainDrift {
     }
 }
 
-/// Diagnose a room with one more effect in the catalogue.
-#[derive(Parser)]
-struct Arguments {
-    /// A measured room [default: one of the laboratory, in which the effect is hidden]
-    #[arg(long, value_name = "DIR")]
-    room: Option<std::path::PathBuf>,
-    /// Leave the new effect out
-    #[arg(long)]
-    without: bool,
-}
-
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let arguments = Arguments::parse();
-    let mut effects = catalogue();
-    if !arguments.without {
-        effects.push(Box::new(GainDrift));
-    }
-    let config = DiagnoseConfig { rays: 1000, ..DiagnoseConfig::default() };
-    let diagnoser = Diagnoser::new(config)?.with_effects(effects);
-    let found = if let Some(folder) = arguments.room {
-        diagnoser.diagnose(&MeasuredRoom::read(folder)?, &[], &())?
-    } else {
-        let hidden = Hidden::GainDrift { depth_db: 3.0, period_s: 0.2, phase_rad: 1.0 };
-        let lab = Laboratory::new(LabConfig { seed: 11, receivers: 4, ..LabConfig::default() })?;
-        let folder = tempfile::tempdir()?;
-        diagnoser.diagnose(&lab.write(&[hidden], &folder.path().join("room"), None)?, &[], &())?
+    let folder = tempfile::tempdir()?;
+    let hidden = Hidden::GainDrift { depth_db: 3.0, period_s: 0.2, phase_rad: 1.0 };
+    let lab = Laboratory::new(LabConfig { seed: 11, receivers: 4, ..LabConfig::default() })?;
+    let room = match std::env::args_os().nth(1) {
+        Some(room) => MeasuredRoom::read(room)?,
+        None => lab.write(&[hidden], &folder.path().join("room"), None)?,
     };
-    print(&found);
-    Ok(())
-}
-
-fn print(found: &Diagnosis) {
-    println!("{}", found.verdict);
-    for cause in &found.causes {
-        println!("{} ({:.0} nats): {}", cause.effect, cause.nats, cause.explanation);
-        for p in &cause.parameters {
-            println!("  {} {:.3} {} (90 %: {:.3} to {:.3})", p.name, p.value, p.unit, p.low, p.high);
+    let config = DiagnoseConfig { rays: 1000, ..DiagnoseConfig::default() };
+    let own: [Box<dyn Effect>; 1] = [Box::new(GainDrift)];
+    let more = catalogue().into_iter().chain(own).collect();
+    for (what, effects) in [("without the effect", catalogue()), ("with it", more)] {
+        let found = Diagnoser::new(config.clone())?.with_effects(effects).diagnose(&room, &[], &())?;
+        println!("{what}: {}", found.verdict);
+        for cause in &found.causes {
+            println!("{} ({:.0} nats): {}", cause.effect, cause.nats, cause.explanation);
+            for p in &cause.parameters {
+                println!("  {} {:.3} {} (90 %: {:.3} to {:.3})", p.name, p.value, p.unit, p.low, p.high);
+            }
         }
     }
+    Ok(())
 }

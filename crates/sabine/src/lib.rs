@@ -23,7 +23,8 @@
 //! | a mesh with materials | [`propagate::PathTracer`] |
 //! | dry speech and responses, and a network to train | [`augment`], [`estimator::Trainer`] |
 //! | an estimator or a tracer of my own | [`match_room_with`] |
-//! | no wish to program | the programs in `examples/` of the repository |
+//! | a wish to read code first | the worked examples in `examples/` of the repository, one idea each |
+//! | no wish to program | the command `sabine` of the crate `sabine-cli` |
 //!
 //! # Example
 //! ```
@@ -52,7 +53,7 @@
 //! assert!((reached_s / wanted_s - 1.0).abs() < 0.05); // one just-noticeable difference
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-//! The example program `match_room` is this call with a command line, progress bars and a report.
+//! The example `match_room` is this call with a progress bar and a report; `sabine match` is it with a command line.
 //!
 //! # Does not
 //! - place sound from directional sources, or above 8 kHz as the room would: the estimator hears 16 kHz speech, and the
@@ -67,7 +68,7 @@
 //! | claim | shown by |
 //! |---|---|
 //! | the fixture, whose room is known: estimates within 9 % of the truth (8 kHz: 15 %), the rendered response within 1.5 % of them | `docs/validation/match_room.md` |
-//! | the same seed gives the same sound on any number of threads | `examples/tests/match_room.rs` |
+//! | the same seed gives the same sound on any number of threads | `crates/cli/tests/it/match_room.rs` |
 //! | everything else | the front pages of the crates |
 //!
 //! # Features

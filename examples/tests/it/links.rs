@@ -1,7 +1,5 @@
 //! Links between the documents lead somewhere.
 
-#![allow(clippy::unwrap_used)] // a panic is how a test fails
-
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
