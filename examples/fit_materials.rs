@@ -44,14 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let names: Vec<&str> = room.scene().materials().iter().map(|m| m.name.as_str()).collect();
     let tables: Vec<Material> =
         room.scene().materials().iter().map(|m| m.material.resampled(bands)).collect();
-    let priors: Vec<AbsorptionPrior> = tables
-        .iter()
-        .zip(room.priors())
-        .map(|(table, prior)| AbsorptionPrior {
-            mean: table.absorption().clone(),
-            standard_deviation: prior.absorption_sd.resampled(bands),
-        })
-        .collect();
+    let priors = AbsorptionPrior::of_room(&room, bands);
 
     let scene = room.scene().with_materials(tables.clone())?;
     let config = TracerConfig { rays: 10_000, duration_s: 2.5, ..TracerConfig::default() };

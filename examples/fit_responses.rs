@@ -36,14 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let bands = Bands::octaves(250.0, 4000.0)?;
     let tables: Vec<_> = room.scene().materials().iter().map(|m| m.material.resampled(bands)).collect();
     let names: Vec<&str> = room.scene().materials().iter().map(|m| m.name.as_str()).collect();
-    let priors: Vec<_> = tables
-        .iter()
-        .zip(room.priors())
-        .map(|(table, prior)| AbsorptionPrior {
-            mean: table.absorption().clone(),
-            standard_deviation: prior.absorption_sd.resampled(bands),
-        })
-        .collect();
+    let priors = AbsorptionPrior::of_room(&room, bands);
 
     // The decay of each response, and the paths between the same places.
     let scene = room.scene().with_materials(tables.clone())?;
