@@ -87,7 +87,7 @@ fn faults(path: &Path, text: &str) -> Vec<String> {
 #[test]
 fn links_and_anchors_of_all_documents_exist() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let mut found = vec![root.join("README.md"), root.join("CHANGELOG.md")];
+    let mut found = vec![root.join("README.md"), root.join("CHANGELOG.md"), root.join("CONTRIBUTING.md")];
     for folder in ["docs", "examples", "crates", "fixtures"] {
         documents(&root.join(folder), &mut found);
     }
