@@ -39,6 +39,9 @@ pub struct Scene {
     materials: Vec<NamedMaterial>,
 }
 
+/// The origin is far away from a room if it is more than so many times its size away.
+const FAR: f64 = 10.0;
+
 impl Scene {
     /// Checks and takes the arrays.
     ///
@@ -183,12 +186,13 @@ impl Scene {
 
     /// Enclosed volume in cubic metres (divergence theorem); meaningful for a closed mesh whose faces are wound alike.
     pub fn volume_m3(&self) -> f64 {
-        // Seen from its middle: far from the origin the differences of large products would be rounding.
+        // Seen from its middle where the origin is far away: differences of large products would be rounding.
         let [low, high] = self.bounds_m();
         let middle = [0, 1, 2].map(|k| 0.5 * (low[k] + high[k]));
+        let from = if norm(middle) > FAR * norm(sub(high, low)) { middle } else { [0.0; 3] };
         let signed: f64 = (0..self.triangles.len())
             .map(|i| {
-                let [a, b, c] = self.corners_m(i).map(|corner| sub(corner, middle));
+                let [a, b, c] = self.corners_m(i).map(|corner| sub(corner, from));
                 dot(a, cross(b, c)) / 6.0
             })
             .sum();
