@@ -240,12 +240,15 @@ impl Place<'_> {
     }
 }
 
+/// Renders a dry sound; gives the sound in the room and the gain in dB that keeps it within full scale.
+type Render<'a> = dyn Fn(&RoomRenderer) -> Result<(Signal, f64), Error> + 'a;
+
 /// What is to be placed in the room: in memory or in a file.
 pub(crate) struct DrySound<'a> {
     /// Its sample rate.
     pub sample_rate_hz: u32,
-    /// Renders it; gives the sound and the gain in dB that keeps it within full scale.
-    pub render: &'a dyn Fn(&RoomRenderer) -> Result<(Signal, f64), Error>,
+    /// How it is rendered.
+    pub render: &'a Render<'a>,
 }
 
 /// Deviation of an octave's gain from the one wanted that is said, in dB: half of what is heard.

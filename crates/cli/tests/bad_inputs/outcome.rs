@@ -137,7 +137,7 @@ impl Outcome {
     fn answer(&self) -> &str {
         let lines = || self.stderr.lines().chain(self.stdout.lines()).filter(|line| !line.trim().is_empty());
         let of = |start: &str| lines().find(|line| line.starts_with(start));
-        of("error").or_else(|| of("note")).or_else(|| lines().last()).unwrap_or("")
+        of("error").or_else(|| of("note")).or_else(|| lines().next_back()).unwrap_or("")
     }
 
     /// A row of the table.
