@@ -2,6 +2,7 @@
 
 use crate::error::check_range;
 use crate::mesh_file::triangulate;
+use crate::regular_file::read_text;
 use crate::{Error, NamedMaterial, Scene, Triangle};
 use std::path::Path;
 
@@ -72,8 +73,7 @@ impl FloorPlan {
     /// [`Error::Io`]; [`Error::InFile`] naming the line, with the cause [`Error::TextLine`]; else as [`FloorPlan::new`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
-        let text =
-            std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
+        let text = read_text(path)?;
         let mut corners_m = Vec::new();
         for (number, line) in text.lines().enumerate() {
             let words = line.split('#').next().unwrap_or_default();

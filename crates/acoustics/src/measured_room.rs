@@ -16,6 +16,7 @@ pub use write::{NewResponse, NewRoom};
 use crate::audio::{Channel, probe_audio, read_audio};
 use crate::error::check_range;
 use crate::inside_folder::check_inside;
+use crate::regular_file::read_text;
 use crate::{
     Air, Bands, Error, ImpulseResponse, Material, Mesh, MeshOptions, PerBand, Receiver, Scene, Source,
     UpAxis, library_material,
@@ -418,12 +419,6 @@ impl MeasuredRoom {
     fn receiver_index(&self, id: &str) -> Result<usize, Error> {
         self.receivers.iter().position(|r| r.id == id).ok_or_else(|| Error::UnknownId { id: id.to_owned() })
     }
-}
-
-fn read_text(path: &Path) -> Result<String, Error> {
-    let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
-    // Names may be in any old encoding; numbers and keywords are ASCII.
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
 fn bands(centres_hz: &[f64]) -> Result<Bands, Error> {

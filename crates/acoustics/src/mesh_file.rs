@@ -9,6 +9,7 @@ mod polygon;
 pub use mesh_options::{LengthUnit, MeshOptions, UpAxis};
 pub(crate) use polygon::triangulate;
 
+use crate::regular_file::read_at_most;
 use crate::{Error, Material, NamedMaterial, Scene, Triangle};
 use mesh_options::Placement;
 use std::collections::{BTreeMap, HashMap};
@@ -96,13 +97,13 @@ impl Mesh {
         };
         match ending.to_str() {
             Some("obj") => {
-                let bytes = read_bytes(path, u64::MAX)?;
+                let bytes = read_at_most(path, u64::MAX)?;
                 // Names may be in any old encoding; numbers and keywords are ASCII.
                 obj::parse_obj(path, &String::from_utf8_lossy(&bytes), &mut draft)?;
             }
             #[cfg(feature = "gltf")]
             Some("gltf" | "glb") => {
-                gltf::parse_gltf(path, &read_bytes(path, u64::MAX)?, folder, &mut draft)?;
+                gltf::parse_gltf(path, &read_at_most(path, u64::MAX)?, folder, &mut draft)?;
             }
             #[cfg(not(feature = "gltf"))]
             Some("gltf" | "glb") => return Err(Error::GltfFeature { path: path.to_owned() }),
@@ -171,22 +172,6 @@ impl Mesh {
         Scene::new(self.vertices_m, self.triangles, materials)
             .map_err(|error| error.in_file(&self.path, "mesh"))
     }
-}
-
-/// Reads at most so many bytes of a regular file: a pipe or a device might never end.
-fn read_bytes(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
-    use std::io::{Error as IoError, ErrorKind, Read};
-    let read = || {
-        let file = std::fs::File::open(path)?;
-        let metadata = file.metadata()?;
-        if !metadata.is_file() {
-            return Err(IoError::new(ErrorKind::InvalidInput, "not a regular file"));
-        }
-        let mut bytes = Vec::with_capacity(metadata.len().min(most) as usize);
-        file.take(most).read_to_end(&mut bytes)?;
-        Ok(bytes)
-    };
-    read().map_err(|source| Error::Io { path: path.to_owned(), source })
 }
 
 /// A mesh that is being read.

@@ -2,6 +2,7 @@
 
 use crate::Error;
 use std::fs::{File, FileType};
+use std::io::Read;
 use std::path::Path;
 
 /// Opens a regular file for reading. A named pipe would wait for a writer for ever, a device may have no end.
@@ -22,6 +23,21 @@ pub fn open_file(path: impl AsRef<Path>) -> Result<File, Error> {
         return Err(Error::NotAFile { path: path.to_owned(), found: name(kind) });
     }
     File::open(path).map_err(failed)
+}
+
+/// Reads at most so many bytes of a regular file.
+pub(crate) fn read_at_most(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
+    let failed = |source| Error::Io { path: path.to_owned(), source };
+    let file = open_file(path)?;
+    let length = file.metadata().map_err(failed)?.len();
+    let mut bytes = Vec::with_capacity(length.min(most) as usize);
+    file.take(most).read_to_end(&mut bytes).map_err(failed)?;
+    Ok(bytes)
+}
+
+/// Reads a text file of a person's making: its names may be in any old encoding, numbers and keywords are ASCII.
+pub(crate) fn read_text(path: &Path) -> Result<String, Error> {
+    Ok(String::from_utf8_lossy(&read_at_most(path, u64::MAX)?).into_owned())
 }
 
 #[cfg(unix)]

@@ -297,7 +297,7 @@ fn each_fault_of_a_document_is_named_with_its_place() {
         ("/buffers/0/uri", "data:;base64,*".into(), "buffers[0]: cannot read `data:;base64,*`"),
         ("/buffers/0/uri", "%ff".into(), "buffers[0]: cannot read `%ff`"),
         ("/buffers/0/uri", "absent.bin".into(), "absent.bin: No such file"),
-        ("/buffers/0/uri", ".".into(), "not a regular file"),
+        ("/buffers/0/uri", ".".into(), "is a directory"),
         ("/accessors/0/bufferView", 7.into(), "bufferView 7 does not exist; there are 2"),
         ("/accessors/0/bufferView", Value::Null, "bufferView of the accessor is empty"),
         ("/accessors/0/componentType", 5122.into(), "`accessors[0]` where only positions"),

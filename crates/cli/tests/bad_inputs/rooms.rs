@@ -374,6 +374,9 @@ pub fn make(folder: &Path) {
         files.insert("ir/talker_microphone.wav", std::fs::read(folder.join("wav").join(wav)).unwrap());
         write(folder, name, &files);
     }
+    let piped = folder.join("rooms/room_file_a_pipe");
+    std::fs::create_dir_all(&piped).unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(piped.join("room.toml")).status().unwrap().success());
     let looped = folder.join("rooms/symbolic_loop");
     std::fs::create_dir_all(&looped).unwrap();
     std::os::unix::fs::symlink("room.toml", looped.join("room.toml")).unwrap();
@@ -386,6 +389,7 @@ pub fn cases() -> Vec<Case> {
         Case::new(format!("trace, room {name}"), &arguments, expected)
     };
     let mut cases: Vec<Case> = rooms().into_iter().map(|(name, _, expected)| trace(name, expected)).collect();
+    cases.push(trace("room_file_a_pipe", Refused(&["room.toml", "named pipe"])));
     cases.push(trace("symbolic_loop", Refused(&["room.toml", "symbolic links"])));
     for (name, words) in [
         ("response_nan", &["talker_microphone.wav", "not finite"][..]),

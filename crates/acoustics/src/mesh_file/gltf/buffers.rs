@@ -3,7 +3,7 @@
 use super::item;
 use crate::Error;
 use crate::inside_folder::check_inside;
-use crate::mesh_file::read_bytes;
+use crate::regular_file::read_at_most;
 use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use gltf::json::accessor::{Accessor, ComponentType, Type};
@@ -194,5 +194,5 @@ fn fetch(path: &Path, buffer: &Buffer, folder: Option<&Path>) -> Result<Vec<u8>,
     if let Some(folder) = folder {
         check_inside(folder, &file)?;
     }
-    read_bytes(&file, buffer.byte_length.0)
+    read_at_most(&file, buffer.byte_length.0)
 }
