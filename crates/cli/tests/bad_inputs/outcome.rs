@@ -107,8 +107,8 @@ fn run(folder: &Path, case: &Case, number: usize) -> Outcome {
     if out.exists() && left.is_empty() {
         left.push("an empty folder".into());
     }
-    // Nothing may appear beside the output folder either; files of the case that runs at the same time begin like these.
-    let known = |name: &String| ["out_", "stdout_", "stderr_"].iter().any(|start| name.starts_with(start));
+    // Nothing may appear beside the output folder either; what the case that runs at the same time writes begins like these.
+    let known = |name: &String| ["out_", "stdout_", "stderr_", ".unfinished-"].iter().any(|start| name.starts_with(start));
     left.extend(listing(folder).difference(&before).filter(|name| !known(name)).cloned());
     Outcome {
         code,
