@@ -7,12 +7,15 @@ use std::fmt::Write;
 
 /// Size of a chart in SVG units: it scales to its place on the page, and its text stays readable on a phone.
 const SIZE: (u32, u32) = (480, 320);
-/// Height of letters in these units: 11 pixels and more where a chart is as wide as a phone of 390 pixels lets it be.
-const TEXT: u32 = 16;
+/// Height of letters as plotters counts it, 1.24 times the size of the font: 11 pixels and more where a chart is as wide as a phone of
+/// 390 pixels lets it be (352).
+const TEXT: u32 = 19;
+/// The same for small charts, which are drawn larger there.
+const SMALL_TEXT: u32 = 16;
 /// Size of one of several small charts side by side.
 const SMALL: (u32, u32) = (320, 244);
 /// Height of a row of the legend.
-const LEGEND_ROW: i32 = 20;
+const LEGEND_ROW: i32 = 23;
 /// Centres of bands that are told along an axis, at most.
 const MOST_CENTRES: usize = 10;
 /// Text and axes; a dark page turns it light.
@@ -134,6 +137,10 @@ impl Chart {
         })
     }
 
+    fn text(&self) -> u32 {
+        if self.small { SMALL_TEXT } else { TEXT }
+    }
+
     fn position(&self, x: f64) -> f64 {
         if matches!(self.x, Scale::Octaves(_)) { x.log2() } else { x }
     }
@@ -168,13 +175,14 @@ impl Chart {
 
     /// Left edge and row of each entry of the legend, wrapped at the width of the chart.
     fn legend_places(&self, width: i32) -> Vec<(i32, i32)> {
-        let start = if self.small { 46 } else { 62 };
+        let start = if self.small { 46 } else { 68 };
         let (mut left, mut row) = (start, 0);
         self.series
             .iter()
             .filter(|s| s.in_legend)
             .map(|series| {
-                let needed = 40 + 9 * series.name.chars().count() as i32;
+                // Letters are about half as wide as high.
+                let needed = 40 + self.text() as i32 * series.name.chars().count() as i32 / 2;
                 if left > start && left + needed > width {
                     (left, row) = (start, row + 1);
                 }
@@ -202,7 +210,11 @@ impl Chart {
                 let stroke = vec![(left + from, middle), (left + to, middle)];
                 legend.draw(&PathElement::new(stroke, colour.stroke_width(3)))?;
             }
-            legend.draw(&Text::new(series.name.clone(), (left + 24, middle - 8), ink(TEXT)))?;
+            legend.draw(&Text::new(
+                series.name.clone(),
+                (left + 24, middle - self.text() as i32 / 2),
+                ink(self.text()),
+            ))?;
         }
 
         let (x0, x1) = self.x_range();
@@ -211,15 +223,15 @@ impl Chart {
             .margin_right(14)
             // plotters places the label by the capitals of one font; in others it rises higher.
             .margin_left(if self.y_label.is_empty() { 0 } else { 6 })
-            .x_label_area_size(if self.x_label.is_empty() { 26 } else { 50 })
-            .y_label_area_size(if self.y_label.is_empty() { 42 } else { 62 })
+            .x_label_area_size(if self.x_label.is_empty() { 26 } else { 54 })
+            .y_label_area_size(if self.y_label.is_empty() { 46 } else { 68 })
             .build_cartesian_2d(x0..x1, y0..y1)?;
         let octaves = matches!(self.x, Scale::Octaves(_));
         let mut mesh = chart.configure_mesh();
         mesh.x_desc(self.x_label.as_str())
             .y_desc(self.y_label.as_str())
-            .axis_desc_style(ink(TEXT))
-            .label_style(ink(TEXT))
+            .axis_desc_style(ink(self.text()))
+            .label_style(ink(self.text()))
             .axis_style(INK)
             .bold_line_style(GRID)
             .light_line_style(TRANSPARENT)
@@ -235,8 +247,8 @@ impl Chart {
                 plot.draw(&PathElement::new(vec![(x, y0), (x, y1)], GRID))?;
                 let (pixel, bottom) = plot.map_coordinate(&(x, y0));
                 let label = if hz < 1000.0 { format!("{hz}") } else { format!("{}k", hz / 1000.0) };
-                let shift = (TEXT / 4 * label.len() as u32) as i32;
-                body.draw(&Text::new(label, (pixel - shift, bottom + 5 - legend_height), ink(TEXT)))?;
+                let shift = (self.text() * label.len() as u32 / 4) as i32;
+                body.draw(&Text::new(label, (pixel - shift, bottom + 5 - legend_height), ink(self.text())))?;
             }
         }
         for series in &self.series {
@@ -303,4 +315,33 @@ pub fn chart_sheet(charts: &[(String, Chart)]) -> Result<String, Box<dyn std::er
         );
     }
     Ok(sheet + "</svg>\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn letters_are_eleven_pixels_high_on_a_phone() {
+        // The page leaves a chart 352 of a phone's 390 pixels; both kinds stand one below the other there.
+        for small in [false, true] {
+            let chart = Chart {
+                x_label: "Octave (Hz)".into(),
+                y_label: "T30 (s)".into(),
+                x: Scale::Octaves(vec![500.0, 1000.0]),
+                y: Some((0.0, 1.0)),
+                series: vec![Series::new("T30", Look::Dots, 0, vec![(500.0, 0.6), (1000.0, 0.5)])],
+                small,
+            };
+            let svg = chart.svg().unwrap();
+            let width = f64::from(if small { SMALL.0 } else { SIZE.0 });
+            let sizes: Vec<f64> = svg
+                .split("font-size=\"")
+                .skip(1)
+                .map(|rest| rest.split('"').next().unwrap().parse().unwrap())
+                .collect();
+            assert!(sizes.len() > 5, "{svg}");
+            assert!(sizes.iter().all(|size| size * 352.0 / width >= 11.0), "{sizes:?}");
+        }
+    }
 }

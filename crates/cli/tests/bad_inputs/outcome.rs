@@ -108,7 +108,9 @@ fn run(folder: &Path, case: &Case, number: usize) -> Outcome {
         left.push("an empty folder".into());
     }
     // Nothing may appear beside the output folder either; what the case that runs at the same time writes begins like these.
-    let known = |name: &String| ["out_", "stdout_", "stderr_", ".unfinished-"].iter().any(|start| name.starts_with(start));
+    let known = |name: &String| {
+        ["out_", "stdout_", "stderr_", ".unfinished-"].iter().any(|start| name.starts_with(start))
+    };
     left.extend(listing(folder).difference(&before).filter(|name| !known(name)).cloned());
     Outcome {
         code,
