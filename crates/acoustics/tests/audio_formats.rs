@@ -206,10 +206,12 @@ fn rooms_take_the_same_formats() {
           measurement = { time_zero = \"per_response\", levels = \"per_response\" }\nresponses = [{ source = \"s\", receiver = \"r\", file = \"ir.wav\" }]\n",
     );
     put("room.obj", b"v 0 0 0\nv 4 0 0\nv 0 4 0\nv 0 0 4\nusemtl wall\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
-    let stream = riff(b"RF64", &[&chunk(b"bext", b"odd"), &fmt(3, 1, 64, b""), &data(0xffff_ffff, &[0; 80])]);
+    // A direct sound, and nothing after it.
+    let samples: Vec<u8> = (0..480).flat_map(|i| f64::from(u8::from(i == 5)).to_le_bytes()).collect();
+    let stream = riff(b"RF64", &[&chunk(b"bext", b"odd"), &fmt(3, 1, 64, b""), &data(0xffff_ffff, &samples)]);
     put("ir.wav", &stream);
     let room = sabine_acoustics::MeasuredRoom::read(folder.path()).unwrap();
-    assert_eq!(room.load_response(0).unwrap().samples().len(), 10);
+    assert_eq!(room.load_response(0).unwrap().samples().len(), 480);
     put("ir.wav", b"\x89PNG\r\n\x1a\n");
     let error = sabine_acoustics::MeasuredRoom::read(folder.path()).unwrap_err().to_string();
     assert!(error.contains("ir.wav: this is PNG"), "{error}");

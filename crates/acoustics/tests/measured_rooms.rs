@@ -284,7 +284,7 @@ fn each_fault_of_a_response_is_named_with_its_file() {
     std::fs::write(&wav, b"").unwrap();
     named("empty");
     std::fs::write(&wav, b"a text").unwrap();
-    named("not a WAV");
+    named("this is text");
     let stereo = hound::WavSpec {
         channels: 2,
         sample_rate: 48_000,

@@ -203,9 +203,9 @@ fn the_shards_hold_what_the_manifest_says() {
 #[test]
 fn what_leaks_or_cannot_be_partitioned_is_refused() {
     let refused = DatasetBuilder::new(config(), sources(1, rooms(4))).err().unwrap();
-    assert!(matches!(refused, Error::TooFew { what: "speaker", .. }), "{refused}");
+    assert!(matches!(refused, Error::TooFew { what: "speakers", .. }), "{refused}");
     let refused = DatasetBuilder::new(config(), sources(5, rooms(2))).err().unwrap();
-    assert!(matches!(refused, Error::TooFew { what: "room", .. }), "{refused}");
+    assert!(matches!(refused, Error::TooFew { what: "rooms", .. }), "{refused}");
 
     let leak = PartitionConfig {
         validation: vec!["r1".into()],

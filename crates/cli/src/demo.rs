@@ -2,7 +2,7 @@
 //!
 //! It is the fixture of the repository (`fixtures/README.md`), so that an installed program works without a checkout.
 
-use std::io;
+use crate::output::OutputError;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
@@ -29,7 +29,7 @@ impl Demo {
     ///
     /// # Errors
     /// The temporary folder cannot be written.
-    pub fn or(&mut self, own: Option<&Path>, name: &str) -> io::Result<PathBuf> {
+    pub fn or(&mut self, own: Option<&Path>, name: &str) -> Result<PathBuf, OutputError> {
         match own {
             Some(path) => Ok(path.to_owned()),
             None => Ok(self.folder()?.join(name)),
@@ -42,13 +42,19 @@ impl Demo {
         inside.map_or_else(|| path.display().to_string(), |name| format!("demo/{}", name.display()))
     }
 
-    fn folder(&mut self) -> io::Result<&Path> {
+    fn folder(&mut self) -> Result<&Path, OutputError> {
         if self.folder.is_none() {
-            let folder = tempfile::Builder::new().prefix("sabine-demo-").tempdir()?;
+            let folder = tempfile::Builder::new()
+                .prefix("sabine-demo-")
+                .tempdir()
+                .map_err(|source| OutputError { path: std::env::temp_dir(), source })?;
             for (name, bytes) in FILES {
                 let path = folder.path().join(name);
-                std::fs::create_dir_all(path.parent().unwrap_or(folder.path()))?;
-                std::fs::write(path, bytes)?;
+                let unpack = || {
+                    std::fs::create_dir_all(path.parent().unwrap_or(folder.path()))?;
+                    std::fs::write(&path, bytes)
+                };
+                unpack().map_err(|source| OutputError { path: path.clone(), source })?;
             }
             self.folder = Some(folder);
         }

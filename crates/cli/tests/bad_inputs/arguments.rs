@@ -56,7 +56,7 @@ pub fn cases() -> Vec<Case> {
         ("eq --gains-db -6,6,-6,6,-6,6,-6 --sample-rate 48000 --out OUT", Done(&["wrote"])),
         ("eq --gains-db 0,1,2,3,0,1,2 --sample-rate 0 --out OUT", Refused(&["sample_rate_hz"])),
         ("eq --gains-db 0,1,2,3,0,1,2 --sample-rate 48000 --out a_file/fir.wav", Refused(&["a_file"])),
-        ("fit --room rooms/good --t60 20,20,20,20,20,20,20 --out OUT", Refused(&["t60"])),
+        ("fit --room rooms/good --t60 20,20,20,20,20,20,20 --out OUT", Refused(&["T60 of 20 s"])),
         ("fit --room rooms/good --t60 0.5,0.5 --out OUT", Refused(&["7"])),
         (
             "fit --room rooms/good --rays 500 --responses --hold-out microphone,corner --out OUT",
@@ -80,7 +80,7 @@ pub fn cases() -> Vec<Case> {
         ("walk --room rooms/good --speed 1e-9 --out OUT", Refused(&["--speed"])),
         ("walk --room rooms/good --rate 0 --out OUT", Refused(&["sample rate"])),
         ("walk --room rooms/good --duration 0 --out OUT", Refused(&["duration_s"])),
-        ("walk --room rooms/good --mode binaural --sofa nope.sofa --out OUT", Refused(&["nope.sofa"])),
+        ("walk --room rooms/good --mode binaural --head nope.sofa --out OUT", Refused(&["nope.sofa"])),
         ("live --fast --room rooms/good --rays 500 --speech wav/one.wav", Refused(&["one.wav", "0.00 s"])),
         (
             "listen analyse --ratings ratings_without_columns.csv",
@@ -99,9 +99,9 @@ pub fn cases() -> Vec<Case> {
         ("match --rays 300 --out /proc/nowhere", Refused(&["/proc/nowhere"])),
         ("measure wav/good.wav --json /proc/nowhere.json", Refused(&["/proc/nowhere.json"])),
         ("measure wav/good.wav --plots a_file", Refused(&["a_file"])),
-        ("measure wav/good.wav --from 30 --to 20", Refused(&["bands"])),
+        ("measure wav/good.wav --from 30 --to 20", Refused(&["nominal centre"])),
         ("new-room --size 0x4x2.6 --out OUT", Refused(&["size"])),
-        ("new-room --size 5x4 --out OUT", Usage),
+        ("new-room --size 5x4 --out OUT", Refused(&["5x4", "length x width x height"])),
         ("materials --csv", Done(&["carpet_thin"])),
     ] {
         cases.push(Case::new(arguments, arguments, expected));

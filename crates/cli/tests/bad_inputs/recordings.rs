@@ -102,7 +102,8 @@ pub fn make(folder: &Path) {
     let odd = b"LIST\x03\0\0\0abc\0".to_vec();
     claiming("oddchunk.wav", &pcm, &int16(&x), Claims { before: odd, ..Claims::default() });
     let mut bext = b"bext\x5b\x02\0\0".to_vec();
-    bext.extend(vec![b' '; 0x25b + 1]);
+    bext.extend(vec![b' '; 0x25b]);
+    bext.push(0);
     claiming("bext.wav", &pcm, &int16(&x), Claims { before: bext, ..Claims::default() });
     claiming(
         "stream.wav",

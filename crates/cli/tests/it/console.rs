@@ -105,7 +105,7 @@ fn too_few_speakers_are_found_before_rooms_are_traced() {
         .arg(folder.path().join("speech"))
         .arg("--rir")
         .arg(fixtures.join("room/ir"))
-        .args(["--rooms", "20000", "--count", "10", "--measured", "0,0,0", "--out"])
+        .args(["--rooms", "20000", "--count", "10", "--measured", "0", "0", "0", "--out"])
         .arg(&out)
         .output()
         .unwrap();

@@ -220,11 +220,12 @@ fn a_place_that_cannot_be_written_to_is_named_before_anything_is_computed() {
 fn a_full_disk_leaves_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
-    let script = "trap '' XFSZ; ulimit -f 100; exec \"$0\" \"$1\" --out \"$2\"";
+    let script = "trap '' XFSZ; ulimit -f 100; exec \"$0\" \"$1\" --out \"$2\" --speech \"$3/speech/recording.wav\" --dry \"$3/speech/dry_guest.wav\" --room \"$3/room\"";
     let output = Command::new("sh")
         .args(["-c", script])
         .args([env!("CARGO_BIN_EXE_sabine"), "match"])
         .arg(&out)
+        .arg(fixture(""))
         .output()
         .unwrap();
     let message = String::from_utf8_lossy(&output.stderr).into_owned();

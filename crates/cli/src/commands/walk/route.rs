@@ -140,9 +140,12 @@ pub fn read_corners(path: &Path) -> Result<Vec<[f64; 3]>, Failure> {
         .enumerate()
         .filter(|(_, line)| !line.trim().is_empty())
         .map(|(number, line)| {
-            let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
-            let wrong = || format!("{}: line {}: `{line}` is not x y z", path.display(), number + 1).into();
-            <[f64; 3]>::try_from(numbers).map_err(|_| wrong())
+            let finite = |word: &str| word.parse().ok().filter(|number: &f64| number.is_finite());
+            let numbers: Option<Vec<f64>> = line.split_whitespace().map(finite).collect();
+            let corner = numbers.and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
+            corner.ok_or_else(|| {
+                format!("{}: line {}: `{line}` is not x y z in metres", path.display(), number + 1).into()
+            })
         })
         .collect()
 }
