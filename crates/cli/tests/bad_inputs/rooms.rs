@@ -365,7 +365,7 @@ fn rooms() -> Vec<(&'static str, Files, Expected)> {
         (
             "response_of_text",
             respond("ir/talker_microphone.wav", "this is not audio"),
-            Done(&["paths; traced in"]),
+            Refused(&["talker_microphone.wav", "this is text"]),
         ),
     ]
 }

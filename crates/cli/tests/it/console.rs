@@ -94,9 +94,10 @@ fn too_few_speakers_are_found_before_rooms_are_traced() {
     let folder = tempfile::tempdir().unwrap();
     let fixtures = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures");
     for speaker in ["one", "two"] {
-        let own = folder.path().join("speech").join(speaker);
-        std::fs::create_dir_all(&own).unwrap();
-        std::fs::copy(fixtures.join("speech/dry_talker.wav"), own.join("a.wav")).unwrap();
+        // The speaker is the name up to the first hyphen.
+        let own = folder.path().join("speech").join(format!("{speaker}-1.wav"));
+        std::fs::create_dir_all(own.parent().unwrap()).unwrap();
+        std::fs::copy(fixtures.join("speech/dry_talker.wav"), own).unwrap();
     }
     let out = folder.path().join("out");
     // So many rooms would take an hour.
