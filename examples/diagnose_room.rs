@@ -7,7 +7,7 @@
 //! Few rays and four suspects, for a quick look; it works in a temporary folder. It prints
 //! ```text
 //! explained
-//! time_zero (40 nats): The recording does not start when the loudspeaker does: a latency was not taken out.
+//! time_zero (40 nats): The recording does not start with the emission: a latency was not removed.
 //!   latency 5.01 ms (90 %: 4.98 to 5.04)
 //!   gain at places not fitted: 0.095 nats for each time bin (90 %: 0.079 to 0.111)
 //! direct sound, in milliseconds after the start of the file:
