@@ -120,7 +120,8 @@ fn sealed(bytes: &[u8]) -> Vec<u8> {
     let at = bytes.windows(before.len()).position(|w| w == before).unwrap();
     let mut bytes = bytes.to_vec();
     bytes[at..at + before.len() + 64 + 2].fill(b' ');
-    add_checksum(&bytes).unwrap()
+    // Without a header of its own there is nothing to seal.
+    add_checksum(&bytes).unwrap_or(bytes)
 }
 
 #[test]
