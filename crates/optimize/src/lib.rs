@@ -81,6 +81,7 @@
 //! | three materials from two responses: intervals cover, and what is open is named | `tests/other_tracers.rs` |
 //! | six from twelve: mean absolute error below 0.02 from 2 kHz on, where the Cramer-Rao bound allows it | `tests/twelve_pairs.rs` |
 //! | a first step to where the cost is infinite is shortened, and T30 of a two-room flat met within 6 % | tests of `response_solver`, `tests/two_room_flat.rs` |
+//! | weights that follow the materials come to rest, for eight seeds of eight | `tests/swinging_weights.rs` |
 //! | what has not converged is an error or a warning, never a result | tests of `bounded` and `assembly` |
 //! | arrivals that are off by a millisecond are allowed for where that is said | `tests/other_tracers.rs` |
 //! | rays are added until T60 is as sure as asked for | `tests/retracing.rs` |

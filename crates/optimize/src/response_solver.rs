@@ -11,6 +11,9 @@ use sabine_acoustics::Objective;
 
 /// Most times that the bins are weighed anew.
 const WEIGHINGS: usize = 40;
+/// From this weighing on only half of each step is taken: weights that follow the materials can make both swing between two places
+/// for ever, and half the way leads to the place between them, which has the same fixed point.
+const DAMPED_FROM: usize = 10;
 /// Most expansions between two weighings.
 const STEPS: usize = 40;
 /// Change of any material from one weighing to the next, in standard deviations of its prior, below which the fit has converged.
@@ -112,11 +115,14 @@ pub(crate) fn solve(bands: &[ResponseBand<'_>], config: &FitConfig) -> Result<So
     // Far from the answer everything is badly explained, which says nothing of how well it will be.
     let mut dispersion = vec![1.0; bands.len()];
     let (mut iterations, mut unconverged) = (0, None);
-    for _ in 0..WEIGHINGS {
+    for weighing in 0..WEIGHINGS {
         let before = x.clone();
         let descent = descend(&unknowns, &mut x, &mut expansions, &dispersion, config)?;
         iterations += descent.iterations;
         let moved = unknowns.distance(&before, &x);
+        if weighing >= DAMPED_FROM && moved >= TOLERANCE {
+            x.iter_mut().zip(&before).for_each(|(x, before)| *x = 0.5 * (*x + before));
+        }
         expansions = expand(&x);
         let absorption = unknowns.absorption(&x);
         dispersion = expansions.iter().zip(&absorption).map(|(e, a)| e.dispersion(a)).collect();
