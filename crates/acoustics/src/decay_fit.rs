@@ -480,13 +480,22 @@ impl Model {
                 damping = (8.0 * damping).max(1e-3);
                 if damping > 1e8 {
                     // Rounding hides a gain that is small; a large one that cannot be had is a failure.
-                    let promised: f64 = step.iter().zip(&score).map(|(s, g)| s * g).sum();
+                    let free = (0..n).filter(|&i| !self.is_held_by_bound(i, step[i]));
+                    let promised: f64 = free.map(|i| step[i] * score[i]).sum();
                     self.converged = promised * damping < NEGLIGIBLE_GAIN;
                     break;
                 }
             }
         }
         self
+    }
+
+    /// Whether a parameter is at its bound and the step leads out of it: a response without noise has the least one.
+    fn is_held_by_bound(&self, i: usize, step: f64) -> bool {
+        let (noise, value) = (self.parameters.len() - 1, self.parameters[i]);
+        let is_power = i % 2 == 0 && i < noise;
+        (i == noise && value <= self.bounds.least_noise && step < 0.0)
+            || (is_power && value >= self.bounds.most_power && step > 0.0)
     }
 
     /// The model with one more slope, if the data ask for it.

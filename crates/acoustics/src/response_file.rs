@@ -45,12 +45,12 @@ pub struct LocatedResponse {
 /// ```
 /// use sabine_acoustics::{Channel, SampleFormat, read_response, write_wav};
 /// let path = std::env::temp_dir().join(format!("sabine_response_{}.wav", std::process::id()));
-/// // Silence of 100 s, then a decay.
+/// // Silence of 100 s, then a decay: what is kept begins a second before the 60 ms in which it begins.
 /// let samples: Vec<f32> =
 ///     (0..101_000).map(|i: i32| if i < 100_000 { 0.0 } else { (-0.01 * (i - 100_000) as f32).exp() }).collect();
 /// write_wav(&path, &samples, 1000, SampleFormat::Float32)?;
 /// let found = read_response(&path, Channel::Mono)?;
-/// assert_eq!((found.start_s, found.response.duration_s(), found.file_duration_s), (98.98, 2.02, 101.0));
+/// assert_eq!((found.start_s, found.response.duration_s(), found.file_duration_s), (98.96, 2.04, 101.0));
 /// # std::fs::remove_file(&path).ok();
 /// # Ok::<(), sabine_acoustics::Error>(())
 /// ```
