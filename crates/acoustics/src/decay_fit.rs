@@ -464,7 +464,13 @@ impl Model {
             for i in 0..n {
                 damped[i * n + i] += damping * information[i * n + i] + 1e-9;
             }
-            let Some(step) = solve(&damped, &score) else { break };
+            // What a bound holds stays where it is; the others must not make up for a step that it cannot take.
+            let mut free = score.clone();
+            for i in (0..n).filter(|&i| self.is_held_by_bound(i, score[i])) {
+                free[i] = 0.0;
+                leave_out(&mut damped, n, i);
+            }
+            let Some(step) = solve(&damped, &free) else { break };
             let parameters = self.parameters.iter().zip(&step).map(|(p, s)| p + s.clamp(-1.0, 1.0)).collect();
             let tried = self.moved(parameters, bins);
             if tried.deviance <= self.deviance {
@@ -480,8 +486,7 @@ impl Model {
                 damping = (8.0 * damping).max(1e-3);
                 if damping > 1e8 {
                     // Rounding hides a gain that is small; a large one that cannot be had is a failure.
-                    let free = (0..n).filter(|&i| !self.is_held_by_bound(i, step[i]));
-                    let promised: f64 = free.map(|i| step[i] * score[i]).sum();
+                    let promised: f64 = step.iter().zip(&score).map(|(s, g)| s * g).sum();
                     self.converged = promised * damping < NEGLIGIBLE_GAIN;
                     break;
                 }
@@ -490,12 +495,12 @@ impl Model {
         self
     }
 
-    /// Whether a parameter is at its bound and the step leads out of it: a response without noise has the least one.
-    fn is_held_by_bound(&self, i: usize, step: f64) -> bool {
+    /// Whether a parameter is at its bound and wants to leave it: the noise of a response that has none.
+    fn is_held_by_bound(&self, i: usize, score: f64) -> bool {
         let (noise, value) = (self.parameters.len() - 1, self.parameters[i]);
         let is_power = i % 2 == 0 && i < noise;
-        (i == noise && value <= self.bounds.least_noise && step < 0.0)
-            || (is_power && value >= self.bounds.most_power && step > 0.0)
+        (i == noise && value <= self.bounds.least_noise && score < 0.0)
+            || (is_power && value >= self.bounds.most_power && score > 0.0)
     }
 
     /// The model with one more slope, if the data ask for it.
