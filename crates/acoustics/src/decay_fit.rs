@@ -498,7 +498,7 @@ impl Model {
     /// Whether a parameter is at its bound and wants to leave it: the noise of a response that has none.
     fn is_held_by_bound(&self, i: usize, score: f64) -> bool {
         let (noise, value) = (self.parameters.len() - 1, self.parameters[i]);
-        let is_power = i % 2 == 0 && i < noise;
+        let is_power = i.is_multiple_of(2) && i < noise;
         (i == noise && value <= self.bounds.least_noise && score < 0.0)
             || (is_power && value >= self.bounds.most_power && score > 0.0)
     }
