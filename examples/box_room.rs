@@ -1,7 +1,7 @@
 //! A room written down in code and traced: where the formulas of Sabine and Eyring hold, and where they do not.
 //!
 //! ```text
-//! cargo run --release --example box_room
+//! cargo run --example box_room
 //! ```
 //!
 //! Nearly all of this room's absorption is on its floor and ceiling: sound that runs level between the bare walls outlives what both
@@ -21,11 +21,10 @@
 //!
 //! A room of your own: `sabine new-room --help`, then `sabine trace --room DIR`. How paths are found: `docs/explanation/tracing.md`.
 
-use sabine::acoustics::{
-    Air, Bands, Conditions, DiffuseRoom, Material, PathParameters, PerBand, Propagator, Receiver, Scene,
-    Source, library_material,
-};
+use sabine::acoustics::{Air, Bands, Material, PerBand, library_material};
+use sabine::paths::{Conditions, PathParameters, Propagator};
 use sabine::propagate::{PathTracer, TracerConfig};
+use sabine::scene::{DiffuseRoom, Receiver, Scene, Source};
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {

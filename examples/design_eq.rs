@@ -1,7 +1,7 @@
 //! From gains in octaves to a filter, and the proof that the filter has them: a filter bank measures its impulse response.
 //!
 //! ```text
-//! cargo run --release --example design_eq
+//! cargo run --example design_eq
 //! ```
 //!
 //! It writes `out/design_eq/equalised.wav`, a voice through the filter, and prints

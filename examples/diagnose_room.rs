@@ -1,7 +1,7 @@
 //! Why is my simulation wrong? Somebody has left 5 ms of latency in the recordings: it is found, named and put into the model.
 //!
 //! ```text
-//! cargo run --release --example diagnose_room
+//! cargo run --example diagnose_room
 //! ```
 //!
 //! Few rays and four suspects, for a quick look; it works in a temporary folder. It prints
@@ -19,9 +19,11 @@
 //! In full, against the whole catalogue: `sabine diagnose --room DIR --hold-out r3 --out DIR`. How a cause is weighed:
 //! `docs/explanation/diagnosis.md`; what it found in real rooms: `docs/validation/diagnose.md`.
 
-use sabine::acoustics::{ImpulseResponse, Material, MeasuredRoom, NewResponse, NewRoom, Onset, Propagator};
+use sabine::acoustics::{ImpulseResponse, Material, Onset};
 use sabine::diagnose::{DiagnoseConfig, Diagnoser};
+use sabine::paths::Propagator;
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
+use sabine::scene::{MeasuredRoom, NewResponse, NewRoom};
 use std::error::Error;
 use std::path::Path;
 
@@ -57,7 +59,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let measured = room.load_response(0)?;
     let config = RenderConfig { sample_rate_hz: measured.sample_rate_hz(), ..RenderConfig::default() };
     let materials: Vec<Material> = model.scene().materials().iter().map(|m| m.material.clone()).collect();
-    let stated = PressureRenderer::new(config)?.render_under(&paths, &extended.conditions(&materials, 0))?;
+    let stated = PressureRenderer::new(config)?.render(&paths, &extended.conditions(&materials, 0, 0))?;
     let mended = extended.finish(&source.id, &receiver.id, stated.clone(), 1)?;
     println!("direct sound, in milliseconds after the start of the file:");
     for (what, response) in [("measured", &measured), ("model", &stated), ("extended model", &mended)] {
@@ -68,11 +70,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// The same room, its recordings late by a latency of which its file knows nothing.
-fn late(
-    room: &MeasuredRoom,
-    latency_s: f64,
-    folder: &Path,
-) -> Result<MeasuredRoom, sabine::acoustics::Error> {
+fn late(room: &MeasuredRoom, latency_s: f64, folder: &Path) -> Result<MeasuredRoom, sabine::scene::Error> {
     let responses = room.responses().iter().enumerate().map(|(i, entry)| {
         let response = room.load_response(i)?;
         let rate_hz = response.sample_rate_hz();
@@ -91,7 +89,7 @@ fn late(
         measurement: room.measurement(),
         sources: room.sources().to_vec(),
         receivers: room.receivers().to_vec(),
-        responses: responses.collect::<Result<_, sabine::acoustics::Error>>()?,
+        responses: responses.collect::<Result<_, sabine::scene::Error>>()?,
     };
     late.write(folder.join("room"))
 }

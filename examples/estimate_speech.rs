@@ -1,7 +1,7 @@
 //! What speech tells about the room that it was spoken in, and why an error is large: a long recording against its first second.
 //!
 //! ```text
-//! cargo run --release --example estimate_speech [-- RECORDING.wav]
+//! cargo run --example estimate_speech [-- RECORDING.wav]
 //! ```
 //!
 //! It prints

@@ -1,7 +1,7 @@
 //! Seven reverberation times and a model: which absorption makes the model ring as long, and which of it is known at all?
 //!
 //! ```text
-//! cargo run --release --example fit_materials
+//! cargo run --example fit_materials
 //! ```
 //!
 //! It prints
@@ -22,11 +22,11 @@
 //!
 //! In full: `sabine fit --room DIR --t60 0.8,0.86,0.82,0.76,0.7,0.63,0.49 --out DIR`. What is minimised: `docs/explanation/objective.md`.
 
-use sabine::acoustics::{
-    Bands, Conditions, Estimate, Material, MeasuredRoom, PathParameters, PerBand, Propagator, Reading,
-};
-use sabine::optimize::{AbsorptionPrior, FitConfig, MaterialFitter};
+use sabine::acoustics::{Bands, Estimate, Material, PerBand, Reading};
+use sabine::optimize::{AbsorptionPrior, FitConfig, FitProblem, MaterialFitter};
+use sabine::paths::{Conditions, PathParameters, Propagator};
 use sabine::propagate::{PathTracer, TracerConfig};
+use sabine::scene::MeasuredRoom;
 use std::error::Error;
 use std::path::Path;
 
@@ -52,9 +52,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let before = PathParameters::read(&paths, &Conditions::new(&tables, &room.air()))?;
     let fit = MaterialFitter::new(FitConfig::default())?.fit_t60(
         &[&paths],
-        &tables,
-        &priors,
-        &room.air(),
+        &FitProblem::new(&tables, &priors, &room.air()),
         &target_s,
         &(),
     )?;

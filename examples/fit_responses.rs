@@ -1,7 +1,7 @@
 //! Measured responses and a model: materials with which the model decays as the room does, held against a response that was not fitted.
 //!
 //! ```text
-//! cargo run --release --example fit_responses
+//! cargo run --example fit_responses
 //! ```
 //!
 //! It prints
@@ -22,11 +22,13 @@
 //! Read what is not determined before you read an absorption. In full: `sabine fit --room DIR --responses --hold-out r3 --out DIR`,
 //! then `sabine validate --room DIR`. Step by step: `docs/how-to/calibrate-a-room.md`.
 
-use sabine::acoustics::{Bands, MeasuredRoom, Propagator};
+use sabine::acoustics::Bands;
 use sabine::optimize::{
-    AbsorptionPrior, DecayMisfit, FitConfig, MaterialFitter, MeasuredDecay, MeasuredPair,
+    AbsorptionPrior, DecayMisfit, FitConfig, FitProblem, MaterialFitter, MeasuredDecay, MeasuredPair,
 };
+use sabine::paths::Propagator;
 use sabine::propagate::{PathTracer, TracerConfig};
+use sabine::scene::MeasuredRoom;
 use std::error::Error;
 use std::path::Path;
 
@@ -54,7 +56,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         decays.iter().zip(&paths).map(|(measured, paths)| MeasuredPair { measured, paths }).collect();
     let (held_out, fitted) = pairs.split_last().ok_or("the room has no responses")?;
     let fitter = MaterialFitter::new(FitConfig::default())?;
-    let fit = fitter.fit_responses(fitted, room.measurement(), &tables, &priors, &room.air(), &())?.fit;
+    let fit = fitter
+        .fit_responses(fitted, room.measurement(), &FitProblem::new(&tables, &priors, &room.air()), &())?
+        .fit;
 
     let misfit =
         |materials| DecayMisfit::new(*held_out, room.measurement().time_zero, materials, &room.air());

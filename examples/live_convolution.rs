@@ -1,7 +1,7 @@
 //! Sound in a room, block by block as a sound card asks for it, with a cross-fade into another room on the way.
 //!
 //! ```text
-//! cargo run --release --example live_convolution
+//! cargo run --example live_convolution
 //! ```
 //!
 //! It writes `out/live_convolution/heard.wav` and prints

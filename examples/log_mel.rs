@@ -1,7 +1,7 @@
 //! The features that the estimator hears, as they come in: log-mel levels of a stream in blocks of 20 ms, drawn as text.
 //!
 //! ```text
-//! cargo run --release --example log_mel [-- RECORDING.wav]
+//! cargo run --example log_mel [-- RECORDING.wav]
 //! ```
 //!
 //! One line for each half second, low frequencies on the left, 5 dB for each step of grey. It prints
@@ -17,7 +17,8 @@
 //!
 //! What is made of them: `sabine estimate RECORDING.wav`. The definition and how exact it is: the front page of `sabine::features`.
 
-use sabine::acoustics::{Channel, FeatureExtractor, read_audio, resample};
+use sabine::acoustics::{Channel, read_audio, resample};
+use sabine::features::FeatureExtractor;
 use sabine::features::{LogMel, LogMelConfig};
 use std::error::Error;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! Below 120 Hz a small room is a wave field: standing waves where theory puts them, joined to rays above.
 //!
 //! ```text
-//! cargo run --release --example low_frequencies
+//! cargo run --example low_frequencies
 //! ```
 //!
 //! Loudspeaker and microphone stand in corners, where waves add up in phase and rays only their energies. It writes
@@ -21,11 +21,11 @@
 //!
 //! For a room of your own: `sabine trace --room DIR --wave-below 120 --out DIR`. How it is done: `docs/explanation/wave.md`.
 
-use sabine::acoustics::{
-    Air, Bands, ImpulseResponse, Material, Propagator, Receiver, SampleFormat, Scene, Source, write_wav,
-};
+use sabine::acoustics::{Air, Bands, ImpulseResponse, Material, SampleFormat, write_wav};
+use sabine::paths::{Conditions, Propagator};
 use sabine::propagate::wave::{Crossover, WaveConfig, WaveSolver};
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
+use sabine::scene::{Receiver, Scene, Source};
 use std::error::Error;
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
@@ -62,7 +62,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let config = TracerConfig { rays: 10_000, duration_s: DURATION_S, ..TracerConfig::default() };
     let paths = PathTracer::new(config)?.trace(&scene, &source, &receiver, &air, &())?;
-    let rays = PressureRenderer::new(RenderConfig::default())?.render(&paths, &walls, &air)?;
+    let rays =
+        PressureRenderer::new(RenderConfig::default())?.render(&paths, &Conditions::new(&walls, &air))?;
     let joined = crossover.join(&waves, &rays)?;
     println!("about 120 Hz the waves are {:.1} dB above the rays", joined.level_difference_db);
 

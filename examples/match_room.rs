@@ -1,7 +1,7 @@
 //! The main job in one call: speech recorded in a room and a rough model of the room in; sound that belongs there out.
 //!
 //! ```text
-//! cargo run --release --example match_room [-- OUT_FOLDER]
+//! cargo run --example match_room [-- OUT_FOLDER]
 //! ```
 //!
 //! It writes `matched.wav`, `report.html` and what led to them into the folder (`out/match_room`), and prints
@@ -18,8 +18,9 @@
 //! On your own recording and room: `sabine match --speech F.wav --room DIR --dry F.wav --out DIR`. Step by step: the guide of the crate
 //! `sabine`; how close it comes: `docs/validation/match_room.md`.
 
-use sabine::acoustics::{Channel, MeasuredRoom, SampleFormat, Signal, encode_wav, read_audio};
+use sabine::acoustics::{Channel, SampleFormat, Signal, encode_wav, read_audio};
 use sabine::propagate::TracerConfig;
+use sabine::scene::MeasuredRoom;
 use sabine::{MatchConfig, MatchInput, MatchSummary, Recording, match_room, materials_toml};
 use sabine_cli::bar::Bar;
 use sabine_cli::output::OutputFolder;

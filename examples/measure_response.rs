@@ -1,7 +1,7 @@
 //! What an impulse response says about its room, octave by octave: each number with its standard error, or the reason why there is none.
 //!
 //! ```text
-//! cargo run --release --example measure_response [-- RESPONSE.wav]
+//! cargo run --example measure_response [-- RESPONSE.wav]
 //! ```
 //!
 //! It prints

@@ -1,7 +1,7 @@
 //! A recording that never was: a dry voice in a measured room, with pink noise so many decibels below it.
 //!
 //! ```text
-//! cargo run --release --example mix_recording [-- SNR_DB]
+//! cargo run --example mix_recording [-- SNR_DB]
 //! ```
 //!
 //! It writes `out/mix_recording/mixed.wav` and prints

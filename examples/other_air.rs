@@ -1,7 +1,7 @@
 //! Traced once, heard under other conditions: drier air, an open curtain, a talker who looks away. Nothing is traced again.
 //!
 //! ```text
-//! cargo run --release --example other_air
+//! cargo run --example other_air
 //! ```
 //!
 //! It prints
@@ -16,11 +16,10 @@
 //! A change of materials in full: `sabine replace --room DIR --material curtain --with rendered_brick`. Why this is possible:
 //! `docs/explanation/tracing.md`.
 
-use sabine::acoustics::{
-    Air, Bands, Conditions, Directivity, Material, MeasuredRoom, Orientation, PathParameters, Propagator,
-    Reading, library_material,
-};
+use sabine::acoustics::{Air, Bands, Directivity, Material, Orientation, Reading, library_material};
+use sabine::paths::{Conditions, PathParameters, Propagator};
 use sabine::propagate::{PathTracer, TracerConfig};
+use sabine::scene::MeasuredRoom;
 use std::error::Error;
 use std::path::Path;
 use std::time::Instant;

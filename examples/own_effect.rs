@@ -1,7 +1,7 @@
 //! An effect of one's own in the catalogue: a recorder whose automatic gain rises and falls while it records.
 //!
 //! ```text
-//! cargo run --release --example own_effect [-- ROOM_FOLDER]
+//! cargo run --example own_effect [-- ROOM_FOLDER]
 //! ```
 //!
 //! The laboratory of the tests hides it in a small room; the catalogue explains the responses without it, then with it. It prints
@@ -13,11 +13,11 @@
 //! ```
 //! What must hold for an effect, line by line: `docs/how-to/own-effect.md`. With the effects of the project: `sabine diagnose`.
 
-use sabine::acoustics::MeasuredRoom;
 use sabine::diagnose::{
-    BandView, Case, DiagnoseConfig, Diagnoser, Effect, EffectInfo, FittedCase, GainOverTime, ModelChange,
-    Parameter, Stage, Survey, catalogue,
+    BandView, Case, DecayTerm, DiagnoseConfig, Diagnoser, Effect, EffectInfo, FittedCase, GainOverTime,
+    ModelChange, Parameter, Stage, Survey, catalogue,
 };
+use sabine::scene::MeasuredRoom;
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
 use std::f64::consts::{LN_10, TAU};
 
@@ -33,46 +33,37 @@ impl Effect for GainDrift {
         EffectInfo::new("gain_drift", "Recorder gain drifts", text)
     }
 
-    fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
-        vec![Box::new(*self)]
-    }
-}
-
-impl Case for GainDrift {
-    fn stage(&self) -> Stage {
-        Stage::Recorder
-    }
-
-    fn parameters(&self, _: &Survey) -> Vec<Parameter> {
-        vec![
+    fn cases(&self, _: &Survey) -> Vec<Case> {
+        let parameters = vec![
             Parameter::new("sine", "dB", 0.0, 3.0, (-20.0, 20.0)).typically(3.0),
             Parameter::new("cosine", "dB", 0.0, 3.0, (-20.0, 20.0)),
             Parameter::new("period", "s", 0.3, 0.3, (0.05, 2.0)),
-        ]
+        ];
+        // Sine and cosine are found from anywhere; the period only from near by.
+        let starts = [0.1, 0.15, 0.2, 0.3, 0.45, 0.7].map(|period_s| vec![0.5, 0.5, period_s]).to_vec();
+        let case = Case::decay(parameters, *self).at(Stage::Recorder).starting(starts);
+        vec![case.changing(changes)]
     }
+}
 
-    /// Sine and cosine are found from anywhere; the period only from near by.
-    fn starts(&self, _: &Survey) -> Vec<Vec<f64>> {
-        [0.1, 0.15, 0.2, 0.3, 0.45, 0.7].map(|period_s| vec![0.5, 0.5, period_s]).to_vec()
-    }
-
-    fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+impl DecayTerm for GainDrift {
+    fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
         for (bin, ln) in ln_energy.iter_mut().enumerate() {
             let (sin, cos) = (TAU * view.file_time_s(bin) / values[2]).sin_cos();
             *ln += LN_10 / 10.0 * (values[0] * sin + values[1] * cos);
         }
     }
+}
 
-    /// What renders: the same gain, in steps of a 32nd of a period, until the longest file ends.
-    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
-        let values = fitted.values();
-        let end_s = fitted.survey().responses().iter().map(|r| r.duration_s).fold(0.0, f64::max);
-        let steps = (32.0 * end_s / values[2]).ceil() as usize;
-        let time_s: Vec<f64> = (0..=steps).map(|k| values[2] * k as f64 / 32.0).collect();
-        let db = |t: &f64| values[0] * (TAU * t / values[2]).sin() + values[1] * (TAU * t / values[2]).cos();
-        let gain_db = time_s.iter().map(db).collect();
-        vec![ModelChange::GainOverTime(GainOverTime::new(time_s, gain_db))]
-    }
+/// What renders: the same gain, in steps of a 32nd of a period, until the longest file ends.
+fn changes(fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+    let values = fitted.values();
+    let end_s = fitted.survey().responses().iter().map(|r| r.duration_s).fold(0.0, f64::max);
+    let steps = (32.0 * end_s / values[2]).ceil() as usize;
+    let time_s: Vec<f64> = (0..=steps).map(|k| values[2] * k as f64 / 32.0).collect();
+    let db = |t: &f64| values[0] * (TAU * t / values[2]).sin() + values[1] * (TAU * t / values[2]).cos();
+    let gain_db = time_s.iter().map(db).collect();
+    vec![ModelChange::GainOverTime(GainOverTime::new(time_s, gain_db))]
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

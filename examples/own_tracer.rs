@@ -1,7 +1,7 @@
 //! A tracer of one's own in the place of the project's: a perfectly diffuse field, and materials fitted on its paths.
 //!
 //! ```text
-//! cargo run --release --example own_tracer
+//! cargo run --example own_tracer
 //! ```
 //!
 //! It prints
@@ -13,11 +13,10 @@
 //!
 //! What must hold for a tracer, line by line: `docs/how-to/own-tracer.md`. The same fit on traced paths: `fit_materials`, `sabine fit`.
 
-use sabine::acoustics::{
-    Air, Bands, Contribution, DiffuseRoom, Estimate, Material, Observer, PathSet, PerBand, Propagator,
-    Receiver, Reflection, Scene, Source, report,
-};
-use sabine::optimize::{AbsorptionPrior, FitConfig, MaterialFitter};
+use sabine::acoustics::{Air, Bands, Estimate, Material, Observer, PerBand, report};
+use sabine::optimize::{AbsorptionPrior, FitConfig, FitProblem, MaterialFitter};
+use sabine::paths::{Contribution, PathSet, Propagator, Reflection};
+use sabine::scene::{DiffuseRoom, Receiver, Scene, Source};
 
 /// Sound that has forgotten where it came from: only volume and areas count.
 struct Diffuse {
@@ -86,7 +85,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let target_s = PerBand::new(bands, vec![Estimate::exact(0.9), Estimate::exact(0.6)])?;
     let priors = vec![AbsorptionPrior::uniform(bands, 0.1, 0.1); 6];
     let fitter = MaterialFitter::new(FitConfig::default())?;
-    let fit = fitter.fit_t60(&[&paths], &vec![wall; 6], &priors, &air, &target_s, &())?;
+    let fit = fitter.fit_t60(&[&paths], &FitProblem::new(&vec![wall; 6], &priors, &air), &target_s, &())?;
     let theory = DiffuseRoom::of_scene(&room.with_materials(fit.materials.clone())?, &air, bands)?;
     println!("octave (Hz)   T60 wanted (s)   absorption fitted   T60 by Eyring (s)");
     for ((hz, wanted), diffuse) in target_s.iter().zip(theory.values()) {

@@ -1,7 +1,7 @@
 //! What would acoustic plaster on the ceiling do? Reverberation and clarity before and after, and a voice in both rooms.
 //!
 //! ```text
-//! cargo run --release --example replace_material
+//! cargo run --example replace_material
 //! ```
 //!
 //! Both are read from the same paths: chance moves them together, and the difference has an error of its own. It writes
@@ -20,12 +20,13 @@
 //! In full: `sabine replace --room DIR --material ceiling --with acoustic_plaster --out DIR`; all surfaces: `sabine materials`.
 
 use sabine::acoustics::{
-    Bands, Channel, Material, MeasuredRoom, PerBand, Propagator, Reading, SampleFormat, library_material,
-    read_audio, write_wav,
+    Bands, Channel, Material, PerBand, Reading, SampleFormat, library_material, read_audio, write_wav,
 };
 use sabine::eqfilter::convolve;
 use sabine::optimize::PredictedChange;
+use sabine::paths::{Conditions, Propagator};
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
+use sabine::scene::MeasuredRoom;
 use std::error::Error;
 use std::path::Path;
 
@@ -65,7 +66,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let config = RenderConfig { sample_rate_hz: rate_hz, ..RenderConfig::default() };
     let renderer = PressureRenderer::new(config)?;
     let heard = |materials: &[Material]| -> Result<Vec<f32>, Box<dyn Error>> {
-        Ok(convolve(voice.samples(), renderer.render(&paths, materials, &room.air())?.samples()))
+        Ok(convolve(
+            voice.samples(),
+            renderer.render(&paths, &Conditions::new(materials, &room.air()))?.samples(),
+        ))
     };
     let voices = [("before.wav", heard(&before)?), ("after.wav", heard(&after)?)];
     let peak = voices.iter().flat_map(|(_, s)| s).fold(f32::MIN_POSITIVE, |peak, s| peak.max(s.abs()));

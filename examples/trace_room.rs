@@ -1,7 +1,7 @@
 //! A room folder in, sound out: the response at a microphone, mono and with directions, and what it measures.
 //!
 //! ```text
-//! cargo run --release --example trace_room [-- ROOM_FOLDER]
+//! cargo run --example trace_room [-- ROOM_FOLDER]
 //! ```
 //!
 //! It takes the first source and the first receiver, writes `out/trace_room/impulse_response.wav` and `ambisonics.wav`, and prints
@@ -19,11 +19,10 @@
 //!
 //! In full: `sabine trace --room DIR --out DIR`. The folder: `docs/measured-room.md`; all options: `docs/how-to/trace-a-room.md`.
 
-use sabine::acoustics::{
-    Conditions, Material, MeasuredRoom, Orientation, PathParameters, Propagator, SampleFormat, Signal,
-    write_wav,
-};
+use sabine::acoustics::{Material, Orientation, SampleFormat, Signal, write_wav};
+use sabine::paths::{Conditions, PathParameters, Propagator};
 use sabine::propagate::{AmbisonicRenderer, PathTracer, PressureRenderer, RenderConfig, TracerConfig};
+use sabine::scene::MeasuredRoom;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
@@ -61,7 +60,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // The listener of the ambisonic response looks along +x; turning the head later needs no new response.
     let config = RenderConfig::default();
-    let mono = PressureRenderer::new(config.clone())?.render_under(&paths, &conditions)?;
+    let mono = PressureRenderer::new(config.clone())?.render(&paths, &conditions)?;
     let directional =
         AmbisonicRenderer::new(1, config)?.render(&paths, &conditions, Orientation::default())?;
 

@@ -1,7 +1,7 @@
 //! From dry speech to a network: a tiny data set of simulated rooms, two epochs of training, and what came of it.
 //!
 //! ```text
-//! cargo run --release --example training_set
+//! cargo run --example training_set
 //! ```
 //!
 //! It works in a temporary folder. It prints

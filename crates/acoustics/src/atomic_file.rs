@@ -1,6 +1,6 @@
 //! Output files are there whole or not at all.
 
-use crate::Error;
+use crate::error::Error;
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -63,7 +63,10 @@ impl Drop for UnfinishedFile {
 }
 
 /// Makes a folder beside `path` that nothing else uses: hidden, so that nobody takes it for what it is to become.
-pub(crate) fn create_folder_beside(path: &Path) -> io::Result<PathBuf> {
+///
+/// # Errors
+/// Where the folder cannot be made.
+pub fn create_folder_beside(path: &Path) -> io::Result<PathBuf> {
     Ok(take_name_beside(path, |name| std::fs::create_dir(name))?.0)
 }
 

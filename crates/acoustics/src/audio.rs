@@ -1,7 +1,7 @@
 //! Reading and writing sound.
 
 mod encode;
-mod kind;
+pub(crate) mod kind;
 mod mix;
 mod reader;
 #[cfg(feature = "symphonia")]
@@ -15,16 +15,9 @@ pub use kind::FileKind;
 pub use reader::{AudioReader, probe_audio};
 pub use writer::WavWriter;
 
-use crate::{Error, Signal};
+use crate::error::Error;
+use crate::signal::Signal;
 use std::path::Path;
-
-/// What is read, for messages.
-#[cfg(feature = "symphonia")]
-pub(crate) const READ_FORMATS: &str =
-    "WAV (RF64 and BW64 too; PCM of up to 32 bits, floats of 32 or 64 bits), FLAC, Ogg Vorbis and AIFF";
-/// What is read, for messages.
-#[cfg(not(feature = "symphonia"))]
-pub(crate) const READ_FORMATS: &str = "WAV (RF64 and BW64 too; PCM of up to 32 bits, floats of 32 or 64 bits), and FLAC, Ogg Vorbis and AIFF with the feature `symphonia`";
 
 /// Which channel of a file to take.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

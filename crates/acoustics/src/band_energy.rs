@@ -1,9 +1,11 @@
 //! The energy of one band of a response over time, and where its decay ends.
 
 use crate::decay_fit::DecayFit;
+use crate::estimate::NoReading;
 use crate::filter_bank::{BandMask, padding_s};
+use crate::onset::Onset;
+use crate::signal::ImpulseResponse;
 use crate::spectrum::Spectrum;
-use crate::{ImpulseResponse, NoReading, Onset};
 
 /// Share of the response, from its end, in which a constant offset is read.
 const OFFSET_SHARE: usize = 5;

@@ -8,7 +8,7 @@
 //! matrix gives the standard errors (Karjalainen et al. 2002 for the model; Balint et al. and the theory of generalised
 //! linear models with Gamma response for the errors).
 
-use crate::{Estimate, NoReading};
+use crate::estimate::{Estimate, NoReading};
 
 /// ln(10^6): the power falls by 60 dB in this many time constants.
 const LN_MILLION: f64 = 13.815_510_557_964_274;

@@ -1,8 +1,10 @@
 //! How a source radiates and how a microphone hears in different directions.
 
+use crate::bands::Bands;
 use crate::directivity_table::{AngleTable, SphereTable, Stencil};
-use crate::error::check_range;
-use crate::{Bands, Error, PerBand};
+use crate::error::Error;
+use crate::out_of_range::OutOfRange;
+use crate::per_band::PerBand;
 
 /// Energy gain over direction and octave, relative to the acoustic axis: the gain on the axis is 1.
 ///
@@ -36,7 +38,7 @@ enum Pattern {
 
 /// Where a direction falls in a directivity, whatever the band.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Place {
+struct Place {
     /// Of the angle to the axis.
     cosine: f64,
     /// Of a pattern that is a table.
@@ -67,7 +69,7 @@ impl Directivity {
     /// # Errors
     /// [`Error::OutOfRange`] for a share outside 0 to 1.
     pub fn first_order(omni_share: f64) -> Result<Self, Error> {
-        check_range("omnidirectional share", omni_share, 0.0, 1.0, "between 0 and 1")?;
+        OutOfRange::check("omnidirectional share", omni_share, 0.0, 1.0, "between 0 and 1")?;
         Ok(Self { bands: None, pattern: Pattern::FirstOrder(vec![omni_share]) })
     }
 
@@ -77,7 +79,7 @@ impl Directivity {
     /// As [`Directivity::first_order`].
     pub fn first_order_per_band(omni_share: &PerBand<f64>) -> Result<Self, Error> {
         for &share in omni_share.values() {
-            check_range("omnidirectional share", share, 0.0, 1.0, "between 0 and 1")?;
+            OutOfRange::check("omnidirectional share", share, 0.0, 1.0, "between 0 and 1")?;
         }
         let pattern = Pattern::FirstOrder(omni_share.values().to_vec());
         Ok(Self { bands: Some(omni_share.bands()), pattern })
@@ -138,6 +140,15 @@ impl Directivity {
         self.gain_at(self.place(direction.map(|c| c / length)), band)
     }
 
+    /// Energy gain in a **unit** direction in every band at once, in the frame of the source or microphone (forward, left, up).
+    ///
+    /// # Panics
+    /// If there are more gains than bands; a pattern that is the same in all bands takes any number.
+    pub fn energy_gains(&self, direction: [f64; 3], gains: &mut [f64]) {
+        let place = self.place(direction);
+        gains.iter_mut().enumerate().for_each(|(band, gain)| *gain = self.gain_at(place, band));
+    }
+
     /// Directivity factor Q: energy on the axis over its mean over all directions, by the midpoint rule on cells of one degree.
     ///
     /// # Panics
@@ -166,7 +177,7 @@ impl Directivity {
     }
 
     /// Where a unit vector falls.
-    pub(crate) fn place(&self, direction: [f64; 3]) -> Place {
+    fn place(&self, direction: [f64; 3]) -> Place {
         let stencil = match &self.pattern {
             Pattern::FirstOrder(_) => Stencil::default(),
             Pattern::Angles(table) => table.stencil(direction),
@@ -176,7 +187,7 @@ impl Directivity {
     }
 
     /// Energy gain at a place of this directivity.
-    pub(crate) fn gain_at(&self, place: Place, band: usize) -> f64 {
+    fn gain_at(&self, place: Place, band: usize) -> f64 {
         let band = if self.bands.is_none() { 0 } else { band };
         let magnitude = match &self.pattern {
             Pattern::FirstOrder(shares) => shares[band] + (1.0 - shares[band]) * place.cosine,
@@ -295,15 +306,15 @@ mod tests {
         for angles in [&[0.0, 90.0][..], &[0.0, 0.0, 180.0], &[10.0, 180.0], &[0.0, f64::NAN, 180.0], &[]] {
             let flat = one_band(vec![0.0; angles.len()]);
             assert!(
-                matches!(Directivity::axisymmetric(angles, &flat), Err(Error::OutOfRange { .. })),
+                matches!(Directivity::axisymmetric(angles, &flat), Err(Error::OutOfRange(_))),
                 "{angles:?}"
             );
         }
         let deaf = Directivity::axisymmetric(&[0.0, 180.0], &one_band(vec![f64::NEG_INFINITY, 0.0]));
-        assert!(matches!(deaf, Err(Error::OutOfRange { .. })));
+        assert!(matches!(deaf, Err(Error::OutOfRange(_))));
         let wild = Directivity::axisymmetric(&[0.0, 180.0], &one_band(vec![0.0, f64::INFINITY]));
-        assert!(matches!(wild, Err(Error::OutOfRange { .. })));
-        assert!(matches!(Directivity::table(2, 3, &one_band(vec![0.0; 6])), Err(Error::OutOfRange { .. })));
+        assert!(matches!(wild, Err(Error::OutOfRange(_))));
+        assert!(matches!(Directivity::table(2, 3, &one_band(vec![0.0; 6])), Err(Error::OutOfRange(_))));
         assert!(matches!(Directivity::table(4, 3, &one_band(vec![0.0; 6])), Err(Error::Length { .. })));
         assert!(Directivity::first_order(1.1).is_err());
     }

@@ -1,7 +1,7 @@
 //! Directivities given by numbers: magnitudes of pressure at nodes, linear in between.
 
-use crate::Error;
-use crate::error::check_range;
+use crate::error::Error;
+use crate::out_of_range::OutOfRange;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Up to four nodes and their weights.
@@ -25,7 +25,7 @@ fn magnitudes(levels_db: &[f64], expected: usize) -> Result<Vec<f64>, Error> {
     levels_db
         .iter()
         .map(|&level| {
-            check_range("level (dB)", level, f64::NEG_INFINITY, 300.0, "minus infinity to 300 dB")?;
+            OutOfRange::check("level (dB)", level, f64::NEG_INFINITY, 300.0, "minus infinity to 300 dB")?;
             Ok(10f64.powf(0.05 * level))
         })
         .collect()
@@ -34,7 +34,7 @@ fn magnitudes(levels_db: &[f64], expected: usize) -> Result<Vec<f64>, Error> {
 /// Divides by the magnitude on the axis.
 fn normalised(mut magnitudes: Vec<f64>, on_axis: &Stencil) -> Result<Vec<f64>, Error> {
     let reference = on_axis.sum(&magnitudes);
-    check_range("pressure on the axis", reference, 1e-15, 1e15, "not silent")?;
+    OutOfRange::check("pressure on the axis", reference, 1e-15, 1e15, "not silent")?;
     magnitudes.iter_mut().for_each(|m| *m /= reference);
     Ok(magnitudes)
 }
@@ -49,10 +49,10 @@ pub(crate) struct AngleTable {
 impl AngleTable {
     pub(crate) fn new(angles_deg: &[f64], levels_db: &[Vec<f64>]) -> Result<Self, Error> {
         let (first, last) = (angles_deg.first().copied(), angles_deg.last().copied());
-        check_range("first angle (degrees)", first.unwrap_or(f64::NAN), 0.0, 0.0, "0")?;
-        check_range("last angle (degrees)", last.unwrap_or(f64::NAN), 180.0, 180.0, "180")?;
+        OutOfRange::check("first angle (degrees)", first.unwrap_or(f64::NAN), 0.0, 0.0, "0")?;
+        OutOfRange::check("last angle (degrees)", last.unwrap_or(f64::NAN), 180.0, 180.0, "180")?;
         for pair in angles_deg.windows(2) {
-            check_range("step between angles (degrees)", pair[1] - pair[0], 1e-6, 180.0, "positive")?;
+            OutOfRange::check("step between angles (degrees)", pair[1] - pair[0], 1e-6, 180.0, "positive")?;
         }
         let table = Self { angles: angles_deg.iter().map(|a| a.to_radians()).collect(), bands: Vec::new() };
         let on_axis = table.stencil([1.0, 0.0, 0.0]);
@@ -87,8 +87,8 @@ pub(crate) struct SphereTable {
 
 impl SphereTable {
     pub(crate) fn new(azimuths: usize, elevations: usize, levels_db: &[Vec<f64>]) -> Result<Self, Error> {
-        check_range("number of azimuths", azimuths as f64, 3.0, 3600.0, "between 3 and 3600")?;
-        check_range("number of elevations", elevations as f64, 3.0, 1801.0, "between 3 and 1801")?;
+        OutOfRange::check("number of azimuths", azimuths as f64, 3.0, 3600.0, "between 3 and 3600")?;
+        OutOfRange::check("number of elevations", elevations as f64, 3.0, 1801.0, "between 3 and 1801")?;
         let table = Self { azimuths, elevations, bands: Vec::new() };
         let on_axis = table.stencil([1.0, 0.0, 0.0]);
         let band = |levels: &Vec<f64>| {

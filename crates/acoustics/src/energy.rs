@@ -1,11 +1,13 @@
 //! Energy over time: what a geometric simulation gives before it becomes pressure.
 
-use crate::{Bands, Error, NoReading};
+use crate::bands::Bands;
+use crate::error::Error;
+use crate::estimate::NoReading;
 
 /// Energy per time bin and band. **Not** a pressure response: it must not be convolved with sound.
 ///
 /// Scaled so that the direct sound of an omnidirectional source at 1 m carries energy 1 in every band.
-/// [`PathSet::energy_response`](crate::PathSet::energy_response) makes one; [`EnergyResponse::decay_curve`] reads it.
+/// `sabine_paths::PathSet::energy_response` makes one; [`EnergyResponse::decay_curve`] reads it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EnergyResponse {
     bands: Bands,
@@ -22,7 +24,7 @@ impl EnergyResponse {
     /// [`Error::BandCount`] if a length is not a multiple of the number of bands or the two differ,
     /// [`Error::OutOfRange`] for a bin width that is not positive.
     pub fn new(bands: Bands, bin_s: f64, energy: Vec<f64>, standard_error: Vec<f64>) -> Result<Self, Error> {
-        crate::error::check_range("bin width (s)", bin_s, 1e-6, 10.0, "between 1 us and 10 s")?;
+        crate::out_of_range::OutOfRange::check("bin width (s)", bin_s, 1e-6, 10.0, "between 1 us and 10 s")?;
         let bins = energy.len() / bands.len();
         if bins * bands.len() != energy.len() {
             return Err(Error::BandCount { expected: bins * bands.len(), found: energy.len() });

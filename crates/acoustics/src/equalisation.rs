@@ -1,7 +1,11 @@
 //! How loud a response is in each octave.
 
 use crate::band_energy::{BandEnergy, Prepared};
-use crate::{Bands, Error, Estimate, ImpulseResponse, NoReading, PerBand, Reading};
+use crate::bands::Bands;
+use crate::error::Error;
+use crate::estimate::{Estimate, NoReading, Reading};
+use crate::per_band::PerBand;
+use crate::signal::ImpulseResponse;
 
 /// The octave that all levels refer to.
 const REFERENCE_HZ: f64 = 1000.0;

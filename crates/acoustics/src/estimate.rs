@@ -1,5 +1,7 @@
 //! A number with its uncertainty, or the reason why there is none.
 
+use std::fmt;
+
 /// A value and its standard error, in the same unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
@@ -35,11 +37,10 @@ fn floor_to_tenth(value: f64) -> f64 {
 pub type Reading = Result<Estimate, NoReading>;
 
 /// Why a quantity cannot be read from a response.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum NoReading {
     /// The noise floor, or the end of the response, comes before the decay has fallen far enough (ISO 3382-2, 5.3).
-    #[error("needs {needed_db:.1} dB of decay range; {:.1} dB are available", floor_to_tenth(*available_db))]
     DynamicRange {
         /// Decay range that the quantity needs, in dB.
         needed_db: f64,
@@ -47,16 +48,13 @@ pub enum NoReading {
         available_db: f64,
     },
     /// No sample stands out of the noise.
-    #[error("there is no onset: the response is silent or all noise")]
     NoOnset,
     /// The band reaches beyond half the sample rate.
-    #[error("the band reaches beyond half the sample rate of {sample_rate_hz} Hz")]
     AboveNyquist {
         /// The sample rate, in Hz.
         sample_rate_hz: u32,
     },
     /// The response ends before the quantity is defined.
-    #[error("needs {needed_s:.3} s after the onset; there are {available_s:.3} s")]
     TooShort {
         /// Length needed, in seconds.
         needed_s: f64,
@@ -64,9 +62,6 @@ pub enum NoReading {
         available_s: f64,
     },
     /// The decay is as fast as the filter's own ringing (ISO 3382-2, 7.3: B T > 8).
-    #[error(
-        "bandwidth times decay time is {bandwidth_time:.1}, below {needed:.0}: the filter's own ringing would be read"
-    )]
     FilterRinging {
         /// Bandwidth times decay time found.
         bandwidth_time: f64,
@@ -74,7 +69,6 @@ pub enum NoReading {
         needed: f64,
     },
     /// The response leaves the quantity too uncertain to be of use.
-    #[error("the standard error is {relative_error:.2} of the value; more than {largest:.2} is no answer")]
     Uncertain {
         /// Standard error divided by the value.
         relative_error: f64,
@@ -82,12 +76,41 @@ pub enum NoReading {
         largest: f64,
     },
     /// The level does not fall.
-    #[error("the level does not decay")]
     NoDecay,
     /// The fit of the decay has not converged.
-    #[error("the fit of the decay has not converged")]
     NotConverged,
 }
+
+impl fmt::Display for NoReading {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::DynamicRange { needed_db, available_db } => write!(
+                f,
+                "needs {needed_db:.1} dB of decay range; {:.1} dB are available",
+                floor_to_tenth(*available_db)
+            ),
+            Self::NoOnset => f.write_str("there is no onset: the response is silent or all noise"),
+            Self::AboveNyquist { sample_rate_hz } => {
+                write!(f, "the band reaches beyond half the sample rate of {sample_rate_hz} Hz")
+            }
+            Self::TooShort { needed_s, available_s } => {
+                write!(f, "needs {needed_s:.3} s after the onset; there are {available_s:.3} s")
+            }
+            Self::FilterRinging { bandwidth_time, needed } => write!(
+                f,
+                "bandwidth times decay time is {bandwidth_time:.1}, below {needed:.0}: the filter's own ringing would be read"
+            ),
+            Self::Uncertain { relative_error, largest } => write!(
+                f,
+                "the standard error is {relative_error:.2} of the value; more than {largest:.2} is no answer"
+            ),
+            Self::NoDecay => f.write_str("the level does not decay"),
+            Self::NotConverged => f.write_str("the fit of the decay has not converged"),
+        }
+    }
+}
+
+impl std::error::Error for NoReading {}
 
 #[cfg(test)]
 mod tests {

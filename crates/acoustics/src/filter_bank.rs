@@ -1,8 +1,10 @@
 //! Splitting sound into octave or third-octave bands without shifting it in time.
 
-use crate::error::check_range;
+use crate::bands::Bands;
+use crate::error::Error;
+use crate::out_of_range::OutOfRange;
+use crate::per_band::PerBand;
 use crate::spectrum::Spectrum;
-use crate::{Bands, Error, PerBand};
 
 /// Ring-down that the padding leaves room for, in units of one over the bandwidth of the narrowest band.
 const PADDING_BANDWIDTH_TIMES: f64 = 16.0;
@@ -175,7 +177,13 @@ pub(crate) fn padding_s(narrowest_edges_hz: (f64, f64)) -> f64 {
 }
 
 fn check_sample_rate(sample_rate_hz: u32) -> Result<(), Error> {
-    check_range("sample rate (Hz)", f64::from(sample_rate_hz), 1e3, 768e3, "between 1 kHz and 768 kHz")
+    Ok(OutOfRange::check(
+        "sample rate (Hz)",
+        f64::from(sample_rate_hz),
+        1e3,
+        768e3,
+        "between 1 kHz and 768 kHz",
+    )?)
 }
 
 #[cfg(test)]

@@ -8,7 +8,6 @@
 //!                                    ├─► RoomParameters (EDT, T20, T30, T60, C50, C80, D50, centre time, DRR per octave)
 //!                                    │        └─► DecayFit: one to three slopes and the noise, with their uncertainty
 //!                                    └─► equalisation: level of each octave relative to 1 kHz
-//!  room folder ─► MeasuredRoom ─► Scene, Material, Air, Source, Receiver ─► (a tracer) ─► PathSet ─► EnergyResponse
 //! ```
 //!
 //! # Example
@@ -43,17 +42,13 @@
 //! - Measures: [`RoomParameters`], [`BandParameters`] (full band and third octaves), [`DecayFit`], [`EnergyDecayCurve`],
 //!   [`equalisation()`], [`Onset`], [`FilterBank`]. A number comes as a [`Reading`]: an [`Estimate`] with its standard error, or
 //!   the reason ([`NoReading`]) why there is none.
-//! - Theory, kept apart from measurement: [`DiffuseRoom`] (Sabine, Eyring, Millington, Fitzroy, Arau-Puchades, critical
-//!   distance, mean free path), [`schroeder_frequency_hz`], [`Air`] (ISO 9613-1).
-//! - Between tracing and everything after it: [`PathSet`], [`Conditions`] (what may change without tracing again: materials,
-//!   air, [`Directivity`] and [`Orientation`] of source and receiver), [`EnergyResponse`] (energy, **not** to be convolved),
-//!   [`PathParameters`] with the standard errors that the rays and the materials' tables leave; [`EdgeDiffraction`].
-//! - Rooms: [`Scene`], [`Mesh`] (OBJ, glTF), [`Material`], [`material_library`], [`MeasuredRoom`], [`Materials`] (their tables, from
-//!   file to file), [`DrawnRoom`] (from a [`FloorPlan`]), [`Source`], [`Receiver`].
-//! - Seams: [`FeatureExtractor`], [`RoomEstimator`], [`Augment`], [`RayScene`], [`Propagator`], [`Objective`].
+//! - What rooms are made of: [`Material`], [`material_library`], [`Air`] (ISO 9613-1), [`Directivity`] and [`Orientation`] of a
+//!   source or receiver.
+//! - [`EnergyResponse`] (energy, **not** to be convolved) and [`RoomTargets`]: what a simulation gives and what a fit wants.
+//! - The trait [`RoomEstimator`]: speech in, [`RoomTargets`] out. [`Observer`]: progress of long work, and a way to stop it.
 //!
 //! # Does not
-//! - trace, simulate or estimate anything: these are the other crates' traits to implement.
+//! - know rooms or paths: meshes, sources and measured rooms are in `sabine-scene`, traced paths in `sabine-paths`.
 //! - deconvolve sweeps: it starts from impulse responses.
 //! - fall back: where T30 cannot be had it does not give T20 in its place.
 //! - measure lateral energy, interaural correlation, speech transmission or sound strength.
@@ -66,22 +61,20 @@
 //! | what | how good | shown by |
 //! |---|---|---|
 //! | bands add up to the input | within -100 dB; each within class 1 of IEC 61260-1 | unit tests of the filter bank |
-//! | full-band T60, SNR 60 / 45 / 30 dB | mean error 0.2 / 0.3 / 0.6 % at 48 kHz | `tests/decay_accuracy.rs` |
-//! | 95 % intervals of T60 | cover 95 to 96 % | `tests/decay_accuracy.rs` |
-//! | two slopes | second slope within 0.2 / 0.3 / 0.5 % at -10 / -20 / -30 dB, full band | `tests/decay_accuracy.rs` |
-//! | one slope taken for two | 0 of 500 | `tests/decay_accuracy.rs` |
-//! | air absorption | three digits of ISO 9613-1 | `tests/air_reference.rs` |
+//! | full-band T60, SNR 60 / 45 / 30 dB | mean error 0.2 / 0.3 / 0.6 % at 48 kHz | `tests/it/decay_accuracy.rs` |
+//! | 95 % intervals of T60 | cover 95 to 96 % | `tests/it/decay_accuracy.rs` |
+//! | two slopes | second slope within 0.2 / 0.3 / 0.5 % at -10 / -20 / -30 dB, full band | `tests/it/decay_accuracy.rs` |
+//! | one slope taken for two | 0 of 500 | `tests/it/decay_accuracy.rs` |
+//! | air absorption | three digits of ISO 9613-1 | `tests/it/air_reference.rs` |
 //! | directivity index of the cardioid family | 0.001 dB | unit tests of the directivity |
-//! | standard errors of the parameters of paths | within 20 % of the spread over seeds (found: 7 %) | `tests/path_parameters.rs` |
-//! | errors that uncertain absorption leaves in T30 | within 10 % of the spread over draws, 25 % for unknown materials (found: 4 and 6 %) | `tests/material_errors.rs` |
-//! | real rooms | BRAS CR2: from 500 Hz on T60 within 5 % of the room means in 14 of 14 third octaves, T20 in 12 | `tests/real_responses.rs` |
+//! | real rooms | BRAS CR2: from 500 Hz on T60 within 5 % of the room means in 14 of 14 third octaves, T20 in 12 | `tests/it/real_responses.rs` |
 //!
 //! A decay shorter than eight over the bandwidth is not read in that band (0.09 s at 125 Hz): the filter would ring as long.
 //! `docs/validation/measures.md` has the tables and how to repeat them.
 //!
 //! # Features
+//! - `audio` (default): sound files and resampling. Without it (`default-features = false`) the crate compiles in seconds.
 //! - `symphonia`: [`read_audio`] reads FLAC, Ogg Vorbis and AIFF besides WAV.
-//! - `gltf`: [`Mesh::read`] reads glTF and GLB besides OBJ.
 //!
 //! # References
 //! - ISO 3382-1:2009 and 3382-2:2008 (parameters), IEC 61260-1:2014 (bands), ISO 9613-1:1993 (air).
@@ -93,84 +86,66 @@
 
 mod air;
 mod atomic_file;
+#[cfg(feature = "audio")]
 mod audio;
 mod band_energy;
 mod bands;
-mod conditions;
 mod decay_fit;
 mod directivity;
 mod directivity_table;
-mod edge_diffraction;
 mod energy;
 mod engineering;
 mod equalisation;
 mod error;
 mod estimate;
 mod filter_bank;
-mod floor_plan;
-mod inside_folder;
 mod material;
 mod material_library;
-mod measured_room;
-mod mesh_file;
 mod onset;
 mod orientation;
-mod packed_direction;
+mod out_of_range;
 mod parameters;
-mod path_parameters;
-mod paths;
+mod per_band;
 mod progress;
 mod regular_file;
+#[cfg(feature = "audio")]
 mod resample;
+#[cfg(feature = "audio")]
 mod response_file;
-mod reweighting;
-mod scene;
+mod room_estimator;
 mod signal;
 mod spectrum;
 mod targets;
-mod theory;
-mod toml_field;
-mod traits;
-mod weld;
 
 pub use air::Air;
-pub use atomic_file::write_atomically;
+pub use atomic_file::{create_folder_beside, write_atomically};
+#[cfg(feature = "audio")]
 pub use audio::{
     AudioInfo, AudioReader, Channel, FileKind, SampleFormat, WavWriter, encode_wav, encode_wav_channels,
     probe_audio, read_audio, write_wav, write_wav_channels,
 };
-pub use bands::{Bands, PerBand};
-pub use conditions::Conditions;
+pub use bands::Bands;
 pub use decay_fit::{DecayFit, Slope};
 pub use directivity::Directivity;
-pub use edge_diffraction::{EdgeDiffraction, EdgePoint};
 pub use energy::{EnergyDecayCurve, EnergyResponse};
 pub use engineering::Engineering;
 pub use equalisation::equalisation;
 pub use error::Error;
 pub use estimate::{Estimate, NoReading, Reading};
 pub use filter_bank::FilterBank;
-pub use floor_plan::FloorPlan;
 pub use material::Material;
 pub use material_library::{LibraryMaterial, library_material, material_library};
-pub use measured_room::materials::{MaterialTable, Materials};
-pub use measured_room::{
-    DrawnRoom, Levels, MaterialPrior, MeasuredRoom, Measurement, NewResponse, NewRoom, ReadOptions,
-    ResponseEntry, RoomNote, TimeZero,
-};
-pub use mesh_file::{LengthUnit, Mesh, MeshOptions, UpAxis};
 pub use onset::Onset;
 pub use orientation::Orientation;
+pub use out_of_range::OutOfRange;
 pub use parameters::{BandParameters, RoomParameters};
-pub use path_parameters::PathParameters;
-pub use paths::{Contribution, Incidence, PathSet, Reflection};
+pub use per_band::PerBand;
 pub use progress::{Observer, report};
-pub use regular_file::open_file;
+pub use regular_file::{open_file, read_at_most, read_text};
+#[cfg(feature = "audio")]
 pub use resample::{BlockResampler, resample, resample_response};
-pub use response_file::{LocatedResponse, read_response};
-pub use scene::{NamedMaterial, Receiver, Scene, Source, Triangle};
+#[cfg(feature = "audio")]
+pub use response_file::{LocatedResponse, check_one_onset, read_response};
+pub use room_estimator::RoomEstimator;
 pub use signal::{ImpulseResponse, Signal};
 pub use targets::RoomTargets;
-pub use theory::{DiffuseRoom, schroeder_frequency_hz};
-pub use traits::{Augment, FeatureExtractor, Objective, Propagator, RayHit, RayScene, RoomEstimator};
-pub use weld::WeldReport;

@@ -1,7 +1,9 @@
 //! Surfaces.
 
-use crate::error::check_range;
-use crate::{Bands, Error, PerBand};
+use crate::bands::Bands;
+use crate::error::Error;
+use crate::out_of_range::OutOfRange;
+use crate::per_band::PerBand;
 
 /// How a surface treats sound energy, per octave band.
 /// ```
@@ -28,10 +30,10 @@ impl Material {
             return Err(Error::BandMismatch { left: absorption.bands(), right: scattering.bands() });
         }
         for &value in absorption.values() {
-            check_range("absorption", value, 0.0, 1.0, "between 0 and 1")?;
+            OutOfRange::check("absorption", value, 0.0, 1.0, "between 0 and 1")?;
         }
         for &value in scattering.values() {
-            check_range("scattering", value, 0.0, 1.0, "between 0 and 1")?;
+            OutOfRange::check("scattering", value, 0.0, 1.0, "between 0 and 1")?;
         }
         Ok(Self { absorption, scattering })
     }

@@ -1,6 +1,9 @@
 //! Common surfaces, from the literature.
 
-use crate::{Bands, Error, Material, PerBand};
+use crate::bands::Bands;
+use crate::error::Error;
+use crate::material::Material;
+use crate::per_band::PerBand;
 
 /// A surface of the library: absorption from a published table, scattering from the depth of its relief.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -162,7 +165,6 @@ static LIBRARY: [LibraryMaterial; 34] = [
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::MaterialPrior;
 
     #[test]
     fn every_surface_is_a_material_under_a_name_of_its_own() {
@@ -199,16 +201,5 @@ mod tests {
             let found = scattering_of_depth(library_material(name).unwrap().depth_m, 707.0);
             assert!(found >= low && found <= high, "{name}: {found}");
         }
-    }
-
-    /// The prior of an unknown surface is that of a surface drawn from the library.
-    #[test]
-    fn the_prior_of_the_unknown_is_the_library_as_a_whole() {
-        let all: Vec<f64> = LIBRARY.iter().flat_map(|s| s.absorption).collect();
-        let mean = all.iter().sum::<f64>() / all.len() as f64;
-        let variance = all.iter().map(|a| (a - mean).powi(2)).sum::<f64>() / all.len() as f64;
-        println!("mean {mean:.3}, standard deviation {:.3}", variance.sqrt());
-        assert!((mean - MaterialPrior::UNKNOWN_ABSORPTION).abs() < 0.05, "{mean}");
-        assert!((variance.sqrt() - MaterialPrior::UNKNOWN_ABSORPTION_SD).abs() < 0.05, "{}", variance.sqrt());
     }
 }

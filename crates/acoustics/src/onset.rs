@@ -1,6 +1,6 @@
 //! When the direct sound arrives.
 
-use crate::NoReading;
+use crate::estimate::NoReading;
 
 /// Blocks in which the level is judged, in seconds.
 const BLOCK_S: f64 = 0.005;

@@ -1,7 +1,7 @@
 //! Which way a source or a listener faces.
 
-use crate::Error;
-use crate::error::check_range;
+use crate::error::Error;
+use crate::out_of_range::OutOfRange;
 
 /// The frame of a source or a listener in the room: x forward, y to the left, z up, right-handed and orthonormal.
 ///
@@ -36,7 +36,13 @@ impl Orientation {
         let forward = unit("length of the forward vector", forward)?;
         let up = unit("length of the up vector", up)?;
         let left = cross(up, forward);
-        check_range("sine of the angle between forward and up", norm(left), 1e-3, 1.1, "at least 0.001")?;
+        OutOfRange::check(
+            "sine of the angle between forward and up",
+            norm(left),
+            1e-3,
+            1.1,
+            "at least 0.001",
+        )?;
         let left = unit("length of the left vector", left)?;
         Ok(Self { forward, left, up: cross(forward, left) })
     }
@@ -91,7 +97,7 @@ fn norm(a: [f64; 3]) -> f64 {
 
 fn unit(field: &'static str, a: [f64; 3]) -> Result<[f64; 3], Error> {
     let length = norm(a);
-    check_range(field, length, 1e-9, 1e9, "finite and not zero")?;
+    OutOfRange::check(field, length, 1e-9, 1e9, "finite and not zero")?;
     Ok(a.map(|c| c / length))
 }
 
@@ -124,9 +130,9 @@ mod tests {
     #[test]
     fn what_is_no_direction_is_refused() {
         let x = [1.0, 0.0, 0.0];
-        assert!(matches!(Orientation::new([0.0; 3], x), Err(Error::OutOfRange { .. })));
-        assert!(matches!(Orientation::new([f64::NAN, 0.0, 0.0], x), Err(Error::OutOfRange { .. })));
-        assert!(matches!(Orientation::new(x, [-2.0, 0.0, 0.0]), Err(Error::OutOfRange { .. })));
+        assert!(matches!(Orientation::new([0.0; 3], x), Err(Error::OutOfRange(_))));
+        assert!(matches!(Orientation::new([f64::NAN, 0.0, 0.0], x), Err(Error::OutOfRange(_))));
+        assert!(matches!(Orientation::new(x, [-2.0, 0.0, 0.0]), Err(Error::OutOfRange(_))));
         assert!(Orientation::towards([0.0, 0.0, -3.0]).is_ok());
     }
 }

@@ -1,9 +1,14 @@
 //! Room-acoustic parameters of a measured response (ISO 3382-1, ISO 3382-2).
 
 use crate::band_energy::{BandEnergy, Prepared};
-use crate::{
-    Bands, DecayFit, EnergyDecayCurve, Error, Estimate, ImpulseResponse, NoReading, Onset, PerBand, Reading,
-};
+use crate::bands::Bands;
+use crate::decay_fit::DecayFit;
+use crate::energy::EnergyDecayCurve;
+use crate::error::Error;
+use crate::estimate::{Estimate, NoReading, Reading};
+use crate::onset::Onset;
+use crate::per_band::PerBand;
+use crate::signal::ImpulseResponse;
 
 /// The noise must lie this far below the lowest level that a regression uses (ISO 3382-1, 5.3.3), in dB.
 const NOISE_MARGIN_DB: f64 = 10.0;

@@ -1,6 +1,6 @@
 //! Long work reports how far it is, and can be stopped.
 
-use crate::Error;
+use crate::error::Error;
 use std::ops::ControlFlow;
 
 /// Hears how far long work has come; `Break` stops it with [`Error::Cancelled`].

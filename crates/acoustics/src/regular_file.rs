@@ -1,6 +1,6 @@
 //! Input files are files: what never ends, or has no bytes, is refused before it is read.
 
-use crate::Error;
+use crate::error::Error;
 use std::fs::{File, FileType};
 use std::io::Read;
 use std::path::Path;
@@ -26,7 +26,10 @@ pub fn open_file(path: impl AsRef<Path>) -> Result<File, Error> {
 }
 
 /// Reads at most so many bytes of a regular file.
-pub(crate) fn read_at_most(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
+///
+/// # Errors
+/// As [`open_file`].
+pub fn read_at_most(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
     let failed = |source| Error::Io { path: path.to_owned(), source };
     let file = open_file(path)?;
     let length = file.metadata().map_err(failed)?.len();
@@ -36,7 +39,10 @@ pub(crate) fn read_at_most(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
 }
 
 /// Reads a text file of a person's making: its names may be in any old encoding, numbers and keywords are ASCII.
-pub(crate) fn read_text(path: &Path) -> Result<String, Error> {
+///
+/// # Errors
+/// As [`open_file`].
+pub fn read_text(path: &Path) -> Result<String, Error> {
     Ok(String::from_utf8_lossy(&read_at_most(path, u64::MAX)?).into_owned())
 }
 

@@ -1,7 +1,8 @@
 //! Changing the sample rate.
 
-use crate::error::check_range;
-use crate::{Error, ImpulseResponse, Signal};
+use crate::error::Error;
+use crate::out_of_range::OutOfRange;
+use crate::signal::{ImpulseResponse, Signal};
 use rubato::audioadapter_buffers::direct::InterleavedSlice;
 use rubato::{Fft, FixedSync, Resampler, WindowFunction};
 
@@ -111,7 +112,13 @@ impl BlockResampler {
 
     fn with_gain(old_hz: u32, new_hz: u32, gain: f64) -> Result<Self, Error> {
         for rate_hz in [old_hz, new_hz] {
-            check_range("sample rate (Hz)", f64::from(rate_hz), 1e3, 768e3, "between 1 kHz and 768 kHz")?;
+            OutOfRange::check(
+                "sample rate (Hz)",
+                f64::from(rate_hz),
+                1e3,
+                768e3,
+                "between 1 kHz and 768 kHz",
+            )?;
         }
         let filter = if old_hz == new_hz { None } else { Some(filter(old_hz, new_hz)?) };
         let of = |length: fn(&Fft<f64>) -> usize| filter.as_ref().map_or(0, length);
@@ -306,7 +313,7 @@ mod tests {
     fn absurd_rates_are_refused() {
         let signal = Signal::new(vec![0.0; 10], 48_000).unwrap();
         for rate in [0, 999, 768_001, u32::MAX] {
-            assert!(matches!(resample(&signal, rate), Err(Error::OutOfRange { .. })));
+            assert!(matches!(resample(&signal, rate), Err(Error::OutOfRange(_))));
         }
     }
 }

@@ -1,6 +1,8 @@
 //! An impulse response from a file: found in it, and told apart from speech and music.
 
-use crate::{AudioReader, Channel, Error, ImpulseResponse};
+use crate::audio::{AudioReader, Channel};
+use crate::error::Error;
+use crate::signal::ImpulseResponse;
 use std::path::Path;
 
 /// Longest part of a file that is taken for the response, in seconds: twice the reverberation of the largest cathedrals and
@@ -94,7 +96,10 @@ pub fn read_response(path: impl AsRef<Path>, channel: Channel) -> Result<Located
 }
 
 /// That a sound may be an impulse response by the number of its bursts: the rule of [`read_response`].
-pub(crate) fn check_one_onset(samples: &[f32], sample_rate_hz: u32) -> Result<(), Error> {
+///
+/// # Errors
+/// [`Error::NotAResponse`].
+pub fn check_one_onset(samples: &[f32], sample_rate_hz: u32) -> Result<(), Error> {
     let rate = f64::from(sample_rate_hz);
     let block = ((BLOCK_S * rate) as usize).max(1);
     let power: Vec<f64> = samples.chunks(block).map(|chunk| block_power(chunk, block)).collect();

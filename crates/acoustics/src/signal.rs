@@ -1,6 +1,6 @@
 //! Sampled sound.
 
-use crate::Error;
+use crate::error::Error;
 
 /// Mono samples at a sample rate. Full scale is 1; the samples are finite and there is at least one.
 /// ```
@@ -132,11 +132,11 @@ pub(crate) fn check_samples(what: &'static str, samples: &[f32], sample_rate_hz:
     if let Some(index) = samples.iter().position(|s| !s.is_finite()) {
         return Err(Error::NotFinite { what, index });
     }
-    crate::error::check_range(
+    Ok(crate::out_of_range::OutOfRange::check(
         "sample rate (Hz)",
         f64::from(sample_rate_hz),
         1e3,
         768e3,
         "between 1 kHz and 768 kHz",
-    )
+    )?)
 }

@@ -1,6 +1,9 @@
 //! What a room should sound like.
 
-use crate::{Bands, Error, Estimate, PerBand};
+use crate::bands::Bands;
+use crate::error::Error;
+use crate::estimate::Estimate;
+use crate::per_band::PerBand;
 
 /// Reverberation time and equalisation per octave: what the estimator hears and the fit aims at.
 /// ```
@@ -33,10 +36,16 @@ impl RoomTargets {
             }
         }
         for estimate in t60_s.values() {
-            crate::error::check_range("T60 (s)", estimate.value, 1e-3, 100.0, "between 1 ms and 100 s")?;
+            crate::out_of_range::OutOfRange::check(
+                "T60 (s)",
+                estimate.value,
+                1e-3,
+                100.0,
+                "between 1 ms and 100 s",
+            )?;
         }
         for estimate in eq_db.values() {
-            crate::error::check_range(
+            crate::out_of_range::OutOfRange::check(
                 "EQ (dB)",
                 estimate.value,
                 -200.0,

@@ -1,5 +1,6 @@
 //! Several changes after one another.
 
+use crate::augment::Augment;
 use crate::drr::{DrrAugment, DrrConfig};
 use crate::eq::{EqAugment, EqConfig};
 use crate::error::{Error, check};
@@ -7,7 +8,7 @@ use crate::labels::Labels;
 use crate::seed::{derive, generator};
 use crate::t60::{T60Augment, T60Config};
 use rand::Rng;
-use sabine_acoustics::{Augment, ImpulseResponse};
+use sabine_acoustics::ImpulseResponse;
 
 /// A response as it became, and what is measured on it.
 #[derive(Clone, Debug, PartialEq)]

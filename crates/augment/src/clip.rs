@@ -6,7 +6,7 @@ use rand::Rng;
 use rand_pcg::Pcg64;
 use realfft::num_complex::Complex32;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
-use sabine_acoustics::FeatureExtractor;
+use sabine_features::FeatureExtractor;
 use sabine_features::{LogMel, LogMelConfig, LogMelScratch};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;

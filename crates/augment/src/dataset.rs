@@ -1,5 +1,6 @@
 //! Building a data set, shard by shard.
 
+use crate::augment::Augment;
 use crate::chain::Chain;
 use crate::clip::{ClipMaker, ClipScratch};
 use crate::corpus::{MeasuredResponse, ResponseCorpus, SpeechCorpus, Utterance, hash_bytes, hash_file};
@@ -16,7 +17,7 @@ use half::f16;
 use rand::Rng;
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
-use sabine_acoustics::{Augment, Bands, ImpulseResponse, Observer, report};
+use sabine_acoustics::{Bands, ImpulseResponse, Observer, report};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};

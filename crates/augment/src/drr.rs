@@ -1,10 +1,11 @@
 //! Nearer to the source, or farther from it.
 
+use crate::augment::Augment;
 use crate::direct::{Direct, HALF_DIRECT_S};
 use crate::error::{Error, check_span};
 use crate::seed::generator;
 use rand::Rng;
-use sabine_acoustics::{Augment, BandParameters, ImpulseResponse};
+use sabine_acoustics::{BandParameters, ImpulseResponse};
 
 /// Readings of the ratio before it is given up, and what is near enough, dB.
 const ROUNDS: usize = 5;

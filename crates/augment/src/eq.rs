@@ -1,9 +1,10 @@
 //! The same room through another loudspeaker and microphone.
 
+use crate::augment::Augment;
 use crate::eq_statistics::EqStatistics;
 use crate::error::{Error, check};
 use crate::seed::generator;
-use sabine_acoustics::{Augment, Bands, ImpulseResponse, NoReading, PerBand, Signal, equalisation};
+use sabine_acoustics::{Bands, ImpulseResponse, NoReading, PerBand, Signal, equalisation};
 use sabine_eqfilter::{EqDesigner, EqFilterConfig};
 
 /// Corrections of the filter by what is still missing: a spectrum that is uneven within an octave needs one or two, a target

@@ -5,14 +5,19 @@
 //! writes clips with labels for the trainer of `sabine-estimator`.
 //!
 //! - [`T60Augment`], [`DrrAugment`], [`EqAugment`]: another reverberation time, distance, equalisation (Bryan 2020; Tang et
-//!   al. 2020). Each is a [`sabine_acoustics::Augment`]; a [`Chain`] of them is one, too. [`AugmentedResponse`] keeps the
+//!   al. 2020). Each is a [`Augment`]; a [`Chain`] of them is one, too. [`AugmentedResponse`] keeps the
 //!   labels with the response.
 //! - [`SyntheticRooms`]: synthetic room impulse responses, some hundreds a second.
 //! - [`TracedRooms`]: responses of random polyhedral rooms ([`PolyhedralRoom`]: slanted walls, L-shapes, screens, furniture,
-//!   surfaces of the material library), traced by a [`sabine_acoustics::Propagator`] that the caller brings.
+//!   surfaces of the material library), traced by a [`sabine_paths::Propagator`] that the caller brings.
 //! - [`EqStatistics`]: how the equalisation of real responses spreads.
 //! - [`DatasetBuilder`]: clips of 4 s in shards, for any number of threads, workers and interruptions the same bytes; rooms
 //!   and speakers are dealt out to the partitions first, and a leak is an error.
+//!
+//! ```toml
+//! [dependencies]
+//! sabine-augment = "0.1"
+//! ```
 //!
 //! ```
 //! use sabine_acoustics::ImpulseResponse;
@@ -49,12 +54,12 @@
 //!
 //! | what | figure | test |
 //! |---|---|---|
-//! | T60 asked for against measured, per octave: noise with a floor | median 3 %, 95th percentile 10 % | `tests/t60.rs` |
-//! | the same on measured responses, where bandwidth times T60 is 16 or more | 0.3 % and 3.9 %; 250 Hz to 8 kHz each within 3 % and 10 %, **125 Hz 0.6 % and 15 %** | `tests/real_responses.rs` |
-//! | decay below the old noise floor | as above it | `tests/t60.rs`, `tests/real_responses.rs` |
-//! | DRR | 0.2 dB, or refused | `tests/drr_and_eq.rs`, `tests/real_responses.rs` |
-//! | EQ per octave | 0.5 dB, or refused | `tests/drr_and_eq.rs`, `tests/real_responses.rs` |
-//! | threads, workers, interruptions | not a byte | `tests/dataset.rs`, `tests/traced_rooms.rs` |
+//! | T60 asked for against measured, per octave: noise with a floor | median 3 %, 95th percentile 10 % | `tests/it/t60.rs` |
+//! | the same on measured responses, where bandwidth times T60 is 16 or more | 0.3 % and 3.9 %; 250 Hz to 8 kHz each within 3 % and 10 %, **125 Hz 0.6 % and 15 %** | `tests/it/real_responses.rs` |
+//! | decay below the old noise floor | as above it | `tests/it/t60.rs`, `tests/it/real_responses.rs` |
+//! | DRR | 0.2 dB, or refused | `tests/it/drr_and_eq.rs`, `tests/it/real_responses.rs` |
+//! | EQ per octave | 0.5 dB, or refused | `tests/it/drr_and_eq.rs`, `tests/it/real_responses.rs` |
+//! | threads, workers, interruptions | not a byte | `tests/it/dataset.rs`, `tests/it/traced_rooms.rs` |
 //!
 //! `docs/validation/augment.md` has the tables; `docs/how-to/dataset-on-a-cluster.md` tells how to make a set on many machines.
 //!
@@ -67,6 +72,7 @@
 //! - M. Karjalainen et al., Estimation of modal decay parameters from noisy response measurements, JAES 50(11), 2002.
 //! - H. Kuttruff, Room Acoustics, 6th ed., 2016.
 
+mod augment;
 mod band_split;
 mod chain;
 mod clip;
@@ -92,6 +98,7 @@ mod synthetic;
 mod t60;
 mod traced_rooms;
 
+pub use augment::Augment;
 pub use chain::{AugmentedResponse, Chain};
 pub use clip::ClipConfig;
 pub use corpus::{

@@ -7,10 +7,8 @@ use rand::Rng;
 use rand::seq::IndexedRandom;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
-use sabine_acoustics::{
-    Air, Bands, DiffuseRoom, Material, NamedMaterial, PerBand, Receiver, Scene, Source, Triangle,
-    library_material,
-};
+use sabine_acoustics::{Air, Bands, Material, PerBand, library_material};
+use sabine_scene::{DiffuseRoom, NamedMaterial, Receiver, Scene, Source, Triangle};
 
 /// Distance of source and receiver from walls, furniture and ceiling, m.
 const CLEARANCE_M: f64 = 0.3;

@@ -1,12 +1,13 @@
 //! The same room, more or less absorbent.
 
+use crate::augment::Augment;
 use crate::direct::Direct;
 use crate::error::{Error, check, check_span};
 use crate::labels::decay_times;
 use crate::seed::{derive, generator};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
-use sabine_acoustics::{Augment, Bands, DecayFit, FilterBank, ImpulseResponse, NoReading};
+use sabine_acoustics::{Bands, DecayFit, FilterBank, ImpulseResponse, NoReading};
 
 /// ln(10^6): power falls by 60 dB in this many time constants.
 const LN_MILLION: f64 = 13.815_510_557_964_274;

@@ -5,7 +5,9 @@ use crate::error::Error;
 use crate::polyhedral_room::{PolyhedralRoom, PolyhedralRoomConfig};
 use crate::seed::derive;
 use rayon::prelude::*;
-use sabine_acoustics::{Air, ImpulseResponse, Observer, PathSet, Propagator, Scene, report};
+use sabine_acoustics::{Air, ImpulseResponse, Observer, report};
+use sabine_paths::{PathSet, Propagator};
+use sabine_scene::Scene;
 use safetensors::tensor::{Dtype, TensorView};
 use std::collections::{BTreeMap, HashMap};
 use std::io::Write;
@@ -25,7 +27,9 @@ const ATTEMPTS: u64 = 8;
 /// takes those of `sabine-propagate`. A response depends on seed, settings, tracer and renderer alone.
 ///
 /// ```no_run
-/// # use sabine_acoustics::{Air, ImpulseResponse, PathSet, Propagator, Scene};
+/// # use sabine_acoustics::{Air, ImpulseResponse};
+/// # use sabine_paths::{PathSet, Propagator};
+/// # use sabine_scene::Scene;
 /// # use sabine_augment::{PolyhedralRoomConfig, ResponseFilter, TracedRooms};
 /// # fn wired(tracer: &dyn Propagator, render: &sabine_augment::RenderPaths) -> Result<(), sabine_augment::Error> {
 /// let rooms = TracedRooms::new(PolyhedralRoomConfig::default(), tracer, render)?;

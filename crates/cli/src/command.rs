@@ -162,8 +162,8 @@ impl Job {
             Self::Evaluate(arguments) => evaluate::run(arguments),
             Self::Materials(arguments) => materials::run(arguments),
             Self::NewRoom(arguments) => new_room::run(arguments),
-            Self::Completions(arguments) => shell::completions(arguments),
-            Self::Man(arguments) => shell::manual(arguments),
+            Self::Completions(arguments) => shell::completions(arguments, command()),
+            Self::Man(arguments) => shell::manual(arguments, &command()),
         }
     }
 }

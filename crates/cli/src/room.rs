@@ -3,7 +3,7 @@
 use crate::demo::Demo;
 use crate::failure::Failure;
 use clap::Args;
-use sabine::acoustics::{MeasuredRoom, ReadOptions};
+use sabine::scene::{MeasuredRoom, ReadOptions, Receiver, Source};
 use std::path::{Path, PathBuf};
 
 /// Options of every command that reads a room.
@@ -29,6 +29,54 @@ impl RoomArguments {
         let folder = demo.or(self.folder.as_deref(), "room")?;
         let room = read_room(&folder, self.allow_outside, self.materials.as_deref())?;
         Ok((room, demo.name(&folder)))
+    }
+}
+
+/// Options of every command that works between one source and one receiver.
+#[derive(Args, Debug, Default)]
+pub struct PlaceArguments {
+    /// Source in the room file [default: its first; where a measured response is needed, the first response's]
+    #[arg(long, value_name = "ID")]
+    pub source: Option<String>,
+    /// Receiver in the room file [default: its first; where a measured response is needed, the first response's]
+    #[arg(long, value_name = "ID")]
+    pub receiver: Option<String>,
+}
+
+impl PlaceArguments {
+    /// Source and receiver that were asked for, or the room's first.
+    ///
+    /// # Errors
+    /// The room has none of that name, or none at all.
+    pub fn of<'r>(&self, room: &'r MeasuredRoom) -> Result<(&'r Source, &'r Receiver), Failure> {
+        let source = match &self.source {
+            Some(id) => room.source(id)?,
+            None => room.sources().first().ok_or("room.toml: sources: there is none")?,
+        };
+        let receiver = match &self.receiver {
+            Some(id) => room.receiver(id)?,
+            None => room.receivers().first().ok_or("room.toml: receivers: there is none")?,
+        };
+        Ok((source, receiver))
+    }
+
+    /// Number of the first response that was measured between the source and the receiver that were asked for; `None` where there
+    /// is none. A place that was not asked for may be any.
+    ///
+    /// # Errors
+    /// The room has no source or receiver of that name.
+    pub fn response(&self, room: &MeasuredRoom) -> Result<Option<usize>, Failure> {
+        if let Some(id) = &self.source {
+            room.source(id)?;
+        }
+        if let Some(id) = &self.receiver {
+            room.receiver(id)?;
+        }
+        let wanted = |wanted: &Option<String>, id: &str| wanted.as_deref().is_none_or(|wanted| wanted == id);
+        Ok(room.responses().iter().position(|entry| {
+            wanted(&self.source, &room.sources()[entry.source].id)
+                && wanted(&self.receiver, &room.receivers()[entry.receiver].id)
+        }))
     }
 }
 

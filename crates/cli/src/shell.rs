@@ -1,9 +1,8 @@
 //! What a shell and `man` want to know of the command.
 
-use crate::command::command;
 use crate::failure::Failure;
 use crate::output::OutputFolder;
-use clap::Args;
+use clap::{Args, Command};
 use clap_complete::Shell;
 use std::path::PathBuf;
 
@@ -27,9 +26,9 @@ pub struct ManArguments {
 ///
 /// # Errors
 /// None today; the signature is that of every command.
-pub fn completions(arguments: &CompletionArguments) -> Result<(), Failure> {
+pub fn completions(arguments: &CompletionArguments, mut sabine: Command) -> Result<(), Failure> {
     let mut script = Vec::new();
-    clap_complete::generate(arguments.shell, &mut command(), "sabine", &mut script);
+    clap_complete::generate(arguments.shell, &mut sabine, "sabine", &mut script);
     print!("{}", String::from_utf8_lossy(&script));
     Ok(())
 }
@@ -38,9 +37,8 @@ pub fn completions(arguments: &CompletionArguments) -> Result<(), Failure> {
 ///
 /// # Errors
 /// The folder cannot be written.
-pub fn manual(arguments: &ManArguments) -> Result<(), Failure> {
+pub fn manual(arguments: &ManArguments, sabine: &Command) -> Result<(), Failure> {
     let mut out = OutputFolder::create(&arguments.out)?;
-    let sabine = command();
     let mut page = Vec::new();
     clap_mangen::Man::new(sabine.clone()).render(&mut page)?;
     out.write("sabine.1", &page)?;

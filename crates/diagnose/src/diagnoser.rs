@@ -12,7 +12,8 @@ use crate::infer::selection::select;
 use crate::report::composition::compose;
 use crate::report::diagnosis::Diagnosis;
 use crate::simulate::scene_tracer::{Rays, SceneTracer};
-use sabine_acoustics::{MeasuredRoom, Observer};
+use sabine_acoustics::Observer;
+use sabine_scene::MeasuredRoom;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -58,7 +59,7 @@ impl Diagnoser {
     }
 
     /// With another tracer than that of `sabine-propagate`; [`EachScene`](crate::EachScene) makes one of any
-    /// [`Propagator`](sabine_acoustics::Propagator). [`DiagnoseConfig::rays`], `image_order` and `allow_leaks` then mean nothing.
+    /// [`Propagator`](sabine_paths::Propagator). [`DiagnoseConfig::rays`], `image_order` and `allow_leaks` then mean nothing.
     #[must_use]
     pub fn with_tracer(self, tracer: impl SceneTracer + 'static) -> Self {
         Self { tracer: Arc::new(tracer), ..self }
@@ -89,11 +90,14 @@ impl Diagnoser {
         observer: &dyn Observer,
     ) -> Result<Diagnosis, Error> {
         let held = held_receivers(room, hold_out)?;
-        let wave_solutions = self.config.wave_solutions && self.effects.iter().any(|e| e.needs_waves());
-        let config = DiagnoseConfig { wave_solutions, ..self.config.clone() };
-        let mut baseline = Baseline::new(room, &held, &config, &self.tracer, observer)?;
+        let mut baseline = Baseline::new(room, &held, &self.config, &self.tracer, observer)?;
         let used = baseline.observations.fitted.clone();
-        let cases = candidates::cases(&self.effects, baseline.survey());
+        let mut cases = candidates::cases(&self.effects, baseline.survey());
+        // What cannot be prepared takes no part.
+        let started = Instant::now();
+        let mut refused = baseline.prepare(&cases)?.into_iter();
+        cases.retain(|_| !refused.next().unwrap_or(false));
+        *baseline.seconds.entry("baseline").or_default() += started.elapsed().as_secs_f64();
 
         let started = Instant::now();
         baseline.calibrate_dispersion(&[], &used)?;

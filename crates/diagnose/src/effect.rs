@@ -1,19 +1,20 @@
 //! A named physical cause of a misfit, and the cases in which it can come.
 
+pub(crate) mod case;
 pub(crate) mod fitted_case;
 pub(crate) mod info;
 pub(crate) mod next_measurement;
 pub(crate) mod reflection_gate;
+pub(crate) mod term;
 
+pub use case::Case;
 pub use fitted_case::FittedCase;
 pub use info::EffectInfo;
+pub use term::{
+    AddedReflection, ArrivalTerm, AuxiliaryEvidence, ChannelChange, DecayTerm, PreArrivalTerm,
+    ReflectionEvidence, ReflectionTerm, Term,
+};
 
-use crate::effect::reflection_gate::ReflectionGate;
-use crate::extend::model_change::ModelChange;
-use crate::likelihood::multilateration::UnassignedPeaks;
-use crate::observe::pre_arrival::PreArrival;
-use crate::report::diagnosis::FoundParameter;
-use crate::simulate::views::{ArrivalView, BandView};
 use crate::survey::Survey;
 
 /// A parameter of an effect.
@@ -33,6 +34,10 @@ pub struct Parameter {
     pub typical: f64,
     /// The only band that it bears on, where there is one.
     pub band: Option<usize>,
+    /// The only receiver (index) that it bears on, where there is one: a fit that has not seen it knows nothing of this parameter.
+    pub receiver: Option<usize>,
+    /// The only response (index) that it bears on, likewise.
+    pub response: Option<usize>,
 }
 
 impl Parameter {
@@ -44,7 +49,17 @@ impl Parameter {
         prior_sd: f64,
         bounds: (f64, f64),
     ) -> Self {
-        Self { name: name.into(), unit, neutral, prior_sd, bounds, typical: neutral, band: None }
+        Self {
+            name: name.into(),
+            unit,
+            neutral,
+            prior_sd,
+            bounds,
+            typical: neutral,
+            band: None,
+            receiver: None,
+            response: None,
+        }
     }
 
     /// The same, with the value at which its signature is plain.
@@ -58,6 +73,25 @@ impl Parameter {
     pub fn in_band(self, band: usize, survey: &Survey) -> Self {
         let name = format!("{}_{}_hz", self.name, survey.bands().nominal_hz(band));
         Self { name, band: Some(band), ..self }
+    }
+
+    /// The same, for one receiver (index) alone, whose name is added.
+    #[must_use]
+    pub fn of_receiver(self, receiver: usize, survey: &Survey) -> Self {
+        let name = format!("{}_{}", self.name, survey.receivers()[receiver].id);
+        Self { name, receiver: Some(receiver), ..self }
+    }
+
+    /// The same, for one response (index) alone, whose name is added.
+    #[must_use]
+    pub fn of_response(self, response: usize, survey: &Survey) -> Self {
+        let name = format!("{}_{}", self.name, survey.responses()[response].name);
+        Self { name, response: Some(response), ..self }
+    }
+
+    /// Whether it bears on a part of the data alone.
+    pub(crate) fn is_local(&self) -> bool {
+        self.receiver.is_some() || self.response.is_some()
     }
 }
 
@@ -75,21 +109,21 @@ pub enum Nuisance {
     ResponseGain(usize),
 }
 
-/// What part of the data an effect bears on. They are fitted separately: no effect needs several at once.
+/// What part of the data a case bears on. They are fitted separately: no case needs several at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Observable {
+pub(crate) enum Observable {
     /// Energy over time in octaves.
     Decay,
     /// Arrival times of the direct sound and of early reflections.
     Arrivals,
     /// Which response is which, or its sign: both of the above and polarity.
     Channels,
-    /// What comes before the direct sound: [`Case::pre_arrival`] weighs it.
+    /// What comes before the direct sound.
     PreArrival,
 }
 
 impl Observable {
-    /// Whether a case with this evidence takes part in the fit of decays or of arrivals.
+    /// Whether a case that bears on this takes part in the fit of decays or of arrivals.
     pub(crate) fn concerns(self, fit: Self) -> bool {
         self == fit || self == Self::Channels
     }
@@ -110,32 +144,10 @@ pub enum Stage {
     Recorder,
 }
 
-/// What single reflections, or the time before the direct sound, say for a cause.
-#[derive(Clone, Debug, PartialEq)]
-pub struct AuxiliaryEvidence {
-    /// Logarithm of how much more probable they are with the cause than without, its parameters summed over.
-    pub nats: f64,
-    /// Its parameters as they and the fit together give them.
-    pub parameters: Vec<FoundParameter>,
-}
-
-/// A reflection that the mesh does not have.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AddedReflection {
-    /// Length of its path in metres.
-    pub length_m: f64,
-    /// Unit vector in which it leaves the source.
-    pub departure: [f64; 3],
-    /// Unit vector from the receiver towards where it comes from.
-    pub arrival: [f64; 3],
-    /// Height of its peak over that of the direct sound, in dB.
-    pub level_db: f64,
-}
-
 /// A named physical cause: an entry of the catalogue.
 ///
-/// To add one, implement this and [`Case`], and hand it to [`Diagnoser::with_effects`](crate::Diagnoser::with_effects) beside
-/// [`catalogue`](crate::catalogue).
+/// To add one, implement this and the trait of its [`Term`], and hand it to
+/// [`Diagnoser::with_effects`](crate::Diagnoser::with_effects) beside [`catalogue`](crate::catalogue).
 pub trait Effect: Send + Sync {
     /// Identifier, title, explanation, and the measurement that tells it apart from others.
     fn info(&self) -> EffectInfo;
@@ -145,107 +157,6 @@ pub trait Effect: Send + Sync {
         self.info().id
     }
 
-    /// The cases in which it may come: one for each receiver, material, response ..., or a single one. None if it cannot be at
-    /// work here.
-    fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>>;
-
-    /// Whether its cases look at [`BandView::wave_change`]: waves are not solved if no effect does.
-    fn needs_waves(&self) -> bool {
-        false
-    }
-}
-
-/// An effect with its subject: "this receiver stands elsewhere". Its parameters are fitted with everything else left open.
-pub trait Case: Send + Sync {
-    /// What it concerns, by name, where the effect has several cases.
-    fn subject(&self) -> Option<String> {
-        None
-    }
-
-    /// The data that it bears on.
-    fn observable(&self) -> Observable {
-        Observable::Decay
-    }
-
-    /// Its place in the chain.
-    fn stage(&self) -> Stage {
-        Stage::Room
-    }
-
-    /// Parameters.
-    fn parameters(&self, survey: &Survey) -> Vec<Parameter>;
-
-    /// Values to start the fit from; the best end counts.
-    fn starts(&self, survey: &Survey) -> Vec<Vec<f64>> {
-        vec![self.parameters(survey).iter().map(|p| p.neutral).collect()]
-    }
-
-    /// Changes the natural logarithm of the predicted energy in the time bins of one band and pair. Each bin must depend on its own
-    /// energy alone.
-    fn energy(&self, _values: &[f64], _view: &BandView<'_>, _ln_energy: &mut [f64]) {}
-
-    /// Changes the expected variance of the bins of one band and pair, as a share of their energy squared: it is less where the
-    /// case predicts what else is left to chance.
-    fn variance(&self, _values: &[f64], _view: &BandView<'_>, _variance: &mut [f64]) {}
-
-    /// Seconds by which an arrival comes later.
-    fn delay_s(&self, _values: &[f64], _arrival: &ArrivalView<'_>) -> f64 {
-        0.0
-    }
-
-    /// A reflection that it adds to a response (index).
-    fn added_reflection(
-        &self,
-        _values: &[f64],
-        _survey: &Survey,
-        _response: usize,
-    ) -> Option<AddedReflection> {
-        None
-    }
-
-    /// Whether its fit must start from what peaks say: then [`Case::starts_among`] gives the starts.
-    fn seeks(&self) -> bool {
-        false
-    }
-
-    /// Values to start from, given the peaks that nothing predicted explains.
-    fn starts_among(&self, _strays: &UnassignedPeaks<'_>) -> Vec<Vec<f64>> {
-        Vec::new()
-    }
-
-    /// Whether single reflections weigh it: then [`Case::among_reflections`] says how much.
-    fn weighs_reflections(&self) -> bool {
-        false
-    }
-
-    /// What single reflections say for it, given its parameters (value and standard deviation) from the fit of the decays.
-    fn among_reflections(&self, _own: &[(f64, f64)], _gates: &[ReflectionGate]) -> Option<AuxiliaryEvidence> {
-        None
-    }
-
-    /// What the responses that count (a flag for each) say for it before their direct sounds, its parameters included.
-    fn pre_arrival(&self, _responses: &PreArrival, _used: &[bool]) -> Option<AuxiliaryEvidence> {
-        None
-    }
-
-    /// Priors that it relaxes, with their new standard deviation.
-    fn relaxes(&self) -> Vec<(Nuisance, f64)> {
-        Vec::new()
-    }
-
-    /// What it changes in the model once it is named: changes of temperature, dimensions and positions are traced again, and the extended
-    /// model renders all of them. A case without any is named, not rendered.
-    fn model_changes(&self, _fitted: &FittedCase<'_>) -> Vec<ModelChange> {
-        Vec::new()
-    }
-
-    /// Two responses (indices) that were exchanged.
-    fn exchanged(&self) -> Option<(usize, usize)> {
-        None
-    }
-
-    /// A response (index) whose sign is turned.
-    fn inverted(&self) -> Option<usize> {
-        None
-    }
+    /// The cases in which it may occur: one for each receiver, material, response ..., or a single one. None if it cannot occur here.
+    fn cases(&self, survey: &Survey) -> Vec<Case>;
 }

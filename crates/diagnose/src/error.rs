@@ -7,6 +7,9 @@ pub enum Error {
     /// The vocabulary refused a value, or long work was cancelled.
     #[error(transparent)]
     Acoustics(#[from] sabine_acoustics::Error),
+    /// A room, a response of it or its mesh cannot be read.
+    #[error(transparent)]
+    Scene(#[from] sabine_scene::Error),
     /// The tracer refused its settings or a place.
     #[error(transparent)]
     Propagate(#[from] sabine_propagate::Error),

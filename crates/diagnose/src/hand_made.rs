@@ -1,14 +1,22 @@
 //! A survey and tables of energy made by hand, for unit tests: no mesh, no paths, no files.
 
+use crate::config::DiagnoseConfig;
+use crate::effect::Case;
+use crate::infer::baseline::Baseline;
 use crate::likelihood::arrivals::ArrivalData;
 use crate::likelihood::decay::EnergyData;
 use crate::likelihood::laplace::Prior;
 use crate::observe::early_energy::EarlySamples;
+use crate::observe::observations::Observations;
 use crate::observe::observed_response::Measured;
 use crate::observe::time_bins::Bins;
+use crate::simulate::simulation::Simulation;
+use crate::simulate::tables::Tables as Prepared;
 use crate::simulate::traced_pair::{Arrival, BandState};
 use crate::survey::{Place, Survey, SurveyedResponse};
-use sabine_acoustics::{Air, Bands, Levels, Measurement, TimeZero};
+use sabine_acoustics::{Air, Bands, Material, PerBand};
+use sabine_scene::{Levels, Measurement, TimeZero};
+use std::collections::BTreeMap;
 
 /// Bins of each band.
 const BINS: usize = 14;
@@ -70,6 +78,15 @@ pub(crate) struct Tables {
 }
 
 impl Tables {
+    /// All responses late by so much: direct sounds and later peaks.
+    pub fn late(mut self, latency_s: f64) -> Self {
+        for measured in &mut self.measured {
+            measured.direct_s += latency_s;
+            measured.peaks_s.iter_mut().for_each(|p| *p += latency_s);
+        }
+        self
+    }
+
     /// Decays of 0.4 s with a scatter of a few decibels, one bin of which is far louder than anything predicted.
     pub fn new(levels: Levels, time_zero: TimeZero) -> Self {
         let survey = survey(levels, time_zero);
@@ -112,7 +129,45 @@ impl Tables {
             absorption: &self.absorption,
             priors: &self.priors,
             gain_sd_db: 0.4,
+            tables: &[],
             dispersion: &self.dispersion,
+        }
+    }
+
+    /// Tables made by hand for cases whose terms prepare some, which get their slots.
+    pub fn prepared(&self, cases: &mut [Case]) -> Vec<Prepared> {
+        let (pairs, bands) = (self.survey.responses.len(), self.survey.bands.len());
+        let mut all = Vec::new();
+        for case in cases {
+            case.slot = Some(all.len());
+            let table = || case.decay_term().and_then(|term| term.by_hand(BINS));
+            let of_pair = |_| (0..bands).map(|_| table()).collect::<Option<Vec<_>>>();
+            all.push(
+                (0..pairs)
+                    .map(of_pair)
+                    .collect::<Option<_>>()
+                    .map_or_else(Prepared::default, Prepared::boxed),
+            );
+        }
+        all
+    }
+
+    /// A baseline of these tables: what the search, the selection and the model need.
+    pub fn baseline(self, config: DiagnoseConfig) -> Baseline {
+        let column = |values: &Vec<f64>| PerBand::new(self.survey.bands, values.clone());
+        let scattering = PerBand::uniform(self.survey.bands, 0.1);
+        let material = |a: &Vec<f64>| Material::new(column(a)?, scattering.clone());
+        let materials: Result<Vec<Material>, sabine_acoustics::Error> =
+            self.absorption.iter().map(material).collect();
+        let materials = materials.expect("absorption between 0 and 1");
+        let simulation = Simulation::by_hand(&self.survey, materials, self.states, self.arrivals);
+        Baseline {
+            observations: Observations::by_hand(self.survey, self.measured),
+            simulation: simulation.expect("a box that can be traced"),
+            config,
+            priors: self.priors,
+            dispersion: self.dispersion,
+            seconds: BTreeMap::new(),
         }
     }
 

@@ -3,15 +3,15 @@
 //!
 //! # Where it stands
 //! At the end of the workspace, after the crates of rooms, responses and paths. [`Diagnoser`] takes a
-//! [`MeasuredRoom`](sabine_acoustics::MeasuredRoom) and returns a [`Diagnosis`]: a [`Verdict`], the [`Cause`]s with parameters and 90 %
+//! [`MeasuredRoom`](sabine_scene::MeasuredRoom) and returns a [`Diagnosis`]: a [`Verdict`], the [`Cause`]s with parameters and 90 %
 //! intervals, which causes cannot be told apart and which measurement would decide, and an [`ExtendedModel`] that renders. As a
 //! document ([`serde::Serialize`]) a diagnosis has the keys that `docs/versioning.md` promises.
 //!
 //! # Seams
-//! - [`Effect`] and [`Case`]: a cause of one's own, with its texts ([`EffectInfo`]) and what it changes in the model ([`ModelChange`]):
-//!   what is named with changes is traced again and rendered, whoever wrote it.
+//! - [`Effect`]: a cause of one's own, with its texts ([`EffectInfo`]). Its [`Case`]s are data; the [`Term`] of each says what it does to
+//!   a prediction, and [`Case::changing`] what it changes in the model: that is traced again and rendered, whoever wrote it.
 //! - [`SceneTracer`]: another tracer ([`Diagnoser::with_tracer`]); [`EachScene`] makes one of any
-//!   [`Propagator`](sabine_acoustics::Propagator).
+//!   [`Propagator`](sabine_paths::Propagator).
 //!
 //! # How
 //! Decays are compared as energy in octaves and time bins, relative to the direct sound; each bin with the spread that interference of
@@ -51,15 +51,15 @@
 //! # Accuracy
 //! | claim | test |
 //! |---|---|
-//! | hidden effects are named, null rooms are not | `tests/hidden_effects.rs` |
-//! | harmonics before the direct sound are found, noise there is not taken for them | `tests/hidden_distortion.rs` |
-//! | panels and holes are found and located | `tests/hidden_surfaces.rs` |
+//! | hidden effects are named, null rooms are not | `tests/it/hidden_effects.rs` |
+//! | harmonics before the direct sound are found, noise there is not taken for them | `tests/it/hidden_distortion.rs` |
+//! | panels and holes are found and located | `tests/it/hidden_surfaces.rs` |
 //! | evidence and bounds of the fit against closed forms | unit tests of `likelihood/laplace.rs` |
-//! | gradients of both likelihoods against central differences | unit tests of `likelihood/decay.rs`, `likelihood/arrivals.rs` |
-//! | any tracer serves | `tests/any_tracer.rs` |
+//! | gradients of both likelihoods against central differences | unit tests of `likelihood/decay/tests.rs`, `likelihood/arrivals.rs` |
+//! | any tracer serves | `tests/it/any_tracer.rs` |
 //! | variances, groups of paths, octave shares against closed forms | unit tests of their modules |
-//! | diffraction around a screen is found in finite differences of the wave equation, and not where sound goes straight | `tests/hidden_edges.rs` |
-//! | rendering from the extended model against closed forms | `tests/rendering.rs` |
+//! | diffraction around a screen is found in finite differences of the wave equation, and not where sound goes straight | `tests/it/hidden_edges.rs` |
+//! | rendering from the extended model against closed forms | `tests/it/rendering.rs` |
 //!
 //! `docs/validation/diagnose.md` has the figures, `cargo run --release -p sabine-validation --bin effect_atlas` makes them.
 //!
@@ -91,8 +91,8 @@ pub use effect::info::discriminating_measurement;
 pub use effect::next_measurement::NextMeasurement;
 pub use effect::reflection_gate::ReflectionGate;
 pub use effect::{
-    AddedReflection, AuxiliaryEvidence, Case, Effect, EffectInfo, FittedCase, Nuisance, Observable,
-    Parameter, Stage,
+    AddedReflection, ArrivalTerm, AuxiliaryEvidence, Case, ChannelChange, DecayTerm, Effect, EffectInfo,
+    FittedCase, Nuisance, Parameter, PreArrivalTerm, ReflectionEvidence, ReflectionTerm, Stage, Term,
 };
 pub use effects::*;
 pub use error::Error;
@@ -106,6 +106,8 @@ pub use report::diagnosis::{
     Isolability, LackOfFit, ResidualCell, Verdict,
 };
 pub use simulate::scene_tracer::{EachScene, PreparedTracer, SceneTracer};
+pub use simulate::tables::{Tables, Unprepared};
+pub use simulate::traced_views::{TracedPairView, TracedRoomView};
 pub use simulate::views::{ArrivalView, BandView};
 pub use survey::planes::Plane;
 pub use survey::{Place, Survey, SurveyedResponse};

@@ -1,8 +1,7 @@
 //! Settings of a design.
 
 use crate::Error;
-use crate::error::check_range;
-use sabine_acoustics::Bands;
+use sabine_acoustics::{Bands, OutOfRange};
 
 /// Settings of [`crate::EqFilter::design`] and its variants.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,10 +36,10 @@ impl EqFilterConfig {
     /// Delay in samples, or why the settings do not go together.
     pub(crate) fn check(&self, bands: Bands, sample_rate_hz: u32) -> Result<usize, Error> {
         let rate = f64::from(sample_rate_hz);
-        check_range("sample_rate_hz", rate, 1e3, 768e3, "between 1 kHz and 768 kHz")?;
-        check_range("delay_s", self.delay_s, 1e-3, 1.0, "between 1 ms and 1 s")?;
+        OutOfRange::check("sample_rate_hz", rate, 1e3, 768e3, "between 1 kHz and 768 kHz")?;
+        OutOfRange::check("delay_s", self.delay_s, 1e-3, 1.0, "between 1 ms and 1 s")?;
         if let Some(above) = self.above {
-            check_range("above.gain_db", above.gain_db, -120.0, 120.0, "between -120 and 120 dB")?;
+            OutOfRange::check("above.gain_db", above.gain_db, -120.0, 120.0, "between -120 and 120 dB")?;
             let highest_hz = bands.nominal_hz(bands.len() - 1);
             let from = Bands::octaves(above.from_band_hz, above.from_band_hz)?;
             if from.nominal_hz(0) <= highest_hz {

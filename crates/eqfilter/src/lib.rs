@@ -7,6 +7,11 @@
 //! It does **not** design recursive filters, equalise loudspeakers by inversion, or decide which gains a room needs: those
 //! come from the estimator, or from a measurement. Nor does it resample.
 //!
+//! ```toml
+//! [dependencies]
+//! sabine-eqfilter = "0.1"
+//! ```
+//!
 //! # Example
 //!
 //! ```
@@ -45,13 +50,13 @@
 //! # Accuracy
 //!
 //! With the default delay of 32 ms, any gains within 15 dB, alternating ones included, are met within 0.1 dB in every octave from
-//! 62.5 Hz to 8 kHz at 16, 44.1, 48 and 96 kHz (`tests/design.rs`, by a Fourier sum that shares no code with the design), and
-//! so the filter bank measures them (`tests/filter_bank.rs`).
+//! 62.5 Hz to 8 kHz at 16, 44.1, 48 and 96 kHz (`tests/it/design.rs`, by a Fourier sum that shares no code with the design), and
+//! so the filter bank measures them (`tests/it/filter_bank.rs`).
 //! The price is in the shape: 64 ms of taps resolve about 25 Hz, half the octave at 62.5 Hz, so there the curve between the
 //! bands is steep or shallow as the taps permit, and where neighbours differ by 30 dB it passes through zeros at the
 //! edges. A shorter delay resolves less: what it cannot meet, [`EqFilter::realised_db`] reports. Minimum phase keeps
 //! these gains within 0.1 dB. Convolution agrees with the plain sum to the rounding of single precision
-//! (`tests/convolution.rs`).
+//! (`tests/it/convolution.rs`).
 //!
 //! # References
 //!

@@ -1,9 +1,10 @@
 //! Convolution in real time.
 
 use crate::Error;
-use crate::error::{check_range, check_taps};
+use crate::error::check_taps;
 use crate::uniform::{BlockTransform, Stage};
 use realfft::num_complex::Complex;
+use sabine_acoustics::OutOfRange;
 
 /// Blocks of the head that make one block of the tail, where the response is long enough to need a tail.
 const TAIL_FACTOR: usize = 16;
@@ -39,15 +40,15 @@ struct Layout {
 
 impl Layout {
     fn new(config: PartitionedConfig) -> Result<Self, Error> {
-        check_range("block", config.block as f64, 16.0, 16384.0, "between 16 and 16384 samples")?;
-        check_range(
+        OutOfRange::check("block", config.block as f64, 16.0, 16384.0, "between 16 and 16384 samples")?;
+        OutOfRange::check(
             "longest_response",
             config.longest_response as f64,
             1.0,
             16_777_216.0,
             "between 1 and 2^24 samples",
         )?;
-        check_range("fade_blocks", config.fade_blocks as f64, 1.0, 1e4, "between 1 and 10000")?;
+        OutOfRange::check("fade_blocks", config.fade_blocks as f64, 1.0, 1e4, "between 1 and 10000")?;
         let (block, length) = (config.block, config.longest_response);
         let long_block = TAIL_FACTOR * block;
         let head_length = TAIL_START * long_block;
@@ -263,7 +264,7 @@ impl PartitionedConvolver {
         for length in [input.len(), output.len()] {
             if length != block {
                 let (field, range) = ("length of the block", "the block size of the convolver");
-                return Err(Error::OutOfRange { field, value: length as f64, range });
+                return Err(OutOfRange { field, value: length as f64, range }.into());
             }
         }
         self.head.push(input);

@@ -5,7 +5,7 @@
 //! synthetic set, reading and label handling included.
 
 #[allow(dead_code)] // the tests use more of it
-#[path = "../tests/support/mod.rs"]
+#[path = "../tests/it/support/mod.rs"]
 mod support;
 
 use sabine_estimator::{Dataset, Model, Network, NetworkConfig, Scratch, TrainConfig, Trainer};

@@ -4,7 +4,7 @@ use crate::adam::Adam;
 use crate::checksum::{seal, verify};
 use crate::config::NetworkConfig;
 use crate::parameters::Parameters;
-use crate::trainer::{EpochRecord, TrainConfig};
+use crate::train_config::{EpochRecord, TrainConfig};
 use crate::{Error, WeightsFault};
 use sabine_acoustics::write_atomically;
 use safetensors::tensor::TensorView;

@@ -6,6 +6,9 @@ use safetensors::tensor::TensorView;
 use sha2::{Digest, Sha256};
 use std::collections::HashMap;
 
+/// The one metadata field.
+pub(crate) const FIELD: &str = "sabine";
+
 /// Between the header's own fields and the digest, which ends the text: `..., "sha256": "<64 digits>"}`.
 const BEFORE: &str = ",\"sha256\":\"";
 const AFTER: &str = "\"}";
@@ -55,18 +58,14 @@ pub fn add_checksum(bytes: &[u8]) -> Result<Vec<u8>, Error> {
     let container = |source| fault(WeightsFault::Container { source });
     let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(container)?;
     let tensors = SafeTensors::deserialize(bytes).map_err(container)?;
-    let missing = || fault(WeightsFault::Metadata { field: crate::model::FIELD });
-    let header = metadata
-        .metadata()
-        .as_ref()
-        .and_then(|fields| fields.get(crate::model::FIELD))
-        .ok_or_else(missing)?;
+    let missing = || fault(WeightsFault::Metadata { field: FIELD });
+    let header = metadata.metadata().as_ref().and_then(|fields| fields.get(FIELD)).ok_or_else(missing)?;
     match verify(header, &tensors) {
         Ok(()) => return Ok(bytes.to_vec()),
         Err(WeightsFault::NoChecksum) => {}
         Err(other) => return Err(fault(other)),
     }
     let views = tensors.tensors();
-    let sealed = HashMap::from([(crate::model::FIELD.to_owned(), seal(header, &views))]);
+    let sealed = HashMap::from([(FIELD.to_owned(), seal(header, &views))]);
     safetensors::serialize(views, Some(sealed)).map_err(container)
 }

@@ -1,16 +1,17 @@
 //! From a recording to the targets of a room.
 
 use crate::Error;
-use crate::joint::{HeardWindow, WindowOutput};
 use crate::labels::LABEL_COUNT;
 use crate::layout::Normalisation;
 use crate::model::Model;
 use crate::network::{Network, Scratch, spectrum};
 use crate::warning::Warning;
+use crate::window_estimate::{DetailedEstimate, HeardWindow, WindowOutput};
 use crate::windows::{FlatTops, Loudness, first_frames, limit_range};
 use ndarray::Array2;
 use rayon::prelude::*;
-use sabine_acoustics::{FeatureExtractor, RoomEstimator, RoomTargets, Signal, resample};
+use sabine_acoustics::{RoomEstimator, RoomTargets, Signal, resample};
+use sabine_features::FeatureExtractor;
 use sabine_features::LogMel;
 use std::path::Path;
 
@@ -40,28 +41,6 @@ struct Prepared {
     /// First frames of its windows.
     firsts: Vec<usize>,
     warnings: Vec<Warning>,
-}
-
-/// What one window of a recording says.
-#[derive(Clone, Debug, PartialEq)]
-pub struct WindowEstimate {
-    /// Its beginning in seconds.
-    pub start_s: f64,
-    /// Its targets.
-    pub targets: RoomTargets,
-    /// Its share in the joint estimate, 0..=1; 0 without speech.
-    pub weight: f64,
-}
-
-/// An estimate with all that is known about it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DetailedEstimate {
-    /// The joint estimate of all windows.
-    pub targets: RoomTargets,
-    /// The windows that it is made of, in order.
-    pub windows: Vec<WindowEstimate>,
-    /// Reasons to trust it less.
-    pub warnings: Vec<Warning>,
 }
 
 impl Estimator {

@@ -1,31 +1,12 @@
 //! One answer from many windows.
 
-use crate::estimator::{DetailedEstimate, Estimator, WindowEstimate};
+use crate::estimator::Estimator;
 use crate::labels::{LABEL_COUNT, T60_COUNT, label_hz, per_band};
 use crate::warning::Warning;
+use crate::window_estimate::{DetailedEstimate, HeardWindow, WindowEstimate};
 use crate::windows::Loudness;
 use crate::{Error, WeightsFault};
 use sabine_acoustics::RoomTargets;
-
-/// What one window says, on the scale of the network.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct WindowOutput {
-    /// Standardised labels.
-    pub mean: [f64; LABEL_COUNT],
-    /// Their calibrated standard deviations.
-    pub deviation: [f64; LABEL_COUNT],
-    /// How unlike the training set the window is.
-    pub novelty: f64,
-}
-
-/// A window that was heard, not yet weighed against others.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct HeardWindow {
-    /// Its first frame.
-    pub first: usize,
-    pub loudness: Loudness,
-    pub output: WindowOutput,
-}
 
 /// One label joined over windows, before the correlation of their errors is taken into account.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,6 +8,11 @@
 //! beyond what an average voice allows: see [`Errors`] for how far the equalisation can be trusted. It makes no data sets:
 //! `sabine-augment` does.
 //!
+//! ```toml
+//! [dependencies]
+//! sabine-estimator = "0.1"
+//! ```
+//!
 //! # Example
 //!
 //! ```
@@ -90,8 +95,10 @@ mod reader;
 mod recordings;
 mod shape;
 mod stack;
+mod train_config;
 mod trainer;
 mod warning;
+mod window_estimate;
 mod windows;
 
 pub use checksum::add_checksum;
@@ -99,7 +106,7 @@ pub use config::{Block, NetworkConfig, Summary};
 pub use constant::ConstantEstimator;
 pub use dataset::{Clip, Dataset, Partition};
 pub use error::{DatasetFault, Error, WeightsFault};
-pub use estimator::{DetailedEstimate, Estimator, LEAST_DURATION_S, WindowEstimate};
+pub use estimator::{Estimator, LEAST_DURATION_S};
 pub use evaluation::{Errors, Evaluation, RoomMean, Selection};
 pub use labels::{EQ_COUNT, LABEL_COUNT, LabelScale, T60_COUNT, T60Scale, label_hz, label_name};
 pub use layout::{FeatureLayout, Normalisation};
@@ -110,5 +117,7 @@ pub use network::{Network, Scratch};
 pub use parameters::Parameters;
 pub use perturb::PerturbConfig;
 pub use recordings::{Recording, RecordingEvaluation};
-pub use trainer::{EpochRecord, Schedule, TrainConfig, Trained, Trainer};
+pub use train_config::{EpochRecord, Schedule, TrainConfig};
+pub use trainer::{Trained, Trainer};
 pub use warning::Warning;
+pub use window_estimate::{DetailedEstimate, WindowEstimate};

@@ -1,10 +1,11 @@
 //! Estimates from a live stream.
 
 use crate::Error;
-use crate::estimator::{DetailedEstimate, Estimator};
-use crate::joint::HeardWindow;
+use crate::estimator::Estimator;
 use crate::network::Scratch;
 use crate::warning::Warning;
+use crate::window_estimate::DetailedEstimate;
+use crate::window_estimate::HeardWindow;
 use crate::windows::{FlatTops, window_hop};
 use sabine_features::LogMelStream;
 

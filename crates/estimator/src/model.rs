@@ -1,6 +1,6 @@
 //! Everything that an estimator needs to know, in one file.
 
-use crate::checksum::{seal, verify};
+use crate::checksum::{FIELD, seal, verify};
 use crate::config::NetworkConfig;
 use crate::labels::{LABEL_COUNT, LabelScale, T60_COUNT, T60Scale};
 use crate::layout::{FeatureLayout, Normalisation};
@@ -14,8 +14,6 @@ use std::collections::{BTreeMap, HashMap};
 
 /// Name and version of the format.
 const FORMAT: &str = "sabine-estimator-2";
-/// The one metadata field.
-pub(crate) const FIELD: &str = "sabine";
 
 /// How far the estimates can be trusted, learned on rooms that the training did not see.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,9 +1,10 @@
 //! Estimates from files of any length.
 
 use crate::Error;
-use crate::estimator::{DetailedEstimate, Estimator};
+use crate::estimator::Estimator;
 use crate::live::LiveEstimator;
 use crate::warning::Warning;
+use crate::window_estimate::DetailedEstimate;
 use crate::windows::FlatTops;
 use sabine_acoustics::{AudioReader, BlockResampler};
 

@@ -1,23 +1,15 @@
 //! What can go wrong when a transform is planned or given slices of the wrong length.
 
+use sabine_acoustics::OutOfRange;
+use std::fmt;
+
 /// Errors of this crate; each names the offending field.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Error {
     /// A setting outside its range, or not finite.
-    #[error("{field} is {value}; it must be {range}")]
-    OutOfRange {
-        /// Name of the setting, with its unit.
-        field: &'static str,
-        /// The value given.
-        value: f64,
-        /// The range in words.
-        range: &'static str,
-    },
+    OutOfRange(OutOfRange),
     /// A mel band so narrow that no bin of the transform falls into it.
-    #[error(
-        "mel band {band} of {mels} holds no bin of a transform of {n_fft} samples: use fewer bands or a longer transform"
-    )]
     EmptyMelBand {
         /// Index of the first such band.
         band: usize,
@@ -27,7 +19,6 @@ pub enum Error {
         n_fft: usize,
     },
     /// A buffer whose length is not what the transform writes or reads.
-    #[error("{what} has {found} values; {expected} are needed")]
     BufferLength {
         /// Which buffer.
         what: &'static str,
@@ -38,14 +29,25 @@ pub enum Error {
     },
 }
 
-/// Checks that a setting is finite and within `low..=high`.
-pub(crate) fn check_range(
-    field: &'static str,
-    value: f64,
-    low: f64,
-    high: f64,
-    range: &'static str,
-) -> Result<(), Error> {
-    // Written so that NaN fails.
-    if value >= low && value <= high { Ok(()) } else { Err(Error::OutOfRange { field, value, range }) }
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::OutOfRange(error) => error.fmt(f),
+            Self::EmptyMelBand { band, mels, n_fft } => write!(
+                f,
+                "mel band {band} of {mels} holds no bin of a transform of {n_fft} samples: use fewer bands or a longer transform"
+            ),
+            Self::BufferLength { what, expected, found } => {
+                write!(f, "{what} has {found} values; {expected} are needed")
+            }
+        }
+    }
 }
+
+impl From<OutOfRange> for Error {
+    fn from(error: OutOfRange) -> Self {
+        Self::OutOfRange(error)
+    }
+}
+
+impl std::error::Error for Error {}

@@ -1,16 +1,21 @@
 //! Short-time Fourier transform and log-mel spectrograms, planned once and run many times.
 //!
 //! The first stage of the line from speech to a room: samples go in, the features that an estimator listens to come out.
-//! [`LogMel`] implements [`sabine_acoustics::FeatureExtractor`]; so does [`NaiveLogMel`], the definition written out, which is
+//! [`LogMel`] implements [`crate::FeatureExtractor`]; so does [`NaiveLogMel`], the definition written out, which is
 //! there to be compared with.
 //!
 //! It does **not** read files, resample, pad, or remove mean and standard deviation: those belong to the estimator, which
 //! knows the training set.
 //!
+//! ```toml
+//! [dependencies]
+//! sabine-features = "0.1"
+//! ```
+//!
 //! # Example
 //!
 //! ```
-//! use sabine_acoustics::FeatureExtractor;
+//! use sabine_features::FeatureExtractor;
 //! use sabine_features::{LogMel, LogMelConfig};
 //!
 //! let log_mel = LogMel::new(LogMelConfig::default())?;
@@ -29,7 +34,7 @@
 //!
 //! | for | use |
 //! |---|---|
-//! | features of a recording | [`LogMel::extract`](sabine_acoustics::FeatureExtractor::extract), or [`LogMel::extract_into`] without allocation |
+//! | features of a recording | [`LogMel::extract`](crate::FeatureExtractor::extract), or [`LogMel::extract_into`] without allocation |
 //! | features of live input, hop by hop | [`LogMelStream`] |
 //! | spectra and back again | [`Stft::forward`], [`Stft::inverse`] |
 //!
@@ -44,8 +49,8 @@
 //!
 //! Within 1e-4 dB of librosa 0.11 (`melspectrogram(center=False, htk=False, norm="slaney")`, `power_to_db(top_db=None)`),
 //! computed in double precision, on noise, tones, clicks, a sweep 100 dB deep and speech-like pulses: test
-//! `tests/librosa.rs`, generator beside its golden files. Within 1e-4 dB of the definition on arbitrary input: test
-//! `tests/definition.rs`.
+//! `tests/it/librosa.rs`, generator beside its golden files. Within 1e-4 dB of the definition on arbitrary input: test
+//! `tests/it/definition.rs`.
 //!
 //! # References
 //!
@@ -56,6 +61,7 @@
 //!   inverse.
 
 mod error;
+mod feature_extractor;
 mod log_mel;
 mod mel;
 mod naive;
@@ -63,6 +69,7 @@ mod stft;
 mod stream;
 
 pub use error::Error;
+pub use feature_extractor::FeatureExtractor;
 pub use log_mel::{LogMel, LogMelConfig, LogMelScratch};
 pub use mel::{MelBands, hz_to_mel, mel_to_hz};
 pub use naive::NaiveLogMel;

@@ -1,11 +1,11 @@
 //! The log-mel spectrogram.
 
-use crate::error::check_range;
+use crate::feature_extractor::FeatureExtractor;
 use crate::mel::LANES;
 use crate::stft::{Stft, StftScratch, check_length};
 use crate::{Error, LogMelStream, MelBands};
 use ndarray::Array2;
-use sabine_acoustics::FeatureExtractor;
+use sabine_acoustics::OutOfRange;
 
 /// Settings of a log-mel spectrogram. The default is that of Tang et al. 2020, section 3.4: four seconds give 32 x 499.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,17 +44,17 @@ impl LogMelConfig {
     /// Checks each setting.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let rate = f64::from(self.sample_rate_hz);
-        check_range("sample_rate_hz", rate, 1e3, 768e3, "between 1 kHz and 768 kHz")?;
-        check_range("mels", self.mels as f64, 1.0, 4096.0, "between 1 and 4096")?;
-        check_range(
+        OutOfRange::check("sample_rate_hz", rate, 1e3, 768e3, "between 1 kHz and 768 kHz")?;
+        OutOfRange::check("mels", self.mels as f64, 1.0, 4096.0, "between 1 and 4096")?;
+        OutOfRange::check(
             "high_hz",
             self.high_hz,
             f64::MIN_POSITIVE,
             rate / 2.0,
             "above 0, at most half the sample rate",
         )?;
-        check_range("low_hz", self.low_hz, 0.0, self.high_hz.next_down(), "from 0 to below high_hz")?;
-        check_range("floor_power", self.floor_power, 1e-30, 1.0, "between 1e-30 and 1")
+        OutOfRange::check("low_hz", self.low_hz, 0.0, self.high_hz.next_down(), "from 0 to below high_hz")?;
+        Ok(OutOfRange::check("floor_power", self.floor_power, 1e-30, 1.0, "between 1e-30 and 1")?)
     }
 }
 
@@ -65,7 +65,7 @@ impl LogMelConfig {
 ///
 /// ```
 /// use sabine_features::{LogMel, LogMelConfig};
-/// use sabine_acoustics::FeatureExtractor;
+/// use sabine_features::FeatureExtractor;
 /// let log_mel = LogMel::new(LogMelConfig::default())?;
 /// let silence = log_mel.extract(&vec![0.0; 64_000]);
 /// assert_eq!(silence.dim(), (32, 499));

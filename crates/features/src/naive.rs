@@ -1,8 +1,9 @@
 //! The log-mel spectrogram by definition, to hold the fast one against.
 
+use crate::feature_extractor::FeatureExtractor;
 use crate::{Error, LogMelConfig};
 use ndarray::Array2;
-use sabine_acoustics::FeatureExtractor;
+use sabine_acoustics::OutOfRange;
 use std::f64::consts::{PI, TAU};
 
 /// Log-mel spectrogram by the definition: a discrete Fourier sum for each bin, dense triangles, double precision.
@@ -23,11 +24,11 @@ impl NaiveLogMel {
         config.check()?;
         if config.n_fft < 2 {
             let (field, range) = ("n_fft", "at least 2");
-            return Err(Error::OutOfRange { field, value: config.n_fft as f64, range });
+            return Err(OutOfRange { field, value: config.n_fft as f64, range }.into());
         }
         if config.hop == 0 || config.hop > config.n_fft {
             let (field, range) = ("hop", "between 1 and n_fft");
-            return Err(Error::OutOfRange { field, value: config.hop as f64, range });
+            return Err(OutOfRange { field, value: config.hop as f64, range }.into());
         }
         Ok(Self { config })
     }

@@ -1,10 +1,10 @@
 //! Short-time Fourier transform and its inverse.
 
 use crate::Error;
-use crate::error::check_range;
 use ndarray::{Array2, ArrayView2};
 use realfft::num_complex::Complex;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use sabine_acoustics::OutOfRange;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -66,8 +66,8 @@ impl Stft {
     /// # Errors
     /// [`Error::OutOfRange`] outside these ranges.
     pub fn new(n_fft: usize, hop: usize) -> Result<Self, Error> {
-        check_range("n_fft", n_fft as f64, 2.0, MAX_N_FFT as f64, "between 2 and 2^20")?;
-        check_range("hop", hop as f64, 1.0, n_fft as f64, "between 1 and n_fft")?;
+        OutOfRange::check("n_fft", n_fft as f64, 2.0, MAX_N_FFT as f64, "between 2 and 2^20")?;
+        OutOfRange::check("hop", hop as f64, 1.0, n_fft as f64, "between 1 and n_fft")?;
         let mut planner = RealFftPlanner::new();
         Ok(Self {
             window: hann_periodic(n_fft),

@@ -3,13 +3,13 @@
 // A bench that cannot be set up should fail; criterion's macro writes a function without documentation.
 #![allow(clippy::unwrap_used, missing_docs)]
 
-#[path = "../tests/ergodic/mod.rs"]
+#[path = "../tests/it/ergodic/mod.rs"]
 mod ergodic;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use ergodic::Ergodic;
 use sabine_acoustics::{Air, Bands, Estimate, Material, PerBand};
-use sabine_optimize::{AbsorptionPrior, FitConfig, MaterialFitter, SlopeObjective};
+use sabine_optimize::{AbsorptionPrior, FitConfig, FitProblem, MaterialFitter, SlopeObjective};
 
 fn fits(criterion: &mut Criterion) {
     let octaves = Bands::SIMULATION;
@@ -27,7 +27,14 @@ fn fits(criterion: &mut Criterion) {
             let fitter = MaterialFitter::new(FitConfig { objective, ..FitConfig::default() }).unwrap();
             group.bench_function(BenchmarkId::new(format!("{objective:?}"), rays), |bencher| {
                 bencher.iter(|| {
-                    fitter.fit_t60(&[&paths], &materials, &priors, &Air::default(), &targets, &()).unwrap()
+                    fitter
+                        .fit_t60(
+                            &[&paths],
+                            &FitProblem::new(&materials, &priors, &Air::default()),
+                            &targets,
+                            &(),
+                        )
+                        .unwrap()
                 });
             });
         }

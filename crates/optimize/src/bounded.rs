@@ -1,10 +1,10 @@
 //! L-BFGS-B on any objective.
 
 use crate::Error;
+use crate::objective::Objective;
 use basin::{
     BoxBounds, ConstraintDescription, ConstraintSet, Executor, FirstOrderState, Lbfgsb, Termination,
 };
-use sabine_acoustics::Objective;
 use std::convert::Infallible;
 
 /// Why a minimisation stopped.
@@ -46,7 +46,7 @@ impl Minimum {
 /// Minimises an objective within bounds by L-BFGS-B (Zhu et al. 1997, version 3.0) from `start`, which is moved inside them.
 ///
 /// ```
-/// use sabine_acoustics::Objective;
+/// use sabine_optimize::Objective;
 /// struct Parabola;
 /// impl Objective for Parabola {
 ///     fn dimension(&self) -> usize { 1 }

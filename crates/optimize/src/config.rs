@@ -1,7 +1,8 @@
 //! Settings of a fit and what is known of the materials beforehand.
 
 use crate::Error;
-use sabine_acoustics::{Bands, MaterialPrior, MeasuredRoom, NamedMaterial, PerBand};
+use sabine_acoustics::{Bands, PerBand};
+use sabine_scene::{MaterialPrior, MeasuredRoom, NamedMaterial};
 
 /// Which slope of the simulated decay is made to meet the target.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,12 +30,13 @@ impl AbsorptionPrior {
     /// that lie in it, or else the nearest one's value, means and standard deviations alike.
     ///
     /// ```
-    /// use sabine_acoustics::{Bands, MeasuredRoom};
+    /// use sabine_acoustics::Bands;
+    /// use sabine_scene::MeasuredRoom;
     /// # let fixture = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/room");
     /// let room = MeasuredRoom::read(fixture)?;
     /// let priors = sabine_optimize::AbsorptionPrior::of_room(&room, Bands::T60);
     /// assert_eq!(priors.len(), room.scene().materials().len());
-    /// # Ok::<(), sabine_acoustics::Error>(())
+    /// # Ok::<(), sabine_scene::Error>(())
     /// ```
     pub fn of_room(room: &MeasuredRoom, bands: Bands) -> Vec<Self> {
         let of = |(named, prior): (&NamedMaterial, &MaterialPrior)| Self {

@@ -1,6 +1,7 @@
 //! What a fit found, and what it could not.
 
-use sabine_acoustics::{Material, MaterialTable, Materials, PerBand, Reading};
+use sabine_acoustics::{Material, PerBand, Reading};
+use sabine_scene::{MaterialTable, Materials};
 use std::fmt;
 
 /// Fitted materials and everything that must be said about them.
@@ -269,10 +270,10 @@ impl MaterialFit {
     ///
     /// # Errors
     /// [`sabine_acoustics::Error::MaterialCount`] for another number of names; else as [`Materials::new`].
-    pub fn tables(&self, names: &[&str]) -> Result<Materials, sabine_acoustics::Error> {
+    pub fn tables(&self, names: &[&str]) -> Result<Materials, sabine_scene::Error> {
         let (expected, found) = (self.materials.len(), names.len());
         if expected != found {
-            return Err(sabine_acoustics::Error::MaterialCount { expected, found });
+            return Err(sabine_acoustics::Error::MaterialCount { expected, found }.into());
         }
         let table = |((name, material), error): ((&&str, &Material), &PerBand<f64>)| {
             MaterialTable::new(*name, material, &error.map(|sd| sd.min(1.0)))

@@ -3,6 +3,7 @@
 use crate::assembly::FoundBand;
 use crate::decay_slope::DecaySlope;
 use crate::fit::{MaterialFit, Unreachable, UnreachableReason, Warning, at_bound};
+use crate::fit_problem::FitProblem;
 use crate::group::{Band, Fitted, Group};
 use crate::history::{History, Trace, by_pair, check_paths};
 use crate::single_paths::SinglePathSlope;
@@ -10,7 +11,8 @@ use crate::uncertainty::Spread;
 use crate::unknowns::BandPrior;
 use crate::{AbsorptionPrior, Error, FitConfig, SlopeObjective};
 use rayon::prelude::*;
-use sabine_acoustics::{Air, Bands, Estimate, Material, Observer, PathSet, PerBand, report};
+use sabine_acoustics::{Air, Bands, Estimate, Material, Observer, PerBand, report};
+use sabine_paths::PathSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Shortest and longest T60 that is accepted as a target, in seconds: a studio's booth and a mausoleum.
@@ -53,16 +55,14 @@ impl MaterialFitter {
     /// # Errors
     /// For paths, materials, priors or targets that do not match or are out of range, paths too short for a target, [`Error::NotConverged`] if the fit converges in none of the bands, and
     /// [`sabine_acoustics::Error::Cancelled`] if the observer asks to stop. A target that cannot be reached is no error.
-    #[allow(clippy::too_many_arguments)] // each is a different thing that only the caller has
     pub fn fit_t60(
         &self,
         paths: &[&PathSet],
-        materials: &[Material],
-        priors: &[AbsorptionPrior],
-        air: &Air,
+        problem: &FitProblem<'_>,
         target_t60_s: &PerBand<Estimate>,
         observer: &dyn Observer,
     ) -> Result<MaterialFit, Error> {
+        let FitProblem { materials, priors, air } = *problem;
         let traces: Vec<Trace<'_>> =
             paths.iter().enumerate().map(|(pair, paths)| Trace { pair, paths, share: 1.0 }).collect();
         self.fit_traces(&traces, materials, priors, air, target_t60_s, observer)

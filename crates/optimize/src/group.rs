@@ -5,12 +5,13 @@ use crate::decay_slope::DecaySlope;
 use crate::expansion::Expansion;
 use crate::fit::Unconverged;
 use crate::history::History;
+use crate::objective::Objective;
 use crate::single_paths::SinglePathSlope;
 use crate::slope_model::SlopeModel;
 use crate::unknowns::{BandPrior, Unknowns};
 use crate::{Error, FitConfig};
 use rayon::prelude::*;
-use sabine_acoustics::{Objective, Reading};
+use sabine_acoustics::Reading;
 
 /// Everything about one band: its slopes, its target, and its materials' priors.
 pub(crate) struct Band<'a> {

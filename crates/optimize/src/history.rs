@@ -1,7 +1,8 @@
 //! Paths between one source and one receiver, sorted by time for fast evaluation.
 
 use crate::Error;
-use sabine_acoustics::{Air, Material, PathSet, PerBand};
+use sabine_acoustics::{Air, Material, PerBand};
+use sabine_paths::PathSet;
 
 /// What the energy of each path depends on: when it comes and how often it met each material. Shared by all bands.
 pub(crate) struct History {

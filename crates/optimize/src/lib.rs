@@ -2,7 +2,7 @@
 //!
 //! # Where it stands
 //!
-//! A tracer hands over a [`PathSet`](sabine_acoustics::PathSet): every path with its length and the materials it met, free of
+//! A tracer hands over a [`PathSet`](sabine_paths::PathSet): every path with its length and the materials it met, free of
 //! absorption. This crate finds the absorption with which the energy of these paths decays as it should, **without
 //! tracing again**. It knows nothing of geometry, of speech or of pressure responses.
 //!
@@ -14,10 +14,17 @@
 //! - trace. [`MaterialFitter::fit_t60_retracing`] asks a closure for more paths until T60 is sure, and holds the fit against
 //!   paths that it has not seen.
 //!
+//! ```toml
+//! [dependencies]
+//! sabine-optimize = "0.1"
+//! ```
+//!
 //! # Example
 //!
 //! ```
 //! use sabine_acoustics::*;
+//! use sabine_paths::*;
+//! use sabine_scene::*;
 //! use sabine_optimize::*;
 //! // A room in which a ray meets a wall every 3 m: thirty batches of rays, 1 s long.
 //! let mut paths = PathSet::new(1, 343.2);
@@ -37,7 +44,7 @@
 //! let prior = AbsorptionPrior::uniform(octaves, 0.1, 0.1);
 //! let target_s = PerBand::uniform(Bands::T60, Estimate::exact(0.5));
 //! let fit = MaterialFitter::new(FitConfig::default())?
-//!     .fit_t60(&[&paths], &[wall], &[prior], &Air::default(), &target_s, &())?;
+//!     .fit_t60(&[&paths], &FitProblem::new(&[wall], &[prior], &Air::default()), &target_s, &())?;
 //!
 //! // Eyring at 1 kHz: 60 dB in 0.5 s are 120 dB/s, less 1.6 in the air; 114.4 reflections a second.
 //! let eyring = 1.0 - 10f64.powf(-(120.0 - 1.6) / 114.4 / 10.0);
@@ -70,21 +77,21 @@
 //!
 //! | claim | test |
 //! |---|---|
-//! | gradients equal central differences to 1e-6, inside and near the bounds | `tests/gradient.rs` |
-//! | argmin's L-BFGS in logit variables reaches the optimum of L-BFGS-B | `tests/gradient.rs` |
-//! | reachable targets are met within 0.5 %, and Eyring's formula agrees within 0.2 % and the Monte-Carlo error | `tests/fit_t60.rs` |
-//! | one material: mean absolute error of absorption below 0.0013 from another seed | `tests/fit_t60.rs` |
-//! | of all materials that meet the target, the most probable | `tests/fit_t60.rs` |
-//! | standard errors cover: standardised errors have mean square 1 | `tests/fit_t60.rs` |
-//! | one material from the T60 of another tracer: absorption within 0.0013 | `tests/other_tracers.rs` |
+//! | gradients equal central differences to 1e-6, inside and near the bounds | `tests/it/gradient.rs` |
+//! | argmin's L-BFGS in logit variables reaches the optimum of L-BFGS-B | `tests/it/gradient.rs` |
+//! | reachable targets are met within 0.5 %, and Eyring's formula agrees within 0.2 % and the Monte-Carlo error | `tests/it/fit_t60.rs` |
+//! | one material: mean absolute error of absorption below 0.0013 from another seed | `tests/it/fit_t60.rs` |
+//! | of all materials that meet the target, the most probable | `tests/it/fit_t60.rs` |
+//! | standard errors cover: standardised errors have mean square 1 | `tests/it/fit_t60.rs` |
+//! | one material from the T60 of another tracer: absorption within 0.0013 | `tests/it/other_tracers.rs` |
 //! | responses: the optimum of a compass search over plain sums of all paths, smooth or not | tests of `response_solver` |
-//! | three materials from two responses: intervals cover, and what is open is named | `tests/other_tracers.rs` |
-//! | six from twelve: mean absolute error below 0.02 from 2 kHz on, where the Cramer-Rao bound allows it | `tests/twelve_pairs.rs` |
-//! | a first step to where the cost is infinite is shortened, and T30 of a two-room flat met within 6 % | tests of `response_solver`, `tests/two_room_flat.rs` |
-//! | weights that follow the materials come to rest, for eight seeds of eight | `tests/swinging_weights.rs` |
+//! | three materials from two responses: intervals cover, and what is open is named | `tests/it/other_tracers.rs` |
+//! | six from twelve: mean absolute error below 0.02 from 2 kHz on, where the Cramer-Rao bound allows it | `tests/it/twelve_pairs.rs` |
+//! | a first step to where the cost is infinite is shortened, and T30 of a two-room flat met within 6 % | tests of `response_solver`, `tests/it/two_room_flat.rs` |
+//! | weights that follow the materials come to rest, for eight seeds of eight | `tests/it/swinging_weights.rs` |
 //! | what has not converged is an error or a warning, never a result | tests of `bounded` and `assembly` |
-//! | arrivals that are off by a millisecond are allowed for where that is said | `tests/other_tracers.rs` |
-//! | rays are added until T60 is as sure as asked for | `tests/retracing.rs` |
+//! | arrivals that are off by a millisecond are allowed for where that is said | `tests/it/other_tracers.rs` |
+//! | rays are added until T60 is as sure as asked for | `tests/it/retracing.rs` |
 //!
 //! `docs/validation/optimize.md` has rooms, targets from 0.2 to 2.5 s, and measured responses.
 //!
@@ -109,6 +116,7 @@ mod decay_slope;
 mod error;
 mod expansion;
 mod fit;
+mod fit_problem;
 mod fitter;
 mod group;
 mod history;
@@ -125,6 +133,7 @@ mod responses;
 mod retrace;
 mod scale;
 mod single_paths;
+mod slope_evaluation;
 mod slope_model;
 mod uncertainty;
 mod unknowns;
@@ -137,11 +146,13 @@ pub use fit::{
     AtBound, MaterialFit, Unconverged, Undetermined, UndeterminedKind, Unreachable, UnreachableReason,
     Warning,
 };
+pub use fit_problem::FitProblem;
 pub use fitter::MaterialFitter;
 pub use measured_decay::MeasuredDecay;
 pub use misfit::DecayMisfit;
-pub use objective::SlopeEvaluation;
+pub use objective::Objective;
 pub use prediction::{PredictedChange, RoomPrediction};
 pub use responses::{MeasuredPair, ResponseFit};
 pub use retrace::{NotVerified, Retrace, RetraceConfig, RetracedFit};
+pub use slope_evaluation::SlopeEvaluation;
 pub use variables::{ForArgmin, Logit, RegularisedSlope};

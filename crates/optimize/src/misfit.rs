@@ -3,7 +3,9 @@
 use crate::history::{History, check_paths};
 use crate::responses::latencies_s;
 use crate::{Error, MeasuredPair};
-use sabine_acoustics::{Air, EnergyDecayCurve, Material, NoReading, PerBand, Reading, TimeZero};
+use sabine_acoustics::{Air, EnergyDecayCurve, Material, NoReading, PerBand, Reading};
+use sabine_paths::Conditions;
+use sabine_scene::TimeZero;
 
 /// Levels below this, re the start, are not compared, in dB: T30 ends there.
 const LOWEST_DB: f64 = -35.0;
@@ -43,7 +45,7 @@ impl DecayMisfit {
         }
         let history = History::new(pair.paths, air, BIN_S);
         let latency_s = latencies_s(&[pair], std::slice::from_ref(&history), time_zero)[0];
-        let energy = pair.paths.energy_response(materials, air, BIN_S)?;
+        let energy = pair.paths.energy_response(&Conditions::new(materials, air), BIN_S)?;
         let simulated_t30_s = PerBand::from_fn(bands, |b| {
             let t30 = energy.decay_curve(b).decay_time_s(-5.0, -35.0)?;
             Ok(sabine_acoustics::Estimate::exact(t30))

@@ -6,13 +6,14 @@ use crate::expansion::Bins;
 use crate::history::{History, variance_of_sum};
 use crate::history::{Trace, Traces, by_pair, check_paths};
 use rayon::prelude::*;
-use sabine_acoustics::{Air, EnergyDecayCurve, Estimate, Material, NoReading, PathSet, PerBand, Reading};
+use sabine_acoustics::{Air, EnergyDecayCurve, Estimate, Material, NoReading, PerBand, Reading};
+use sabine_paths::PathSet;
 
 /// Early sound ends this long after the direct sound, in seconds (ISO 3382-1, A.2.3: speech).
 const EARLY_S: f64 = 0.05;
 
 /// One side of a [`PredictedChange`], or the difference of both; standard errors are those of the paths (Monte Carlo). For a single
-/// set of materials `sabine_acoustics::PathParameters` reads more.
+/// set of materials `sabine_paths::PathParameters` reads more.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RoomPrediction {
     /// Reverberation time over -5 to -35 dB of the decay curve, in seconds.

@@ -5,7 +5,8 @@ use crate::history::{History, Traces};
 use crate::measured_decay::BinnedDecay;
 use crate::pulse::Pulse;
 use crate::unknowns::BandPrior;
-use sabine_acoustics::{Levels, PathSet};
+use sabine_paths::PathSet;
+use sabine_scene::Levels;
 
 /// Points at which a bin of the paths is held against the edges of the measured ones.
 const POINTS: usize = 8;

@@ -3,7 +3,7 @@
 use crate::expansion::Bins;
 use crate::history::variance_of_sum;
 use crate::response_band::{Arrival, BandResponse, ResponseBand, Window};
-use sabine_acoustics::Levels;
+use sabine_scene::Levels;
 
 /// A measured bin and what the paths give for it near an absorption.
 #[derive(Clone)]

@@ -2,12 +2,12 @@
 
 use crate::bounded::minimise;
 use crate::fit::Unconverged;
+use crate::objective::Objective;
 use crate::response_band::{BandResponse, ResponseBand, Window};
 use crate::response_expansion::ResponseExpansion;
 use crate::uncertainty::Spread;
 use crate::unknowns::Unknowns;
 use crate::{Error, FitConfig};
-use sabine_acoustics::Objective;
 
 /// Most times that the bins are weighed anew.
 const WEIGHINGS: usize = 40;

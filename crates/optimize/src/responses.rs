@@ -2,14 +2,17 @@
 
 use crate::assembly::FoundBand;
 use crate::fit::Warning;
+use crate::fit_problem::FitProblem;
 use crate::history::{History, Trace, check_paths};
 use crate::measured_decay::MeasuredDecay;
 use crate::prediction::t60_of_traces;
 use crate::response_band::ResponseBand;
 use crate::response_solver::{Solved, solve_where_explained};
-use crate::{AbsorptionPrior, Error, MaterialFit, MaterialFitter};
+use crate::{Error, MaterialFit, MaterialFitter};
 use rayon::prelude::*;
-use sabine_acoustics::{Air, Material, Measurement, NoReading, Observer, PathSet, PerBand, TimeZero, report};
+use sabine_acoustics::{NoReading, Observer, PerBand, report};
+use sabine_paths::PathSet;
+use sabine_scene::{Measurement, TimeZero};
 
 /// A measured response and the paths between its source and its receiver.
 #[derive(Clone, Copy, Debug)]
@@ -58,11 +61,10 @@ impl MaterialFitter {
         &self,
         pairs: &[MeasuredPair<'_>],
         measurement: Measurement,
-        materials: &[Material],
-        priors: &[AbsorptionPrior],
-        air: &Air,
+        problem: &FitProblem<'_>,
         observer: &dyn Observer,
     ) -> Result<ResponseFit, Error> {
+        let FitProblem { materials, priors, air } = *problem;
         let paths: Vec<&PathSet> = pairs.iter().map(|p| p.paths).collect();
         check_paths(&paths, materials)?;
         self.check_priors(materials, priors)?;

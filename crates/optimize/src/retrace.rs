@@ -1,9 +1,11 @@
 //! The fit on one set of rays, held against other rays.
 
+use crate::fit_problem::FitProblem;
 use crate::history::{Trace, check_paths};
 use crate::prediction::t60_of_traces;
-use crate::{AbsorptionPrior, Error, MaterialFit, MaterialFitter, Unreachable, UnreachableReason};
-use sabine_acoustics::{Air, Bands, Estimate, Material, Observer, PathSet, PerBand, Reading, report};
+use crate::{Error, MaterialFit, MaterialFitter, Unreachable, UnreachableReason};
+use sabine_acoustics::{Air, Bands, Estimate, Material, Observer, PerBand, Reading, report};
+use sabine_paths::PathSet;
 use std::time::Instant;
 
 /// What traces a room again, with other random numbers and as many rays as are asked for.
@@ -11,7 +13,8 @@ use std::time::Instant;
 /// Any closure of two arguments does; implement the trait to say as well how reverberation is read in the end.
 ///
 /// ```
-/// use sabine_acoustics::{Error, PathSet};
+/// use sabine_acoustics::Error;
+/// use sabine_paths::PathSet;
 /// use sabine_optimize::Retrace;
 /// fn takes(room: &dyn Retrace) -> Result<usize, Error> {
 ///     Ok(room.trace(7, 2.0)?.len())
@@ -161,17 +164,15 @@ impl MaterialFitter {
     ///
     /// # Errors
     /// As [`MaterialFitter::fit_t60`], those of the tracer, and [`Error::Config`] for a setting out of range.
-    #[allow(clippy::too_many_arguments)] // each is a different thing that only the caller has
     pub fn fit_t60_retracing(
         &self,
         room: &dyn Retrace,
-        materials: &[Material],
-        priors: &[AbsorptionPrior],
-        air: &Air,
+        problem: &FitProblem<'_>,
         target_t60_s: &PerBand<Estimate>,
         config: &RetraceConfig,
         observer: &dyn Observer,
     ) -> Result<RetracedFit, Error> {
+        let FitProblem { materials, priors, air } = *problem;
         config.check()?;
         // Before anything is traced; how long the paths are is known only then.
         if let Some(material) = materials.first() {

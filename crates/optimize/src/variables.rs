@@ -1,7 +1,7 @@
 //! Objectives built from others: with a prior, in unbounded variables, and for argmin's solvers.
 
+use crate::objective::Objective;
 use crate::{Error, SlopeEvaluation};
-use sabine_acoustics::Objective;
 
 /// Half the squared deviations of absorption from a prior, in standard deviations, plus weight/2 (m/m' - 1)2: what the fit
 /// minimises in one band, as an objective for any solver. Variables are absorptions.
@@ -116,7 +116,7 @@ impl<O: Objective> Objective for Logit<O> {
 ///
 /// ```
 /// use argmin::core::{CostFunction, Gradient};
-/// use sabine_acoustics::Objective;
+/// use sabine_optimize::Objective;
 /// use sabine_optimize::ForArgmin;
 /// struct Parabola;
 /// impl Objective for Parabola {

@@ -6,7 +6,10 @@ mod rooms;
 
 use rooms::finely_meshed;
 use sabine_acoustics::*;
+use sabine_paths::Conditions;
+use sabine_paths::*;
 use sabine_propagate::*;
+use sabine_scene::*;
 use std::path::Path;
 use std::time::Instant;
 
@@ -19,7 +22,7 @@ const BAND: usize = 3;
 
 /// Energy that is left at each bin, in the octave that is looked at.
 fn remaining(paths: &PathSet, materials: &[Material]) -> Vec<f64> {
-    let response = paths.energy_response(materials, &Air::default(), BIN_S).unwrap();
+    let response = paths.energy_response(&Conditions::new(materials, &Air::default()), BIN_S).unwrap();
     let mut left: Vec<f64> = response.band(BAND).to_vec();
     for i in (1..left.len()).rev() {
         left[i - 1] += left[i];

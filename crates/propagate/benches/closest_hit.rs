@@ -8,8 +8,9 @@ use parry3d::math::Vector;
 use parry3d::query::{Ray, RayCast};
 use parry3d::shape::TriMesh;
 use rooms::{finely_meshed, furnished, rays};
-use sabine_acoustics::{RayScene, Scene};
+use sabine_paths::RayScene;
 use sabine_propagate::MeshScene;
+use sabine_scene::Scene;
 use std::hint::black_box;
 
 fn scenes() -> Vec<(String, Scene)> {

@@ -6,7 +6,10 @@ mod rooms;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use rooms::finely_meshed;
 use sabine_acoustics::*;
+use sabine_paths::Conditions;
+use sabine_paths::*;
 use sabine_propagate::*;
+use sabine_scene::*;
 
 /// Paths of the box until there are a million contributions, and what its walls are changed to.
 fn a_million() -> (PathSet, Vec<Material>) {
@@ -36,10 +39,10 @@ fn reweighting(criterion: &mut Criterion) {
         bencher.iter(|| paths.log_reflectance(&materials, 3).unwrap());
     });
     group.bench_function("energies, eight bands", |bencher| {
-        bencher.iter(|| paths.energies(&materials, &air).unwrap());
+        bencher.iter(|| paths.energies(&Conditions::new(&materials, &air)).unwrap());
     });
     group.bench_function("energy response in 1 ms, eight bands", |bencher| {
-        bencher.iter(|| paths.energy_response(&materials, &air, 1e-3).unwrap());
+        bencher.iter(|| paths.energy_response(&Conditions::new(&materials, &air), 1e-3).unwrap());
     });
     group.finish();
 }

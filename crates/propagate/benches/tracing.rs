@@ -6,7 +6,10 @@ mod rooms;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rooms::finely_meshed;
 use sabine_acoustics::*;
+use sabine_paths::Conditions;
+use sabine_paths::*;
 use sabine_propagate::*;
+use sabine_scene::*;
 
 fn traces(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("trace");
@@ -51,7 +54,7 @@ fn renders(criterion: &mut Criterion) {
     for statistics in [Statistics::Gaussian, Statistics::DecayMatched] {
         let renderer = PressureRenderer::new(RenderConfig { statistics, ..Default::default() }).unwrap();
         group.bench_function(BenchmarkId::from_parameter(format!("{statistics:?}")), |bencher| {
-            bencher.iter(|| renderer.render(&paths, &materials, &Air::default()).unwrap());
+            bencher.iter(|| renderer.render(&paths, &Conditions::new(&materials, &Air::default())).unwrap());
         });
     }
     group.finish();

@@ -1,10 +1,13 @@
 //! From paths to ambisonics.
 
-use crate::error::check_range;
+use crate::ambisonic_response::AmbisonicResponse;
+use crate::error::Error;
+use crate::render_config::RenderConfig;
+use crate::renderer::Ambisonics;
 use crate::rendering::Rendering;
-use crate::spherical_harmonics::MOST_ORDER;
-use crate::{AmbisonicResponse, Error, RenderConfig};
-use sabine_acoustics::{Conditions, Orientation, PathSet};
+use crate::spherical_harmonics::MAX_ORDER;
+use sabine_acoustics::{Orientation, OutOfRange};
+use sabine_paths::{Conditions, PathSet};
 
 /// Turns paths into an ambisonic response of first to third order (ACN, SN3D).
 ///
@@ -14,7 +17,8 @@ use sabine_acoustics::{Conditions, Orientation, PathSet};
 /// [`PressureRenderer`](crate::PressureRenderer) gives, to the same accuracy.
 ///
 /// ```
-/// use sabine_acoustics::{Air, Bands, Conditions, Contribution, Material, Orientation, PathSet};
+/// use sabine_acoustics::{Air, Bands, Material, Orientation};
+/// use sabine_paths::{Conditions, Contribution, PathSet};
 /// use sabine_propagate::{AmbisonicRenderer, RenderConfig};
 /// let mut paths = PathSet::new(1, 34.0);
 /// paths.push(Contribution {
@@ -45,7 +49,7 @@ impl AmbisonicRenderer {
     /// # Errors
     /// [`Error::OutOfRange`] for an order or a setting outside its range.
     pub fn new(order: usize, config: RenderConfig) -> Result<Self, Error> {
-        check_range("ambisonic order", order as f64, 1.0, MOST_ORDER as f64, "1, 2 or 3")?;
+        OutOfRange::check("ambisonic order", order as f64, 1.0, MAX_ORDER as f64, "1, 2 or 3")?;
         config.check()?;
         Ok(Self { order, config })
     }
@@ -63,14 +67,15 @@ impl AmbisonicRenderer {
     /// The response for a listener who faces so. A directivity of the receiver, if the conditions hold one, weighs the arrivals.
     ///
     /// # Errors
-    /// As [`PressureRenderer::render_under`](crate::PressureRenderer::render_under).
+    /// As [`PressureRenderer::render`](crate::PressureRenderer::render).
     pub fn render(
         &self,
         paths: &PathSet,
         conditions: &Conditions,
         facing: Orientation,
     ) -> Result<AmbisonicResponse, Error> {
-        let rendering = Rendering::new(&self.config, paths, conditions, self.order, facing)?;
+        let encoder = Ambisonics::new(self.order)?;
+        let rendering = Rendering::new(&self.config, paths, conditions, &encoder, facing)?;
         AmbisonicResponse::new(rendering.response(&self.config), self.config.sample_rate_hz)
     }
 }

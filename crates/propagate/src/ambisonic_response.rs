@@ -2,9 +2,10 @@
 
 use crate::Error;
 use crate::direction_cells::DirectionCells;
-use crate::error::check_range;
-use crate::spherical_harmonics::{MOST_CHANNELS, MOST_ORDER, harmonics};
-use sabine_acoustics::{ImpulseResponse, Orientation, SampleFormat, encode_wav_channels, write_wav_channels};
+use crate::spherical_harmonics::{MAX_CHANNELS, MAX_ORDER, harmonics};
+use sabine_acoustics::{
+    ImpulseResponse, Orientation, OutOfRange, SampleFormat, encode_wav_channels, write_wav_channels,
+};
 use std::path::Path;
 
 /// Pressure and its directional parts at a listener: ambisonics of order 1 to 3 in the channel order ACN with the
@@ -24,9 +25,9 @@ impl AmbisonicResponse {
     /// or hold samples that are not finite, or for a sample rate outside 1 kHz to 768 kHz.
     pub fn new(channels: Vec<Vec<f32>>, sample_rate_hz: u32) -> Result<Self, Error> {
         let count = channels.len();
-        let known = (1..=MOST_ORDER).any(|order| (order + 1) * (order + 1) == count);
+        let known = (1..=MAX_ORDER).any(|order| (order + 1) * (order + 1) == count);
         let value = if known { count as f64 } else { f64::NAN };
-        check_range("number of channels", value, 4.0, MOST_CHANNELS as f64, "4, 9 or 16")?;
+        OutOfRange::check("number of channels", value, 4.0, MAX_CHANNELS as f64, "4, 9 or 16")?;
         let expected = channels[0].len();
         for channel in &channels {
             if channel.len() != expected {
@@ -63,7 +64,7 @@ impl AmbisonicResponse {
     /// The sound field as a listener hears it who is turned so from the listener of this response.
     #[must_use]
     pub fn rotated(&self, facing: &Orientation) -> Self {
-        let design = DirectionCells::for_order(MOST_ORDER);
+        let design = DirectionCells::for_order(MAX_ORDER);
         let pairs: Vec<_> = design
             .centres()
             .iter()
@@ -137,8 +138,8 @@ mod tests {
             AmbisonicResponse::new(lengths.iter().map(|&n| vec![0.0; n]).collect(), 48_000)
         };
         assert_eq!(of(&[5; 9]).unwrap().order(), 2);
-        assert!(matches!(of(&[5; 5]), Err(Error::OutOfRange { .. })));
-        assert!(matches!(of(&[]), Err(Error::OutOfRange { .. })));
+        assert!(matches!(of(&[5; 5]), Err(Error::OutOfRange(_))));
+        assert!(matches!(of(&[]), Err(Error::OutOfRange(_))));
         assert!(matches!(of(&[5, 5, 4, 5]), Err(Error::Acoustics(_))));
         assert!(matches!(of(&[0; 4]), Err(Error::Acoustics(_))));
     }

@@ -2,7 +2,8 @@
 
 use crate::Error;
 use crate::surfaces::Surfaces;
-use sabine_acoustics::{RayHit, RayScene, Scene};
+use sabine_paths::{RayHit, RayScene};
+use sabine_scene::Scene;
 
 /// The mesh of a [`Scene`] without any acceleration, in double precision: slow, and right. It checks [`MeshScene`] and
 /// carries [`ReferenceTracer`].

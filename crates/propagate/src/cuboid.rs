@@ -4,7 +4,8 @@ use crate::random::generator;
 use crate::surfaces::Surfaces;
 use crate::vector::{Vec3, dot, scale};
 use rand::Rng;
-use sabine_acoustics::{Contribution, Incidence, NamedMaterial, PathSet, Reflection};
+use sabine_paths::{Contribution, Incidence, PathSet, Reflection};
+use sabine_scene::NamedMaterial;
 use std::collections::HashMap;
 
 /// Two directions are parallel or at right angles if the sine or cosine between them is below this.
@@ -228,7 +229,9 @@ mod tests {
     #![allow(clippy::unwrap_used)] // a panic is how a test fails
     use super::*;
     use crate::vector::sub;
-    use sabine_acoustics::{Air, Bands, Material, Scene};
+    use sabine_acoustics::{Air, Bands, Material};
+    use sabine_paths::Conditions;
+    use sabine_scene::Scene;
 
     fn bands() -> Bands {
         Bands::octaves(1000.0, 1000.0).unwrap()
@@ -255,7 +258,8 @@ mod tests {
             let mut paths = PathSet::new(6, 60.0);
             cuboid.add_paths(&mut paths, turned[0], turned[1], 5000, scene.materials(), 1);
             let materials: Vec<Material> = scene.materials().iter().map(|m| m.material.clone()).collect();
-            let mut all: Vec<f32> = paths.energies(&materials, &Air::default()).unwrap().remove(0);
+            let mut all: Vec<f32> =
+                paths.energies(&Conditions::new(&materials, &Air::default())).unwrap().remove(0);
             all.sort_by(f32::total_cmp);
             all
         };
@@ -307,7 +311,7 @@ mod tests {
             let mut paths = PathSet::new(6, 120.0);
             cuboid.add_paths(&mut paths, [1.0, 2.0, 1.2], [2.5, 3.5, 1.7], most, scene.materials(), seed);
             assert!(paths.len() < 2 * most);
-            let energies = paths.energies(&materials, &Air::default()).unwrap().remove(0);
+            let energies = paths.energies(&Conditions::new(&materials, &Air::default())).unwrap().remove(0);
             let mut sums = vec![0.0; 8];
             for (e, length) in energies.iter().zip(paths.lengths_m()) {
                 sums[(length / 15.001) as usize] += f64::from(*e);

@@ -4,7 +4,7 @@ use crate::image_sources::validated;
 use crate::mesh_scene::MeshScene;
 use crate::vector::{Vec3, along, mirror, norm, sub};
 use crate::walk::before_hit;
-use sabine_acoustics::{PathSet, RayScene};
+use sabine_paths::{PathSet, RayScene};
 use std::collections::BTreeMap;
 
 /// Frames for which a sequence of planes that carries no path is remembered.

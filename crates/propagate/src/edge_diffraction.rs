@@ -5,7 +5,8 @@ use crate::mesh_scene::MeshScene;
 use crate::vector::{Vec3, along, norm, scale, sub};
 use crate::walk::visible;
 use rayon::prelude::*;
-use sabine_acoustics::{EdgeDiffraction, EdgePoint, PathSet, Scene};
+use sabine_paths::{EdgeDiffraction, EdgePoint, PathSet};
+use sabine_scene::Scene;
 
 /// The legs of a path end this far beside the edge (m), clear of its faces. A slit narrower than this, as between a screen and a
 /// wall that it should touch, is closed.
@@ -40,10 +41,12 @@ const SIGHT_END_M: f64 = 1e-3;
 ///
 /// # Cost
 /// Finding the 3,748 edges of the 5,160 triangles of BRAS CR4 takes 26 ms; the paths over them between two points at most 10 ms
-/// on two cores (100 random pairs, `tests/diffraction.rs`).
+/// on two cores (100 random pairs, `tests/it/diffraction.rs`).
 ///
 /// ```
 /// use sabine_acoustics::*;
+/// use sabine_paths::*;
+/// use sabine_scene::*;
 /// use sabine_propagate::{DiffractingEdges, MeshScene};
 /// // A screen 1.5 m wide and 2 m high stands in the open; 1 m behind it the sound arrives over all four edges.
 /// let vertices = vec![[0.0, 0.0, 0.0], [0.0, 1.5, 0.0], [0.0, 1.5, 2.0], [0.0, 0.0, 2.0]];
@@ -56,7 +59,7 @@ const SIGHT_END_M: f64 = 1e-3;
 /// edges.add_paths(&mut paths, &mesh, [-1.0, 0.75, 1.2], [1.0, 0.75, 1.2]);
 /// assert_eq!((edges.len(), paths.len()), (4, 4));
 /// // The low octaves pass, the high ones do not.
-/// let energy = paths.energies(&[wood.material], &Air::default())?;
+/// let energy = paths.energies(&Conditions::new(&[wood.material], &Air::default()))?;
 /// let level_db = |band: usize| 10.0 * (4.0 * energy[band].iter().sum::<f32>()).log10();
 /// assert!(level_db(0) > -6.0 && level_db(6) < -15.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

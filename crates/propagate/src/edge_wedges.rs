@@ -2,7 +2,8 @@
 
 use crate::surfaces::Surfaces;
 use crate::vector::{Vec3, along, cross, dot, norm, scale, sub, unit};
-use sabine_acoustics::{EdgePoint, Scene};
+use sabine_paths::EdgePoint;
+use sabine_scene::Scene;
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 

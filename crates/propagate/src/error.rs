@@ -1,19 +1,14 @@
 //! What can go wrong between a mesh and a response.
 
+use sabine_acoustics::OutOfRange;
+
 /// Errors of this crate; each names what is wrong and where.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A setting outside its range, or not finite.
-    #[error("{field} is {}; it must be {range}", sabine_acoustics::Engineering(*value))]
-    OutOfRange {
-        /// The setting, with its unit.
-        field: &'static str,
-        /// Its value.
-        value: f64,
-        /// The range in words.
-        range: &'static str,
-    },
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
     /// Every triangle of the mesh has zero area.
     #[error("the mesh has no surface: all {triangles} triangles have zero area")]
     NoSurface {
@@ -205,16 +200,4 @@ impl From<Error> for sabine_acoustics::Error {
             other => Self::implementation("propagation", other),
         }
     }
-}
-
-/// Checks that a setting is finite and within `low..=high`.
-pub(crate) fn check_range(
-    field: &'static str,
-    value: f64,
-    low: f64,
-    high: f64,
-    range: &'static str,
-) -> Result<(), Error> {
-    // Written so that NaN fails.
-    if value >= low && value <= high { Ok(()) } else { Err(Error::OutOfRange { field, value, range }) }
 }

@@ -1,13 +1,12 @@
 //! Responses of a head, and what its ears hear of an ambisonic response.
 
 use crate::direction_cells::DirectionCells;
-use crate::error::check_range;
 use crate::spectrum::Spectrum;
-use crate::spherical_harmonics::{MOST_ORDER, harmonics};
+use crate::spherical_harmonics::{MAX_ORDER, harmonics};
 use crate::vector::{Vec3, dot, norm, scale};
 use crate::{AmbisonicResponse, Error};
 use realfft::num_complex::Complex;
-use sabine_acoustics::{ImpulseResponse, resample_response};
+use sabine_acoustics::{ImpulseResponse, OutOfRange, resample_response};
 
 /// Head-related impulse responses: what a pulse from each of many directions becomes at the left and the right ear. With the
 /// feature `sofa` they are read from AES69 (SOFA) files; else they come as plain arrays.
@@ -61,7 +60,7 @@ impl HeadResponses {
         }
         let unit = |direction: Vec3| {
             let length = norm(direction);
-            check_range("length of a direction", length, 1e-9, 1e9, "finite and not zero")?;
+            OutOfRange::check("length of a direction", length, 1e-9, 1e9, "finite and not zero")?;
             Ok(scale(direction, 1.0 / length))
         };
         let directions = directions.into_iter().map(unit).collect::<Result<_, Error>>()?;
@@ -146,7 +145,7 @@ impl HeadResponses {
     /// `[ear][channel]`: the response of the ears to each channel of ambisonics, by the decoder whose gains are the harmonics
     /// themselves (exact on a spherical design).
     fn channel_filters(&self, order: usize) -> [Vec<Vec<f64>>; 2] {
-        let waves = DirectionCells::for_order(order.min(MOST_ORDER));
+        let waves = DirectionCells::for_order(order.min(MAX_ORDER));
         let channels = (order + 1) * (order + 1);
         let decoded: Vec<(usize, _)> =
             waves.centres().iter().map(|&wave| (self.nearest(wave), harmonics(wave))).collect();

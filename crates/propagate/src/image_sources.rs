@@ -6,7 +6,7 @@ use crate::surfaces::Plane;
 use crate::vector::{Vec3, along, dot, mirror, norm, scale, sub};
 use crate::walk::{before_hit, next_hit, visible};
 use rayon::prelude::*;
-use sabine_acoustics::{Contribution, Incidence, PathSet, RayScene, Reflection};
+use sabine_paths::{Contribution, Incidence, PathSet, RayScene, Reflection};
 use std::collections::BTreeSet;
 
 /// Up to so many sequences of planes are all tried; of more, only those that rays find.

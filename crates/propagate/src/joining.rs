@@ -4,7 +4,7 @@ use crate::tracing::{Tracing, Walk};
 use crate::vector::{along, dot, norm, sub};
 use crate::walk::visible;
 use rand::Rng;
-use sabine_acoustics::{Contribution, PathSet};
+use sabine_paths::{Contribution, PathSet};
 use std::f64::consts::PI;
 
 /// Rays that meet on a patch must see each other at this height above it (m): a wall may stand across the patch.

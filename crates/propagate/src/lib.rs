@@ -1,10 +1,10 @@
 //! From a triangle mesh with materials to the sound at a receiver: paths once, responses as often as you like.
 //!
-//! Where it sits: [`PathTracer`] turns a [`Scene`](sabine_acoustics::Scene), a source and a receiver into a
-//! [`PathSet`](sabine_acoustics::PathSet), in which absorption, air and speed of sound are still free. `sabine-optimize`
+//! Where it sits: [`PathTracer`] turns a [`Scene`](sabine_scene::Scene), a source and a receiver into a
+//! [`PathSet`](sabine_paths::PathSet), in which absorption, air and speed of sound are still free. `sabine-optimize`
 //! fits materials to such paths; [`PressureRenderer`] turns them into a pressure response to convolve sound with,
 //! [`AmbisonicRenderer`] into one with directions, and [`HeadResponses`] that into what two ears hear. [`MovingTracer`] follows
-//! whoever moves. Directivity of source and receiver enters with the [`Conditions`](sabine_acoustics::Conditions) under which
+//! whoever moves. Directivity of source and receiver enters with the [`Conditions`](sabine_paths::Conditions) under which
 //! paths are weighed or rendered. Plain arrays go in and out.
 //!
 //! Below about 2000 sqrt(T60 / V) Hz a room is a wave field, not rays (Schroeder 1962): there [`wave::WaveSolver`] solves the wave
@@ -14,13 +14,20 @@
 //! room modes, no transmission through walls, no phase at reflections or of directivities, no Doppler shift within a response.
 //! Meshes are not read here.
 //!
+//! ```toml
+//! [dependencies]
+//! sabine-propagate = "0.1"
+//! ```
+//!
 //! # Example
 //!
 //! Sabine's formula promises 1.40 s for this box, Eyring's 1.33 s. A box with mirror-like walls rings longer, for its long
 //! axis feels few reflections:
 //!
 //! ```
-//! use sabine_acoustics::{Air, Bands, Material, Propagator, Receiver, Scene, Source};
+//! use sabine_acoustics::{Air, Bands, Material};
+//! use sabine_paths::{Conditions, Propagator};
+//! use sabine_scene::{Receiver, Scene, Source};
 //! use sabine_propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 //!
 //! let bands = Bands::octaves(250.0, 500.0)?;
@@ -32,14 +39,14 @@
 //!
 //! let tracer = PathTracer::new(TracerConfig { rays: 8_000, duration_s: 2.0, ..Default::default() })?;
 //! let paths = tracer.trace(&room, &source, &receiver, &air, &())?;
-//! let energy = paths.energy_response(&vec![wall; 6], &air, 1e-3)?;
+//! let energy = paths.energy_response(&Conditions::new(&vec![wall; 6], &air), 1e-3)?;
 //! let t30_s = energy.decay_curve(1).decay_time_s(-5.0, -35.0)?;
 //! assert!((t30_s / 2.0 - 1.0).abs() < 0.1); // image sources: 2.12 s, less what 2 s of air take
 //!
 //! // Other walls, same paths: nothing is traced again.
 //! let softer = vec![Material::uniform(bands, 0.3, 0.0)?; 6];
 //! let config = RenderConfig { sample_rate_hz: 16_000, ..Default::default() };
-//! let response = PressureRenderer::new(config)?.render(&paths, &softer, &air)?;
+//! let response = PressureRenderer::new(config)?.render(&paths, &Conditions::new(&softer, &air))?;
 //! assert_eq!(response.samples().len(), 32_000);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -54,22 +61,22 @@
 //!
 //! | what | how well | shown by |
 //! |---|---|---|
-//! | image sources up to third order | equal to the formula for boxes | `tests/box_room.rs` |
-//! | decay curve of a mirror-like box to -40 dB | 0.2 dB with 40,000 rays | `tests/box_room.rs` |
-//! | T30 at scattering 0.1, 0.3, 0.5, 1 | within four standard errors of 1.493, 1.373, 1.359, 1.360 s | `tests/box_room.rs` |
-//! | rays from both ends against rays from one | equal in the mean, half the variance, also through a doorway | `tests/agreement.rs` |
-//! | octaves of different scattering in one trace | equal in the mean to a trace for each | `tests/agreement.rs` |
-//! | T20, T30 measured on the rendered response | 3 % of the paths' own, 125 Hz to 4 kHz | `tests/rendering.rs` |
-//! | reverberation of a directional source | 1 / directivity factor, within three standard errors | `tests/directivity.rs` |
-//! | ambisonics: an exact path | its spherical harmonics in all channels | `tests/ambisonics.rs` |
-//! | ambisonics: a diffuse field | SN3D energies, 1 / (2l + 1), within 1 % in each channel; T30 of W as in mono | `tests/ambisonics.rs` |
-//! | a listener who walks | direct sound exact; reverberation within four standard errors of a long trace | `tests/moving.rs` |
-//! | same seed, other number of threads | the same paths and samples, bit for bit | `tests/agreement.rs` |
-//! | diffraction by one edge, 63 Hz to 8 kHz | 0.05 dB from Macdonald's half plane, 0.02 dB from the uniform theory at a right angle | `tests/diffraction.rs` |
+//! | image sources up to third order | equal to the formula for boxes | `tests/it/box_room.rs` |
+//! | decay curve of a mirror-like box to -40 dB | 0.2 dB with 40,000 rays | `tests/it/box_room.rs` |
+//! | T30 at scattering 0.1, 0.3, 0.5, 1 | within four standard errors of 1.493, 1.373, 1.359, 1.360 s | `tests/it/box_room.rs` |
+//! | rays from both ends against rays from one | equal in the mean, half the variance, also through a doorway | `tests/it/agreement.rs` |
+//! | octaves of different scattering in one trace | equal in the mean to a trace for each | `tests/it/agreement.rs` |
+//! | T20, T30 measured on the rendered response | 3 % of the paths' own, 125 Hz to 4 kHz | `tests/it/rendering.rs` |
+//! | reverberation of a directional source | 1 / directivity factor, within three standard errors | `tests/it/directivity.rs` |
+//! | ambisonics: an exact path | its spherical harmonics in all channels | `tests/it/ambisonics.rs` |
+//! | ambisonics: a diffuse field | SN3D energies, 1 / (2l + 1), within 1 % in each channel; T30 of W as in mono | `tests/it/ambisonics.rs` |
+//! | a listener who walks | direct sound exact; reverberation within four standard errors of a long trace | `tests/it/moving.rs` |
+//! | same seed, other number of threads | the same paths and samples, bit for bit | `tests/it/agreement.rs` |
+//! | diffraction by one edge, 63 Hz to 8 kHz | 0.05 dB from Macdonald's half plane, 0.02 dB from the uniform theory at a right angle | `tests/it/diffraction.rs` |
 //! | edges and corners | no ray lost | `walk.rs` |
-//! | waves: frequencies of a rigid box up to 200 Hz | within 0.3 % | `tests/waves.rs` |
-//! | waves: decay of modes | within 1 % of theory | `tests/waves.rs` |
-//! | waves: narrow-band spectrum of a box, 20 to 300 Hz | 1.0 to 1.7 dB rms from the exact sum of its modes | `tests/waves.rs` |
+//! | waves: frequencies of a rigid box up to 200 Hz | within 0.3 % | `tests/it/waves.rs` |
+//! | waves: decay of modes | within 1 % of theory | `tests/it/waves.rs` |
+//! | waves: narrow-band spectrum of a box, 20 to 300 Hz | 1.0 to 1.7 dB rms from the exact sum of its modes | `tests/it/waves.rs` |
 //!
 //! Spheres about source and receiver blur arrivals by their radius over the speed of sound (1.5 ms at 0.5 m) and average over
 //! as much space, and so do the patches of wall (0.35 m) on which rays from both ends meet; that concerns paths of several
@@ -118,6 +125,8 @@ mod pressure_renderer;
 mod pulse;
 mod random;
 mod reference_tracer;
+mod render_config;
+mod renderer;
 mod rendering;
 #[cfg(feature = "sofa")]
 mod sofa_file;
@@ -145,6 +154,8 @@ pub use moving_tracer::{Frame, MovingConfig, MovingTracer};
 pub use path_tracer::{PathTracer, TracerConfig};
 pub use placement::check_placement;
 pub use prepared_scene::PreparedScene;
-pub use pressure_renderer::{PressureRenderer, RenderConfig, Statistics};
+pub use pressure_renderer::PressureRenderer;
 pub use reference_tracer::ReferenceTracer;
+pub use render_config::{RenderConfig, Statistics};
+pub use renderer::{Ambisonics, Omnidirectional, Renderer};
 pub use spherical_harmonics::ambisonic_gains;

@@ -2,7 +2,7 @@
 
 use crate::box_tree::{Bounds, BoxTree};
 use crate::vector::{Vec3, cross, dot, norm, scale, sub, unit};
-use sabine_acoustics::Scene;
+use sabine_scene::Scene;
 use std::collections::HashSet;
 
 /// Closer than this, an edge lies on a face (m): as far as two vertices may be apart that are meant to be one.

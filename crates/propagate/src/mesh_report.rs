@@ -6,7 +6,8 @@ use crate::mesh_scene::MeshScene;
 use crate::random::{direction, generator};
 use crate::vector::Vec3;
 use crate::walk::{before_hit, next_hit, reflected};
-use sabine_acoustics::{Reflection, Scene};
+use sabine_paths::Reflection;
+use sabine_scene::Scene;
 use std::fmt;
 
 /// Rays that look for leaks ...
@@ -27,7 +28,8 @@ const LISTED: usize = 5;
 /// mesh holds sound; the edges say where to look if it does not.
 ///
 /// ```
-/// use sabine_acoustics::{Bands, Material, Scene};
+/// use sabine_acoustics::{Bands, Material};
+/// use sabine_scene::Scene;
 /// use sabine_propagate::MeshReport;
 /// let plaster = Material::uniform(Bands::SIMULATION, 0.1, 0.1)?;
 /// let room = Scene::shoebox([10.0, 7.0, 3.0], std::array::from_fn(|_| plaster.clone()))?;

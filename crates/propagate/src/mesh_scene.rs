@@ -5,7 +5,8 @@ use crate::hierarchy::Hierarchy;
 use crate::surfaces::{Surfaces, distance_to};
 use crate::vector::{Vec3, along, norm, sub};
 use crate::wide_node::LocalRay;
-use sabine_acoustics::{RayHit, RayScene, Scene};
+use sabine_paths::{RayHit, RayScene};
+use sabine_scene::Scene;
 use std::ops::ControlFlow;
 
 /// The mesh of a [`Scene`], ready for rays: a bounding volume hierarchy chooses the candidates in single precision, a test
@@ -15,7 +16,9 @@ use std::ops::ControlFlow;
 /// their sides, so that no ray slips through an edge by rounding.
 ///
 /// ```
-/// use sabine_acoustics::{Bands, Material, RayScene, Scene};
+/// use sabine_acoustics::{Bands, Material};
+/// use sabine_paths::RayScene;
+/// use sabine_scene::Scene;
 /// use sabine_propagate::MeshScene;
 /// let plaster = Material::uniform(Bands::SIMULATION, 0.1, 0.1)?;
 /// let room = Scene::shoebox([10.0, 7.0, 3.0], std::array::from_fn(|_| plaster.clone()))?;
@@ -130,7 +133,8 @@ mod tests {
     use super::*;
     use crate::random::{direction, generator};
     use rand::Rng;
-    use sabine_acoustics::{Bands, Material, NamedMaterial, Triangle};
+    use sabine_acoustics::{Bands, Material};
+    use sabine_scene::{NamedMaterial, Triangle};
 
     #[test]
     fn the_nearest_triangle_is_that_of_a_plain_search() {

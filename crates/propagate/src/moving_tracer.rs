@@ -1,10 +1,11 @@
 //! Paths between a source and a listener that move.
 
 use crate::early_memory::EarlyMemory;
-use crate::error::check_range;
 use crate::vector::{norm, sub};
 use crate::{Error, PathTracer, PreparedScene, TracerConfig};
-use sabine_acoustics::{Air, Observer, PathSet, Receiver, Scene, Source};
+use sabine_acoustics::{Air, Observer, OutOfRange};
+use sabine_paths::PathSet;
+use sabine_scene::{Receiver, Scene, Source};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -54,7 +55,8 @@ pub struct Frame {
 /// The result depends on the seed and on the sequence of places, not on the time that passes or on the number of threads.
 ///
 /// ```
-/// use sabine_acoustics::{Air, Bands, Material, Receiver, Scene, Source};
+/// use sabine_acoustics::{Air, Bands, Material};
+/// use sabine_scene::{Receiver, Scene, Source};
 /// use sabine_propagate::{MovingConfig, MovingTracer};
 /// let wall = Material::uniform(Bands::octaves(500.0, 1000.0)?, 0.2, 0.3)?;
 /// let room = Scene::shoebox([8.0, 5.0, 3.0], std::array::from_fn(|_| wall.clone()))?;
@@ -99,8 +101,8 @@ impl MovingTracer {
     /// [`Error::OutOfRange`] for a setting outside its range, [`Error::NoSurface`] if all triangles have zero area.
     pub fn new(scene: Scene, air: Air, config: MovingConfig) -> Result<Self, Error> {
         let prepared = Arc::new(PathTracer::new(config.tracer.clone())?.prepare(&scene)?);
-        check_range("memory_m", config.memory_m, 1e-3, 1e3, "between 1 mm and 1 km")?;
-        check_range("most_frames", config.most_frames as f64, 1.0, 1e3, "between 1 and 1000")?;
+        OutOfRange::check("memory_m", config.memory_m, 1e-3, 1e3, "between 1 mm and 1 km")?;
+        OutOfRange::check("most_frames", config.most_frames as f64, 1.0, 1e3, "between 1 and 1000")?;
         let early = EarlyMemory::default();
         Ok(Self { scene, prepared, closed: false, air, config, early, past: VecDeque::new(), count: 0 })
     }

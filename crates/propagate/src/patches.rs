@@ -129,7 +129,8 @@ fn area(polygon: &[[f64; 2]]) -> f64 {
 mod tests {
     use super::*;
     use crate::mesh_scene::MeshScene;
-    use sabine_acoustics::{Bands, Material, Scene};
+    use sabine_acoustics::{Bands, Material};
+    use sabine_scene::Scene;
 
     #[test]
     fn patches_hold_all_of_the_wall_and_no_more() {

@@ -1,13 +1,14 @@
 //! The path tracer.
 
 use crate::Error;
-use crate::error::check_range;
 use crate::image_sources::add_exact_paths;
 use crate::placement::check_placement;
 use crate::prepared_scene::PreparedScene;
 use crate::tracing::Tracing;
 use rayon::prelude::*;
-use sabine_acoustics::{Air, Observer, PathSet, Propagator, Receiver, Scene, Source, report};
+use sabine_acoustics::{Air, Observer, OutOfRange, report};
+use sabine_paths::{PathSet, Propagator};
+use sabine_scene::{Receiver, Scene, Source};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Parts of the rays between which their paths are gathered.
@@ -65,11 +66,17 @@ impl Default for TracerConfig {
 
 impl TracerConfig {
     pub(crate) fn check(&self) -> Result<(), Error> {
-        check_range("rays", self.rays as f64, 1.0, 1e8, "between 1 and 100 million")?;
-        check_range("duration_s", self.duration_s, 1e-3, 60.0, "between 1 ms and 60 s")?;
-        check_range("image_order", self.image_order as f64, 0.0, 10.0, "between 0 and 10")?;
-        check_range("cuboid_paths", self.cuboid_paths as f64, 0.0, 1e7, "between 0 and 10 million")?;
-        check_range("receiver_radius_m", self.receiver_radius_m, 0.01, 10.0, "between 1 cm and 10 m")
+        OutOfRange::check("rays", self.rays as f64, 1.0, 1e8, "between 1 and 100 million")?;
+        OutOfRange::check("duration_s", self.duration_s, 1e-3, 60.0, "between 1 ms and 60 s")?;
+        OutOfRange::check("image_order", self.image_order as f64, 0.0, 10.0, "between 0 and 10")?;
+        OutOfRange::check("cuboid_paths", self.cuboid_paths as f64, 0.0, 1e7, "between 0 and 10 million")?;
+        Ok(OutOfRange::check(
+            "receiver_radius_m",
+            self.receiver_radius_m,
+            0.01,
+            10.0,
+            "between 1 cm and 10 m",
+        )?)
     }
 }
 

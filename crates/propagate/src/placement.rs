@@ -5,7 +5,8 @@ use crate::mesh_scene::MeshScene;
 use crate::random::{direction, generator};
 use crate::surfaces::Surface;
 use crate::vector::{Vec3, along, cross, dot, norm, sub};
-use sabine_acoustics::{RayScene, Receiver, Source};
+use sabine_paths::RayScene;
+use sabine_scene::{Receiver, Source};
 use std::f64::consts::PI;
 
 /// Rays that probe the surroundings of a point.

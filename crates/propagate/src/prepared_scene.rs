@@ -6,7 +6,7 @@ use crate::event_mixture::EventProbabilities;
 use crate::mesh_scene::MeshScene;
 use crate::patches::Patches;
 use crate::{Error, MeshReport};
-use sabine_acoustics::{NamedMaterial, Scene};
+use sabine_scene::{NamedMaterial, Scene};
 use std::fmt;
 
 /// What a tracer needs to know of a scene, whatever the places of source and receiver: made once by

@@ -8,9 +8,9 @@ use crate::vector::{norm, scale, sub};
 use crate::walk::{Sphere, before_hit, next_hit, reflected, visible};
 use crate::{Error, TracerConfig};
 use rand::Rng;
-use sabine_acoustics::{
-    Air, Contribution, Observer, PathSet, Propagator, Receiver, Reflection, Scene, Source, report,
-};
+use sabine_acoustics::{Air, Observer, report};
+use sabine_paths::{Contribution, PathSet, Propagator, Reflection};
+use sabine_scene::{Receiver, Scene, Source};
 use std::f64::consts::PI;
 
 /// Unidirectional tracing with a spherical receiver, to be read and to be compared with: every triangle is tested, every

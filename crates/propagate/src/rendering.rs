@@ -1,20 +1,21 @@
-//! One rendering under way: exact paths as pulses, sampled ones as shaped noise, in one channel or in those of ambisonics.
+//! One rendering under way: exact paths as pulses, sampled ones as shaped noise, in the channels of an encoder.
 
 use crate::Error;
 use crate::band_masks::{BandMasks, Transition};
 use crate::direction_cells::DirectionCells;
 use crate::energy_envelope::{EnergyEnvelope, STEP_S, moving_mean};
-use crate::pressure_renderer::{RenderConfig, Statistics};
 use crate::pulse::{PULSE_REACH, Pulse};
 use crate::random::generator;
+use crate::render_config::{RenderConfig, Statistics};
 use crate::spectrum::Spectrum;
-use crate::spherical_harmonics::{MOST_CHANNELS, harmonics};
-use crate::vector::{Vec3, along, norm};
+use crate::vector::{Vec3, along, norm, unit};
 use rand::Rng;
 use rayon::prelude::*;
 use realfft::num_complex::Complex;
-use sabine_acoustics::{Conditions, Orientation, PathSet};
+use sabine_acoustics::Orientation;
+use sabine_paths::{Conditions, Encoder, PathSet};
 use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
 /// Longest time by which a zero-phase band filter rings before and after, in periods of the lowest band centre.
 const RINGING_PERIODS: f64 = 8.0;
@@ -38,8 +39,9 @@ pub(crate) struct Rendering<'a> {
     paths: &'a PathSet,
     /// `[band][path]`.
     energies: Vec<Vec<f32>>,
-    /// Ambisonic order; 0 is one omnidirectional channel.
-    order: usize,
+    encoder: &'a dyn Encoder,
+    /// The omnidirectional channel: one of the encoder's, or one of our own after them.
+    omni: usize,
     facing: Orientation,
     samples_per_m: f64,
     rate: f64,
@@ -62,10 +64,10 @@ impl<'a> Rendering<'a> {
         config: &RenderConfig,
         paths: &'a PathSet,
         conditions: &Conditions,
-        order: usize,
+        encoder: &'a dyn Encoder,
         facing: Orientation,
     ) -> Result<Self, Error> {
-        let energies = paths.energies_under(conditions)?;
+        let energies = paths.energies(conditions)?;
         let sample_rate_hz = config.sample_rate_hz;
         // The paths accepted the materials: there is at least one.
         let bands = conditions.materials[0].bands();
@@ -86,7 +88,8 @@ impl<'a> Rendering<'a> {
             masks,
             paths,
             energies,
-            order,
+            omni: encoder.omnidirectional().unwrap_or(encoder.channels()),
+            encoder,
             facing,
             samples_per_m,
             rate,
@@ -107,8 +110,16 @@ impl<'a> Rendering<'a> {
         response.into_iter().map(|channel| channel.into_iter().map(|s| s as f32).collect()).collect()
     }
 
+    /// Channels that noise is made for: those of the encoder, and the omnidirectional one that its energy is measured in.
     fn channels(&self) -> usize {
-        (self.order + 1) * (self.order + 1)
+        self.encoder.channels().max(self.omni + 1)
+    }
+
+    /// Gain of each channel for sound from a direction.
+    fn gains(&self, direction: Vec3) -> Vec<f64> {
+        let mut gains = vec![1.0; self.channels()];
+        self.encoder.gains(unit(direction), &mut gains[..self.encoder.channels()]);
+        gains
     }
 
     fn position(&self, path: usize) -> f64 {
@@ -121,11 +132,11 @@ impl<'a> Rendering<'a> {
 
     /// The exact paths.
     fn pulses(&self) -> Vec<Vec<f64>> {
-        let pulses: Vec<(usize, Pulse, [f64; MOST_CHANNELS])> = (0..self.paths.len())
+        let pulses: Vec<(usize, Pulse, Vec<f64>)> = (0..self.paths.len())
             .filter(|&i| self.paths.is_exact(i) && self.position(i) < self.samples as f64)
-            .map(|i| (i, Pulse::at(self.margin as f64 + self.position(i)), harmonics(self.arrival(i))))
+            .map(|i| (i, Pulse::at(self.margin as f64 + self.position(i)), self.gains(self.arrival(i))))
             .collect();
-        (0..self.channels())
+        (0..self.encoder.channels())
             .into_par_iter()
             .map(|channel| {
                 let mut sum = vec![Complex::default(); self.spectrum.length() / 2 + 1];
@@ -155,18 +166,23 @@ impl<'a> Rendering<'a> {
         let mut corrections = vec![EnergyEnvelope { steps: vec![1.0; steps] }; bands.len()];
         if config.statistics == Statistics::DecayMatched {
             for round in 0..WINDOW_ROUNDS + WHOLE_ROUNDS {
-                let noise = self.corrected(&bands, &corrections, 0);
+                let noise = self.corrected(&bands, &corrections, self.omni);
                 self.correct(&noise, &bands, &mut corrections, round < WINDOW_ROUNDS);
             }
         }
-        let corrections: Vec<Vec<EnergyEnvelope>> = (0..=self.order)
-            .map(|degree| {
-                let of_band = |(band, correction)| self.balanced(band, correction, degree);
+        let groups = self.encoder.power_groups();
+        let balanced: Vec<Vec<EnergyEnvelope>> = groups
+            .iter()
+            .map(|group| {
+                let of_band = |(band, correction)| self.balanced(band, correction, group);
                 bands.iter().zip(&corrections).map(of_band).collect()
             })
             .collect();
-        let channel = |channel: usize| self.corrected(&bands, &corrections[channel.isqrt()], channel);
-        Some((0..self.channels()).into_par_iter().map(channel).collect())
+        let channel = |channel: usize| {
+            let own = groups.iter().position(|group| group.contains(&channel));
+            self.corrected(&bands, own.map_or(&corrections, |group| &balanced[group]), channel)
+        };
+        Some((0..self.encoder.channels()).into_par_iter().map(channel).collect())
     }
 
     /// Independent noise from each cell of directions, with the energy that comes from there.
@@ -175,7 +191,7 @@ impl<'a> Rendering<'a> {
         let per_sample = 1.0 / (self.rate * STEP_S);
         let step_of = |path: usize| (self.position(path) * per_sample) as usize;
         let first = (self.earliest * per_sample) as usize;
-        let cells = DirectionCells::for_order(self.order);
+        let cells = DirectionCells::for_order(self.encoder.order());
         // Step, cell and direction of each sampled path within the response.
         let sampled: Vec<(usize, usize, usize, Vec3)> = (0..self.paths.len())
             .filter(|&i| !self.paths.is_exact(i) && step_of(i) < steps)
@@ -212,7 +228,7 @@ impl<'a> Rendering<'a> {
                 if norm(mean) == 0.0 {
                     continue;
                 }
-                let gains = harmonics(mean);
+                let gains = self.gains(mean);
                 let envelope = EnergyEnvelope::smoothed(collected, first);
                 noise.envelope.steps.iter_mut().zip(&envelope.steps).for_each(|(sum, e)| *sum += e);
                 // Stationary noise of the band, shaped afterwards: filtering what is shaped would ring before its time.
@@ -236,18 +252,22 @@ impl<'a> Rendering<'a> {
         Some((0..self.masks.len()).into_par_iter().map(band).collect())
     }
 
-    /// The correction of a band for the channels of one degree. In SN3D their energies add up to that of the first channel,
-    /// whatever the direction; a correction made for the first channel, where it happens to be weak, would make the others
-    /// stronger.
-    fn balanced(&self, band: &BandNoise, correction: &EnergyEnvelope, degree: usize) -> EnergyEnvelope {
+    /// The correction of a band for channels whose energies add up to that of the omnidirectional one, whatever the direction: a
+    /// correction made for the omnidirectional channel, where it happens to be weak, would make the others stronger.
+    fn balanced(
+        &self,
+        band: &BandNoise,
+        correction: &EnergyEnvelope,
+        group: &Range<usize>,
+    ) -> EnergyEnvelope {
         let energy = |channels: &[Vec<f32>]| -> f64 {
             let corrected = |(i, &s): (usize, &f32)| {
                 f64::from(s).powi(2) * correction.at(i as f64 / (self.rate * STEP_S))
             };
             channels.iter().map(|samples| samples.iter().enumerate().map(corrected).sum::<f64>()).sum()
         };
-        let found = energy(&band.channels[degree * degree..(degree + 1) * (degree + 1)]);
-        let gain = if found > 0.0 { energy(&band.channels[..1]) / found } else { 1.0 };
+        let found = energy(&band.channels[group.clone()]);
+        let gain = if found > 0.0 { energy(&band.channels[self.omni..=self.omni]) / found } else { 1.0 };
         EnergyEnvelope { steps: correction.steps.iter().map(|c| c * gain).collect() }
     }
 

@@ -35,7 +35,7 @@ impl HeadResponses {
         };
         let rate = f64::from(file.sample_rate());
         let no_rate = |_| failed(format!("a sample rate of {rate} Hz").into());
-        crate::error::check_range("sample rate (Hz)", rate, 1e3, 768e3, "between 1 and 768 kHz")
+        sabine_acoustics::OutOfRange::check("sample rate (Hz)", rate, 1e3, 768e3, "between 1 and 768 kHz")
             .map_err(no_rate)?;
         let (ears, taps) = (file.hrtf().r(), file.filter_len());
         if ears != 2 || taps == 0 {

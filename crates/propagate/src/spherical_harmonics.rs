@@ -3,9 +3,9 @@
 use crate::vector::{Vec3, norm};
 
 /// Highest ambisonic order of this crate.
-pub(crate) const MOST_ORDER: usize = 3;
+pub(crate) const MAX_ORDER: usize = 3;
 /// Channels of the highest order.
-pub(crate) const MOST_CHANNELS: usize = (MOST_ORDER + 1) * (MOST_ORDER + 1);
+pub(crate) const MAX_CHANNELS: usize = (MAX_ORDER + 1) * (MAX_ORDER + 1);
 
 /// Gains with which sound from a direction enters the channels of ambisonics of an order of 0 to 3: real spherical harmonics
 /// without Condon-Shortley phase in the channel order ACN, n = l (l + 1) + m, and the normalisation SN3D, in which no
@@ -21,12 +21,12 @@ pub(crate) const MOST_CHANNELS: usize = (MOST_ORDER + 1) * (MOST_ORDER + 1);
 /// # Panics
 /// If the order is above 3.
 pub fn ambisonic_gains(order: usize, direction: [f64; 3]) -> Vec<f64> {
-    assert!(order <= MOST_ORDER, "order {order} of at most {MOST_ORDER}");
+    assert!(order <= MAX_ORDER, "order {order} of at most {MAX_ORDER}");
     harmonics(direction)[..(order + 1) * (order + 1)].to_vec()
 }
 
 /// All channels of the highest order.
-pub(crate) fn harmonics(direction: Vec3) -> [f64; MOST_CHANNELS] {
+pub(crate) fn harmonics(direction: Vec3) -> [f64; MAX_CHANNELS] {
     let length = norm(direction);
     let [x, y, z] = direction.map(|c| c / length);
     let (root3, root15) = (3f64.sqrt(), 15f64.sqrt());
@@ -99,8 +99,8 @@ mod tests {
     fn channels_are_orthogonal_with_sn3d_norms() {
         let cells = DirectionCells::for_order(3);
         let points = cells.centres();
-        for a in 0..MOST_CHANNELS {
-            for b in 0..MOST_CHANNELS {
+        for a in 0..MAX_CHANNELS {
+            for b in 0..MAX_CHANNELS {
                 let mean = points.iter().map(|&p| harmonics(p)[a] * harmonics(p)[b]).sum::<f64>()
                     / points.len() as f64;
                 let degree = (0..=3).rev().find(|l| l * l <= a).unwrap();

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::vector::{Vec3, cross, dot, norm, scale, sub};
-use sabine_acoustics::Scene;
+use sabine_scene::Scene;
 use std::collections::HashMap;
 
 /// Triangles smaller than this have no usable normal (m2).

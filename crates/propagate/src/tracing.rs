@@ -9,7 +9,7 @@ use crate::techniques::{Use, Ways};
 use crate::vector::{Vec3, dot, norm, scale, sub};
 use crate::walk::{Sphere, before_hit, next_hit, reflected, visible};
 use rand::Rng;
-use sabine_acoustics::{Contribution, Incidence, PathSet, Reflection};
+use sabine_paths::{Contribution, Incidence, PathSet, Reflection};
 use std::f64::consts::PI;
 
 /// The ends of the paths.

@@ -4,7 +4,7 @@ use crate::random::lambert;
 use crate::surfaces::Surface;
 use crate::vector::{Vec3, along, dot, mirror, sub};
 use rand::Rng;
-use sabine_acoustics::{RayHit, RayScene, Reflection};
+use sabine_paths::{RayHit, RayScene, Reflection};
 
 /// A ray leaves a surface this far before it (m), on the segment that it came along: a point that is certainly in the
 /// room, even in a corner, where a step along the normal of one wall may end behind another.
@@ -98,7 +98,8 @@ mod tests {
     use crate::mesh_scene::MeshScene;
     use crate::random::{direction, generator};
     use crate::vector::unit;
-    use sabine_acoustics::{Bands, Material, Scene};
+    use sabine_acoustics::{Bands, Material};
+    use sabine_scene::Scene;
 
     const SIZE_M: Vec3 = [10.0, 7.0, 3.0];
 

@@ -45,6 +45,9 @@ pub enum Error {
     /// The vocabulary, a measure or a file.
     #[error(transparent)]
     Acoustics(#[from] sabine_acoustics::Error),
+    /// A room that cannot be read, or materials that do not fit it.
+    #[error(transparent)]
+    Scene(#[from] sabine_scene::Error),
     /// The equalisation filter.
     #[error(transparent)]
     EqFilter(#[from] sabine_eqfilter::Error),

@@ -55,7 +55,8 @@
 //! person, to 5 cm; finer detail belongs into scattering. Materials from the library or a table, and **how far you trust them**
 //! (`absorption_sd`): the fit moves what you doubt.
 //! ```
-//! use sabine::acoustics::{Bands, MeasuredRoom, library_material};
+//! use sabine::acoustics::{Bands, library_material};
+//! use sabine::scene::MeasuredRoom;
 //! use sabine::propagate::MeshReport;
 //! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
 //! let room = MeasuredRoom::read("fixtures/room")?;
@@ -72,7 +73,9 @@
 //! # 4. Simulate it
 //! `sabine trace --room DIR --out DIR`. Paths are traced once; materials, air and directivity act on them afterwards.
 //! ```
-//! use sabine::acoustics::{Bands, DiffuseRoom, MeasuredRoom, PathParameters, Propagator};
+//! use sabine::acoustics::Bands;
+//! use sabine::paths::{Conditions, PathParameters, Propagator};
+//! use sabine::scene::{DiffuseRoom, MeasuredRoom};
 //! use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 //! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
 //! let room = MeasuredRoom::read("fixtures/room")?;
@@ -81,7 +84,7 @@
 //! let paths = tracer.trace(room.scene(), source, receiver, &room.air(), &())?;
 //! let materials: Vec<_> = room.scene().materials().iter().map(|m| m.material.clone()).collect();
 //!
-//! let response = PressureRenderer::new(RenderConfig::default())?.render(&paths, &materials, &room.air())?;
+//! let response = PressureRenderer::new(RenderConfig::default())?.render(&paths, &Conditions::new(&materials, &room.air()))?;
 //! // The direct sound comes after the way from the talker to the microphone, and not before.
 //! let distance_m = (0..3).map(|k| (source.position_m[k] - receiver.position_m[k]).powi(2)).sum::<f64>().sqrt();
 //! let direct = (distance_m / room.air().speed_of_sound_m_s() * f64::from(response.sample_rate_hz())) as usize;
@@ -90,7 +93,7 @@
 //! assert!(around > 1000.0 * before);
 //!
 //! // A room that is not diffuse need not meet Eyring's formula, but it is of that size.
-//! let energy = paths.energy_response(&materials, &room.air(), 1e-3)?;
+//! let energy = paths.energy_response(&Conditions::new(&materials, &room.air()), 1e-3)?;
 //! let at_1_khz = room.bands().index_of(1000.0).ok_or("no such octave")?;
 //! let t30_s = energy.decay_curve(at_1_khz).decay_time_s(-5.0, -35.0)?;
 //! let eyring_s = DiffuseRoom::of_scene(room.scene(), &room.air(), room.bands())?.values()[at_1_khz].eyring_t60_s();
@@ -132,14 +135,15 @@
 //! # 7. Measure, and fit the materials to that
 //! Responses beside the model make it a *measured* room. `sabine fit --room DIR --responses --hold-out r3 --out DIR`, then
 //! `sabine validate --room DIR` for what was not fitted. In code: calibrate a room, `docs/how-to/calibrate-a-room.md`.
-//! A folder can be written from Rust, too ([`NewRoom`](crate::acoustics::NewRoom)); the next step does.
+//! A folder can be written from Rust, too ([`NewRoom`](crate::scene::NewRoom)); the next step does.
 //!
 //! # 8. Why is my simulation wrong?
 //! `diagnose -- --room DIR --hold-out r3 --out DIR`. The simulation never agrees with the measurement exactly. [`Diagnoser`](crate::diagnose::Diagnoser)
 //! says what of the disagreement is chance, what has a cause, which, how large, and what it gains at positions that it has not seen; or that
 //! it does not know. Here somebody has forgotten to take out 5 ms of latency:
 //! ```
-//! use sabine::acoustics::{ImpulseResponse, MeasuredRoom, NewResponse, NewRoom};
+//! use sabine::acoustics::ImpulseResponse;
+//! use sabine::scene::{MeasuredRoom, NewResponse, NewRoom};
 //! use sabine::diagnose::{DiagnoseConfig, Diagnoser, Verdict};
 //! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
 //! let room = MeasuredRoom::read("fixtures/room")?;
@@ -159,7 +163,7 @@
 //!     measurement: room.measurement(), // "sample 0 is the instant of emission": no longer true
 //!     sources: room.sources().to_vec(),
 //!     receivers: room.receivers().to_vec(),
-//!     responses: responses.collect::<Result<_, sabine::acoustics::Error>>()?,
+//!     responses: responses.collect::<Result<_, sabine::scene::Error>>()?,
 //! };
 //! # let folder = std::env::temp_dir().join(format!("sabine_guide_{}", std::process::id()));
 //! # let _ = std::fs::remove_dir_all(&folder);
@@ -183,7 +187,7 @@
 //!
 //! # Parts of your own
 //! [`match_room_with`](crate::match_room_with) takes any [`RoomEstimator`](crate::acoustics::RoomEstimator) and any
-//! [`Propagator`](crate::acoustics::Propagator): own estimator, `docs/how-to/own-estimator.md`, own tracer, `docs/how-to/own-tracer.md`,
+//! [`Propagator`](crate::paths::Propagator): own estimator, `docs/how-to/own-estimator.md`, own tracer, `docs/how-to/own-tracer.md`,
 //! training on own data, `docs/how-to/train-on-my-data.md`.
 //!
 //! # Feature flags

@@ -26,9 +26,15 @@
 //! | a wish to read code first | the worked examples in `examples/` of the repository, one idea each |
 //! | no wish to program | the command `sabine` of the crate `sabine-cli` |
 //!
+//! ```toml
+//! [dependencies]
+//! sabine = "0.1"
+//! ```
+//!
 //! # Example
 //! ```
-//! use sabine::acoustics::{Channel, MeasuredRoom, read_audio};
+//! use sabine::acoustics::{Channel, read_audio};
+//! use sabine::scene::MeasuredRoom;
 //! use sabine::propagate::TracerConfig;
 //! use sabine::{MatchConfig, MatchInput, Recording, match_room};
 //! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
@@ -86,7 +92,9 @@ pub use sabine_eqfilter as eqfilter;
 pub use sabine_estimator as estimator;
 pub use sabine_features as features;
 pub use sabine_optimize as optimize;
+pub use sabine_paths as paths;
 pub use sabine_propagate as propagate;
+pub use sabine_scene as scene;
 
 pub mod guide;
 

@@ -1,8 +1,9 @@
 //! The low end of a match from the wave equation.
 
 use crate::Error;
-use sabine_acoustics::{Air, ImpulseResponse, Material, MeasuredRoom, Observer, Receiver, Source};
+use sabine_acoustics::{Air, ImpulseResponse, Material, Observer};
 use sabine_propagate::wave::{Crossover, WaveConfig, WaveRoom, WaveSolver};
+use sabine_scene::{MeasuredRoom, Receiver, Source};
 use serde::Serialize;
 
 /// What joining waves to paths found.

@@ -4,8 +4,9 @@ use crate::matching::{Clock, DrySound, Place, match_targets, path_tracer, warn_o
 use crate::recording::{ClipCounter, judge};
 use crate::room_renderer::RoomRenderer;
 use crate::{Error, MatchConfig, RoomMatch, Warning};
-use sabine_acoustics::{AudioReader, Channel, MeasuredRoom, Observer, SampleFormat, Signal, report};
+use sabine_acoustics::{AudioReader, Channel, Observer, SampleFormat, Signal, report};
 use sabine_estimator::Estimator;
+use sabine_scene::MeasuredRoom;
 use std::path::Path;
 
 /// Length of what is kept of a longer file to listen to, in seconds.

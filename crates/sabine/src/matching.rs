@@ -4,14 +4,15 @@ use crate::low_end::{JoinedWaves, LowEnd};
 use crate::room_renderer::RoomRenderer;
 use crate::{Error, Recording, Warning};
 use sabine_acoustics::{
-    Air, Bands, EnergyDecayCurve, Estimate, FilterBank, ImpulseResponse, Material, MeasuredRoom, Observer,
-    PerBand, Propagator, Reading, RoomEstimator, RoomParameters, RoomTargets, Signal, equalisation, report,
-    resample,
+    Air, Bands, EnergyDecayCurve, Estimate, FilterBank, ImpulseResponse, Material, Observer, PerBand,
+    Reading, RoomEstimator, RoomParameters, RoomTargets, Signal, equalisation, report, resample,
 };
 use sabine_eqfilter::{AboveBand, EqFilter, EqFilterConfig};
 use sabine_estimator::Estimator;
-use sabine_optimize::{AbsorptionPrior, FitConfig, MaterialFit, MaterialFitter};
+use sabine_optimize::{AbsorptionPrior, FitConfig, FitProblem, MaterialFit, MaterialFitter};
+use sabine_paths::{Conditions, Propagator};
 use sabine_propagate::{MeshReport, PathTracer, PressureRenderer, RenderConfig, TracerConfig};
+use sabine_scene::MeasuredRoom;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
@@ -298,9 +299,10 @@ pub(crate) fn match_targets(
     let mut aim = targets.t60_s().clone();
     let mut corrections = 0;
     let (fit, mut response, mut parameters) = loop {
-        let fit = fitter.fit_t60(&[&paths], &materials_before, &priors, &air, &aim, observer)?;
+        let fit =
+            fitter.fit_t60(&[&paths], &FitProblem::new(&materials_before, &priors, &air), &aim, observer)?;
         clock.lap("fit");
-        let response = renderer.render(&paths, &fit.materials, &air)?;
+        let response = renderer.render(&paths, &Conditions::new(&fit.materials, &air))?;
         let parameters = RoomParameters::measure(&response, Bands::T60)?;
         clock.lap("render");
         let next = corrected(&aim, targets.t60_s(), &parameters.t30_s, &fit);
@@ -310,7 +312,7 @@ pub(crate) fn match_targets(
             _ => break (fit, response, parameters),
         }
     };
-    let response_before = renderer.render(&paths, &materials_before, &air)?;
+    let response_before = renderer.render(&paths, &Conditions::new(&materials_before, &air))?;
     let mut waves = None;
     if let Some(low_end) = low_end {
         let (joined, found) = low_end.join((source, receiver), &fit.materials, &air, &response, observer)?;

@@ -140,7 +140,7 @@ fn without_reference<T>(levels: &PerBand<T>) -> Vec<(f64, &T)> {
 }
 
 /// The materials of a match as tables of a room file (`[bands]` and `[materials.NAME]`), which
-/// [`MeasuredRoom::with_materials_file`](sabine_acoustics::MeasuredRoom::with_materials_file) reads.
+/// [`MeasuredRoom::with_materials_file`](sabine_scene::MeasuredRoom::with_materials_file) reads.
 ///
 /// # Errors
 /// [`Error::Acoustics`], which a fit's numbers and names do not cause.

@@ -17,7 +17,7 @@ pub enum Warning {
     Speech(sabine_estimator::Warning),
     /// What should be known of the room before numbers are believed: materials without a table, doubtful units.
     #[error("{0}")]
-    Room(sabine_acoustics::RoomNote),
+    Room(sabine_scene::RoomNote),
     /// The room file says nothing about the air.
     #[error("the room file has no [air]: 20 C, 50 % and 101.325 kPa are assumed")]
     AirAssumed,

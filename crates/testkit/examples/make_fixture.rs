@@ -8,9 +8,12 @@ use rand_pcg::Pcg64Mcg;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
 use sabine_acoustics::{
-    Air, Bands, Channel, ImpulseResponse, Levels, Material, MaterialPrior, Measurement, NamedMaterial,
-    NewResponse, NewRoom, PerBand, Receiver, SampleFormat, Scene, Source, TimeZero, Triangle,
-    library_material, read_audio, write_atomically, write_wav,
+    Air, Bands, Channel, ImpulseResponse, Material, PerBand, SampleFormat, library_material, read_audio,
+    write_atomically, write_wav,
+};
+use sabine_scene::{
+    Levels, MaterialPrior, Measurement, NamedMaterial, NewResponse, NewRoom, Receiver, Scene, Source,
+    TimeZero, Triangle,
 };
 use sabine_testkit::{PhononConfig, Phonons};
 use serde_json::json;

@@ -1,7 +1,8 @@
 //! Every ray against every triangle.
 
 use crate::geometry::{Vec3, first_hit};
-use sabine_acoustics::{RayHit, RayScene, Scene};
+use sabine_paths::{RayHit, RayScene};
+use sabine_scene::Scene;
 
 /// The plainest ray scene there is: time grows with the number of triangles, and nothing can be lost in a tree.
 #[derive(Clone, Debug)]

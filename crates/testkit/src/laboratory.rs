@@ -40,22 +40,22 @@ mod screened_room;
 mod steep_bands;
 mod stream;
 mod truth;
-mod typical;
 mod unfolded;
 
 pub use config::LabConfig;
 pub use hidden::{End, Fault, Gap, Hidden};
 pub use screened_room::{ScreenedConfig, ScreenedRoom};
-pub use truth::{TrueMaterial, TrueSession, TrueSource, Truth};
+pub use truth::{TrueMaterial, TrueMicrophone, TrueSession, TrueSource, Truth};
 
 use box_decay::BoxDecay;
 use image_field::Columns;
 use noise::{BandEnergies, Noise};
 use random_room::Declared;
 use rayon::prelude::*;
-use sabine_acoustics::{
-    Air, Bands, Error, ImpulseResponse, Material, MaterialPrior, MeasuredRoom, Measurement, NamedMaterial,
-    NewResponse, NewRoom, PerBand, Receiver, Scene, Source, Triangle,
+use sabine_acoustics::{Air, Bands, Error, ImpulseResponse, Material, PerBand};
+use sabine_scene::{
+    MaterialPrior, MeasuredRoom, Measurement, NamedMaterial, NewResponse, NewRoom, Receiver, Scene, Source,
+    Triangle,
 };
 use scattered_field::ScatteredField;
 use std::io;
@@ -119,7 +119,10 @@ impl Laboratory {
             .receivers_m
             .iter()
             .enumerate()
-            .map(|(i, &place)| Receiver::omni(format!("r{}", i + 1), place))
+            .map(|(i, &place)| {
+                let axis = config.microphone_axes.then(|| truth.microphones[i].axis);
+                Ok(Receiver { axis, ..Receiver::omni(format!("r{}", i + 1), place)? })
+            })
             .collect::<Result<_, Error>>()?;
         let air = truth.air()?;
         Ok(Self { config, bands, scene, priors, air, sources, receivers, truth })
@@ -233,7 +236,7 @@ impl Laboratory {
         let noise = Noise::new(truth, &energies, samples);
         responses.par_iter_mut().enumerate().for_each(|(index, samples)| {
             noise.add(truth, index, self.bands, self.config.sample_rate_hz, samples);
-            recorder::record(truth, index, rate_hz, samples);
+            recorder::record(truth, index, self.bands, self.config.sample_rate_hz, samples);
         });
         recorder::swap(truth, &mut responses);
         responses
@@ -256,14 +259,14 @@ impl Laboratory {
         effects: &[Hidden],
         folder: &Path,
         truth_file: Option<&Path>,
-    ) -> Result<MeasuredRoom, Error> {
+    ) -> Result<MeasuredRoom, sabine_scene::Error> {
         let truth = self.truth(effects)?;
         // Two ways to say where something is must not hide that it is the same place.
         let full = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         if let Some(path) = truth_file.filter(|path| full(path).starts_with(full(folder))) {
             let source =
                 io::Error::new(io::ErrorKind::InvalidInput, "the truth must not lie within the room");
-            return Err(Error::Io { path: path.to_owned(), source });
+            return Err(Error::Io { path: path.to_owned(), source }.into());
         }
         let room = self.new_room(self.render(&truth)?)?;
         if let Some(path) = truth_file {

@@ -3,7 +3,7 @@
 //! This crate is never published. It imports `sabine-acoustics` alone, for the vocabulary: geometry, air, filters and random
 //! walks are written here a second time, in another way than in the crates under test.
 //!
-//! - [`ShoeboxImages`]: all image sources of a box, as energy, as pressure and as a [`PathSet`](sabine_acoustics::PathSet).
+//! - [`ShoeboxImages`]: all image sources of a box, as energy, as pressure and as a [`PathSet`](sabine_paths::PathSet).
 //! - [`BoxModes`]: standing waves of a box whose walls have an impedance, exactly.
 //! - [`WaveGrid`]: the wave equation in a box with thin screens, by finite differences.
 //! - [`BruteForceRays`]: every ray against every triangle.
@@ -16,7 +16,8 @@
 //! What it does **not** do: run fast, read files of users, or follow diffraction but in [`WaveGrid`].
 //!
 //! ```
-//! use sabine_acoustics::{Bands, Material, Receiver, Scene, Source};
+//! use sabine_acoustics::{Bands, Material};
+//! use sabine_scene::{Receiver, Scene, Source};
 //! use sabine_testkit::ShoeboxImages;
 //! let bands = Bands::octaves(1000.0, 1000.0)?;
 //! let hard = Material::uniform(bands, 0.1, 0.0)?;
@@ -31,7 +32,7 @@
 //!
 //! Lengths in metres, times in seconds, energies relative to the direct sound at 1 m.
 //!
-//! Accuracy: `tests/oracles.rs` holds the oracles against closed forms and against each other. References: J. B. Allen and D. A. Berkley, JASA 65
+//! Accuracy: `tests/it/oracles.rs` holds the oracles against closed forms and against each other. References: J. B. Allen and D. A. Berkley, JASA 65
 //! (1979) 943 (image sources); H. Kuttruff, *Room Acoustics* (particles, mean free path).
 
 mod box_modes;
@@ -48,8 +49,8 @@ mod wave_grid;
 pub use box_modes::BoxModes;
 pub use brute_force::BruteForceRays;
 pub use laboratory::{
-    End, Fault, Gap, Hidden, LabConfig, Laboratory, ScreenedConfig, ScreenedRoom, TrueMaterial, TrueSession,
-    TrueSource, Truth,
+    End, Fault, Gap, Hidden, LabConfig, Laboratory, ScreenedConfig, ScreenedRoom, TrueMaterial,
+    TrueMicrophone, TrueSession, TrueSource, Truth,
 };
 pub use phonons::{PhononConfig, PhononEnergy, Phonons};
 pub use shoebox::{Image, ShoeboxImages};

@@ -6,7 +6,8 @@ use crate::geometry::{Vec3, add, cross, dot, first_hit, norm, scale, sub};
 use crate::own_air::{energy_exponent_per_m, speed_of_sound_m_s};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use sabine_acoustics::{Air, Bands, EnergyResponse, Error, ImpulseResponse, Receiver, Scene, Source};
+use sabine_acoustics::{Air, Bands, EnergyResponse, Error, ImpulseResponse, OutOfRange};
+use sabine_scene::{Receiver, Scene, Source};
 use std::f64::consts::{PI, TAU};
 
 /// Batches into which the particles fall: their scatter gives the standard errors, and each has its own random numbers, so that
@@ -85,7 +86,7 @@ impl Phonons {
         ];
         for (field, value) in checks {
             if !(value.is_finite() && value > 0.0) {
-                return Err(Error::OutOfRange { field, value, range: "positive" });
+                return Err(OutOfRange { field, value, range: "positive" }.into());
             }
         }
         let triangles = corners(scene);
@@ -94,7 +95,7 @@ impl Phonons {
             scale(n, 1.0 / norm(n))
         };
         let bands = scene.materials()[0].material.bands();
-        let surface = |t: &sabine_acoustics::Triangle| {
+        let surface = |t: &sabine_scene::Triangle| {
             let m = &scene.materials()[t.material as usize].material;
             let pairs = m.absorption().values().iter().zip(m.scattering().values());
             pairs.map(|(a, s)| (1.0 - a, *s)).collect()

@@ -3,10 +3,9 @@
 use crate::filter::{Complement, add_pulse, join_bands};
 use crate::geometry::Vec3;
 use crate::own_air::{energy_exponent_per_m, speed_of_sound_m_s};
-use sabine_acoustics::{
-    Air, Contribution, EnergyResponse, Error, ImpulseResponse, Observer, PathSet, Propagator, Receiver,
-    Reflection, Scene, Source, report,
-};
+use sabine_acoustics::{Air, EnergyResponse, Error, ImpulseResponse, Observer, OutOfRange, report};
+use sabine_paths::{Contribution, PathSet, Propagator, Reflection};
+use sabine_scene::{Receiver, Scene, Source};
 use std::fmt;
 
 /// All image sources of a box up to a duration (Allen and Berkley 1979), each wall reflecting the share (1 - absorption)
@@ -68,7 +67,7 @@ impl ShoeboxImages {
             Ok(Self { duration_s })
         } else {
             let range = "between 0.001 and 20 s";
-            Err(Error::OutOfRange { field: "duration (s)", value: duration_s, range })
+            Err(OutOfRange { field: "duration (s)", value: duration_s, range }.into())
         }
     }
 

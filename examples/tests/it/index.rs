@@ -48,7 +48,7 @@ fn every_example_is_short_and_says_how_to_run_it_what_it_prints_and_where_to_go_
         assert!(lines <= MAX_LINES, "{name}.rs has {lines} lines");
         let header: Vec<&str> = source.lines().take_while(|line| line.starts_with("//!")).collect();
         let header = header.join("\n");
-        assert!(header.contains(&format!("cargo run --release --example {name}")), "{name}: no command");
+        assert!(header.contains(&format!("cargo run --example {name}")), "{name}: no command");
         assert_eq!(header.matches("```").count(), 4, "{name}: a command and what it prints");
         assert!(header.contains("`sabine "), "{name}: which command does it in full?");
         assert!(!source.contains("clap"), "{name}: an example takes one argument at most");

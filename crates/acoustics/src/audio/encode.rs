@@ -1,8 +1,10 @@
 //! Writing sound.
 
 use super::SampleFormat;
-use crate::error::check_range;
-use crate::{Error, Signal, write_atomically};
+use crate::atomic_file::write_atomically;
+use crate::error::Error;
+use crate::out_of_range::OutOfRange;
+use crate::signal::Signal;
 use std::io;
 use std::path::Path;
 
@@ -129,7 +131,7 @@ fn check_writable(channels: &[&[f32]], sample_rate_hz: u32, format: SampleFormat
 }
 
 pub(super) fn check_channels(channels: usize) -> Result<(), Error> {
-    check_range("number of channels", channels as f64, 1.0, 64.0, "between 1 and 64")
+    Ok(OutOfRange::check("number of channels", channels as f64, 1.0, 64.0, "between 1 and 64")?)
 }
 
 /// That an integer format can hold the samples.
@@ -138,14 +140,14 @@ pub(super) fn check_full_scale(samples: &[f32], format: SampleFormat) -> Result<
         && let Some(&beyond) = samples.iter().find(|s| s.abs() > 1.0)
     {
         let range = "between -1 and 1 in an integer format";
-        return Err(Error::OutOfRange { field: "sample", value: f64::from(beyond), range });
+        return Err(Error::OutOfRange(OutOfRange { field: "sample", value: f64::from(beyond), range }));
     }
     Ok(())
 }
 
 /// That the RIFF header, which counts bytes in 32 bits, can count so many samples.
 pub(super) fn check_count(samples: u64) -> Result<(), Error> {
-    check_range("number of samples", samples as f64, 1.0, 1e9, "between 1 and 1e9 in a WAV file")
+    Ok(OutOfRange::check("number of samples", samples as f64, 1.0, 1e9, "between 1 and 1e9 in a WAV file")?)
 }
 
 pub(super) fn into_io(error: hound::Error) -> io::Error {

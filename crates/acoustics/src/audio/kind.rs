@@ -5,6 +5,14 @@ use std::fmt;
 /// Bytes that are looked at.
 pub(super) const LOOK: usize = 512;
 
+/// What is read, for messages.
+#[cfg(feature = "symphonia")]
+pub(crate) const READ_FORMATS: &str =
+    "WAV (RF64 and BW64 too; PCM of up to 32 bits, floats of 32 or 64 bits), FLAC, Ogg Vorbis and AIFF";
+/// What is read, for messages.
+#[cfg(not(feature = "symphonia"))]
+pub(crate) const READ_FORMATS: &str = "WAV (RF64 and BW64 too; PCM of up to 32 bits, floats of 32 or 64 bits), and FLAC, Ogg Vorbis and AIFF with the feature `symphonia`";
+
 /// What the first bytes of a file say that it is. `Display` names it in words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]

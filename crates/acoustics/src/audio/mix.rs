@@ -1,7 +1,7 @@
 //! One channel out of several.
 
 use super::Channel;
-use crate::Error;
+use crate::error::Error;
 use std::path::Path;
 
 /// Turns interleaved samples into one channel.

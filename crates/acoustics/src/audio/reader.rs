@@ -4,8 +4,9 @@ use super::kind::{FileKind, LOOK};
 use super::mix::Mixer;
 use super::wav::WavDecoder;
 use super::{AudioInfo, Channel};
-use crate::error::check_range;
-use crate::{Error, open_file};
+use crate::error::Error;
+use crate::out_of_range::OutOfRange;
+use crate::regular_file::open_file;
 use std::fmt;
 use std::io::{BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
@@ -88,8 +89,14 @@ impl AudioReader {
             #[cfg(feature = "symphonia")]
             Decoder::Other(other) => (other.sample_rate_hz(), other.channels(), other.frames()),
         };
-        check_range("sample rate (Hz)", f64::from(sample_rate_hz), 1e3, 768e3, "between 1 kHz and 768 kHz")
-            .map_err(|error| error.in_file(path, "header"))?;
+        OutOfRange::check(
+            "sample rate (Hz)",
+            f64::from(sample_rate_hz),
+            1e3,
+            768e3,
+            "between 1 kHz and 768 kHz",
+        )
+        .map_err(|error| Error::from(error).in_file(path, "header"))?;
         Ok(Self {
             mixer: Mixer::new(path, channel, channels)?,
             path: path.to_owned(),
@@ -188,7 +195,7 @@ impl AudioReader {
         let (sample, index) = (self.mixed[at], self.position as usize + at);
         let error = if sample.is_finite() {
             let range = "within 200 dB of full scale (1)";
-            Error::OutOfRange { field: "a sample", value: f64::from(sample), range }
+            Error::OutOfRange(OutOfRange { field: "a sample", value: f64::from(sample), range })
         } else {
             Error::NotFinite { what: "signal", index }
         };

@@ -1,6 +1,6 @@
 //! Sound in formats other than WAV, by symphonia.
 
-use crate::Error;
+use crate::error::Error;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use symphonia::core::codecs::audio::{AudioDecoder, AudioDecoderOptions};

@@ -1,7 +1,7 @@
 //! Samples of a WAV file.
 
 use super::wav_header::{Encoding, WavHeader, failed};
-use crate::Error;
+use crate::error::Error;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};

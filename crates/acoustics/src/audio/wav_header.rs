@@ -1,8 +1,9 @@
 //! The chunks of a WAV file: RIFF, and RF64 and BW64 beyond 4 GiB (EBU Tech 3306, ITU-R BS.2088).
 
 use super::kind::FileKind;
-use crate::Error;
-use crate::error::check_range;
+use crate::error::Error;
+use crate::out_of_range::OutOfRange;
+use std::fmt;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -50,21 +51,37 @@ pub(super) struct WavHeader {
 }
 
 /// A WAV file that contradicts itself.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug)]
 enum Malformed {
-    #[error("malformed WAV: the file ends inside its header")]
     Ends,
-    #[error("malformed WAV: chunk `{id}` of {bytes} bytes reaches beyond the end of the file")]
     BeyondEnd { id: String, bytes: u64 },
-    #[error("malformed WAV: there is no `{id}` chunk before the samples")]
     Missing { id: &'static str },
-    #[error("malformed WAV: the `{id}` chunk has {bytes} bytes")]
     Short { id: &'static str, bytes: u64 },
-    #[error("malformed WAV: frames of {frame} bytes for {channels} channels of {bits} bits")]
     Frame { frame: u16, channels: u16, bits: u16 },
-    #[error("malformed WAV: {bytes} bytes of samples are no whole number of frames of {frame} bytes")]
     PartFrame { bytes: u64, frame: usize },
 }
+
+impl fmt::Display for Malformed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Ends => f.write_str("malformed WAV: the file ends inside its header"),
+            Self::BeyondEnd { id, bytes } => {
+                write!(f, "malformed WAV: chunk `{id}` of {bytes} bytes reaches beyond the end of the file")
+            }
+            Self::Missing { id } => write!(f, "malformed WAV: there is no `{id}` chunk before the samples"),
+            Self::Short { id, bytes } => write!(f, "malformed WAV: the `{id}` chunk has {bytes} bytes"),
+            Self::Frame { frame, channels, bits } => {
+                write!(f, "malformed WAV: frames of {frame} bytes for {channels} channels of {bits} bits")
+            }
+            Self::PartFrame { bytes, frame } => write!(
+                f,
+                "malformed WAV: {bytes} bytes of samples are no whole number of frames of {frame} bytes"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for Malformed {}
 
 impl WavHeader {
     pub(super) fn frame_bytes(&self) -> usize {
@@ -157,14 +174,14 @@ impl Walk<'_> {
     fn samples(&self, format: Format, promised_bytes: u64) -> Result<WavHeader, Error> {
         let (encoding, channels) = self.encoding(format)?;
         let header = |error: Error| error.in_file(self.path, "header");
-        check_range(
+        OutOfRange::check(
             "sample rate (Hz)",
             f64::from(format.sample_rate_hz),
             1e3,
             768e3,
             "between 1 kHz and 768 kHz",
         )
-        .map_err(header)?;
+        .map_err(|error| header(error.into()))?;
         let left = self.file_bytes - self.at;
         let frame = channels * encoding.bytes();
         let is_stream = promised_bytes == UNKNOWN || promised_bytes == SOX_STREAM && left < SOX_STREAM;
@@ -193,8 +210,8 @@ impl Walk<'_> {
         let encoding = match (tag, bits) {
             (1, bits) => {
                 let range = "between 1 and 32";
-                check_range("bits per sample", f64::from(bits), 1.0, 32.0, range)
-                    .map_err(|error| error.in_file(self.path, "header"))?;
+                OutOfRange::check("bits per sample", f64::from(bits), 1.0, 32.0, range)
+                    .map_err(|error| Error::from(error).in_file(self.path, "header"))?;
                 Encoding::Int { bytes: usize::from(bits.div_ceil(8)) }
             }
             (3, 32) => Encoding::Float32,

@@ -2,8 +2,8 @@
 
 use super::SampleFormat;
 use super::encode::{check_channels, check_count, check_full_scale, into_io, spec, write_samples};
-use crate::Error;
 use crate::atomic_file::UnfinishedFile;
+use crate::error::Error;
 use crate::signal::check_samples;
 use std::fmt;
 use std::fs::File;

@@ -3,14 +3,14 @@
 use crate::failure::Failure;
 use clap::Args;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
-use sabine::acoustics::{
-    Air, Bands, DiffuseRoom, Material, Observer, PathSet, Propagator, Receiver, Scene, Source,
-};
+use sabine::acoustics::{Air, Bands, Material, Observer};
 use sabine::augment::{
     Built, DatasetBuilder, DatasetConfig, DatasetSources, Error, Manifest, NoiseCorpus, Partition,
     PolyhedralRoomConfig, ResponseCorpus, ResponseFilter, RoomCache, SpeechCorpus, TracedRooms, Worker,
 };
+use sabine::paths::{Conditions, PathSet, Propagator};
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
+use sabine::scene::{DiffuseRoom, Receiver, Scene, Source};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -216,7 +216,7 @@ fn traced_rooms(
     let render = |paths: &PathSet, scene: &Scene, air: &Air, seed: u64| {
         let materials: Vec<Material> = scene.materials().iter().map(|m| m.material.clone()).collect();
         let renderer = PressureRenderer::new(RenderConfig { seed, ..rendering.clone() })?;
-        Ok(renderer.render(paths, &materials, air)?)
+        Ok(renderer.render(paths, &Conditions::new(&materials, air))?)
     };
     let cache = RoomCache {
         folder: arguments.out.join("rooms"),

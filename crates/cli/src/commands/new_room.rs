@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use clap::{ArgGroup, Args};
-use sabine::acoustics::{DrawnRoom, FloorPlan, Receiver, Source};
+use sabine::scene::{DrawnRoom, FloorPlan, Receiver, Source};
 use std::path::PathBuf;
 
 /// Make a room folder from a size or a floor plan and names of the material library (`sabine materials`).

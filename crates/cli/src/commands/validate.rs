@@ -6,12 +6,11 @@ use crate::bar::Bar;
 use crate::failure::Failure;
 use crate::room::read_room;
 use clap::Args;
-use sabine::acoustics::{
-    Bands, Conditions, Estimate, Material, MaterialTable, Materials, MeasuredRoom, PathParameters, PathSet,
-    PerBand, Propagator, Reading, Scene, library_material,
-};
-use sabine::optimize::{AbsorptionPrior, FitConfig, MaterialFitter};
+use sabine::acoustics::{Bands, Estimate, Material, PerBand, Reading, library_material};
+use sabine::optimize::{AbsorptionPrior, FitConfig, FitProblem, MaterialFitter};
+use sabine::paths::{Conditions, PathParameters, PathSet, Propagator};
 use sabine::propagate::{PathTracer, TracerConfig};
+use sabine::scene::{MaterialTable, Materials, MeasuredRoom, Scene};
 use std::path::{Path, PathBuf};
 
 /// Compare simulated with measured room means, in just-noticeable differences (ISO 3382-1, table A.1).
@@ -201,7 +200,8 @@ fn fitted(
     let fitter = MaterialFitter::new(FitConfig { range_db: (-5.0, -25.0), ..FitConfig::default() })?;
     let references: Vec<&PathSet> = paths.iter().collect();
     let targets = PerBand::new(bands, targets)?;
-    let fit = fitter.fit_t60(&references, materials, &priors, &room.air(), &targets, bar)?;
+    let fit =
+        fitter.fit_t60(&references, &FitProblem::new(materials, &priors, &room.air()), &targets, bar)?;
     let names: Vec<&str> = room.scene().materials().iter().map(|named| named.name.as_str()).collect();
     let unreachable = fit.unreachable.iter().map(ToString::to_string);
     for note in unreachable.chain(fit.warnings.iter().map(|warning| warning.describe(&names))) {

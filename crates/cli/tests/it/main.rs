@@ -2,13 +2,20 @@
 
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
+#[cfg(target_os = "linux")] // peak memory is read from /proc; named pipes and devices
+mod bad_inputs;
 mod console;
 mod diagnose;
+#[cfg(unix)]
+mod faults;
 mod fit;
 mod listen;
 mod live;
 mod long_files;
 mod match_room;
+#[cfg(unix)]
+#[path = "../../../acoustics/tests/faults/process.rs"]
+mod process;
 mod replace;
 mod rooms;
 mod trace;

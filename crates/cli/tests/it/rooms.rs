@@ -1,7 +1,8 @@
 //! What commands say of a room before they compute: its size, its units, its guesses; rooms that are drawn; walks into walls.
 
 use crate::sabine;
-use sabine::acoustics::{MeasuredRoom, material_library};
+use sabine::acoustics::material_library;
+use sabine::scene::MeasuredRoom;
 use serde_json::Value;
 use std::path::Path;
 use std::process::Output;
@@ -87,6 +88,8 @@ fn a_drawn_room_is_traced() {
     let traced = ["--room", room, "--rays", "2000", "--rate", "16000", "--out", out.to_str().unwrap()];
     let text = printed(&run("trace", &traced));
     assert!(text.starts_with("room: 5 x 4 x 2.6 m") && !text.contains("note: "), "{text}");
+    let written = std::fs::read_to_string(Path::new(room).join("room.toml")).unwrap();
+    assert!(written.starts_with("[room]\n") && !written.contains("responses"), "{written}");
     let again = refused(&run("new-room", &arguments));
     assert!(again.contains("living room"), "{again}");
 }

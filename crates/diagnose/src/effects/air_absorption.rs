@@ -1,9 +1,8 @@
 //! `air_absorption`: the air was drier or moister than the room file says.
 
 use crate::effect::EffectInfo;
-use crate::effect::FittedCase;
 use crate::effect::next_measurement::NextMeasurement;
-use crate::effect::{Case, Effect, Parameter};
+use crate::effect::{Case, DecayTerm, Effect, Parameter};
 use crate::extend::model_change::ModelChange;
 use crate::simulate::views::BandView;
 use crate::survey::Survey;
@@ -33,27 +32,19 @@ impl Effect for AirAbsorption {
         ])
     }
 
-    fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
-        vec![Box::new(*self)]
+    fn cases(&self, survey: &Survey) -> Vec<Case> {
+        let stated = survey.air().relative_humidity_percent();
+        let other = if stated > 35.0 { 0.5 * stated } else { 2.0 * stated };
+        let bounds = (DRIEST_PERCENT, MOISTEST_PERCENT);
+        let humidity = Parameter::new("relative_humidity", "%", stated, 20.0, bounds).typically(other);
+        let starts = vec![vec![stated], vec![0.4 * stated], vec![0.5 * (stated + MOISTEST_PERCENT)]];
+        let case = Case::decay(vec![humidity], *self).starting(starts);
+        vec![case.changing(|fitted| vec![ModelChange::RelativeHumidity(fitted.values()[0])])]
     }
 }
 
-impl Case for AirAbsorption {
-    fn parameters(&self, survey: &Survey) -> Vec<Parameter> {
-        let stated = survey.air().relative_humidity_percent();
-        let dry = if stated > 35.0 { 0.5 * stated } else { 2.0 * stated };
-        vec![
-            Parameter::new("relative_humidity", "%", stated, 20.0, (DRIEST_PERCENT, MOISTEST_PERCENT))
-                .typically(dry),
-        ]
-    }
-
-    fn starts(&self, survey: &Survey) -> Vec<Vec<f64>> {
-        let stated = survey.air().relative_humidity_percent();
-        vec![vec![stated], vec![0.4 * stated], vec![0.5 * (stated + MOISTEST_PERCENT)]]
-    }
-
-    fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+impl DecayTerm for AirAbsorption {
+    fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
         let stated = view.pair().air;
         let change = values[0] - view.survey().air().relative_humidity_percent();
         let percent = (stated.relative_humidity_percent() + change).clamp(DRIEST_PERCENT, MOISTEST_PERCENT);
@@ -64,9 +55,5 @@ impl Case for AirAbsorption {
         for (bin, l) in ln_energy.iter_mut().enumerate() {
             *l += per_s * view.time_s(bin);
         }
-    }
-
-    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
-        vec![ModelChange::RelativeHumidity(fitted.values()[0])]
     }
 }

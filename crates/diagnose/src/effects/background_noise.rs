@@ -2,9 +2,8 @@
 
 use super::add_energy;
 use crate::effect::EffectInfo;
-use crate::effect::FittedCase;
 use crate::effect::next_measurement::NextMeasurement;
-use crate::effect::{Case, Effect, Parameter, Stage};
+use crate::effect::{Case, DecayTerm, Effect, FittedCase, Parameter, Stage};
 use crate::extend::model_change::ModelChange;
 use crate::simulate::views::BandView;
 use crate::survey::Survey;
@@ -29,36 +28,23 @@ impl Effect for BackgroundNoise {
         .decided_by(1, NextMeasurement::LongerWithSilence)
     }
 
-    fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
-        vec![Box::new(*self)]
+    fn cases(&self, survey: &Survey) -> Vec<Case> {
+        // Neutral is where it cannot be told from none.
+        let level = Parameter::new("level", "dB", -60.0, 20.0, (-90.0, 0.0)).typically(-30.0);
+        let levels = (0..survey.bands().len()).map(|b| level.clone().in_band(b, survey)).collect();
+        let starts = vec![vec![-35.0; survey.bands().len()]];
+        vec![Case::decay(levels, *self).at(Stage::Noise).starting(starts).changing(changes)]
     }
 }
 
-impl Case for BackgroundNoise {
-    fn stage(&self) -> Stage {
-        Stage::Noise
-    }
+fn changes(fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+    let level = |b: usize| fitted.level_per_s(b).unwrap_or(0.0) * 10f64.powf(fitted.values()[b] / 10.0);
+    vec![ModelChange::Noise(fitted.per_band(level))]
+}
 
-    fn parameters(&self, survey: &Survey) -> Vec<Parameter> {
-        (0..survey.bands().len())
-            .map(|b| {
-                // Neutral is where it cannot be told from none.
-                Parameter::new("level", "dB", -60.0, 20.0, (-90.0, 0.0)).typically(-30.0).in_band(b, survey)
-            })
-            .collect()
-    }
-
-    fn starts(&self, survey: &Survey) -> Vec<Vec<f64>> {
-        vec![vec![-35.0; survey.bands().len()]]
-    }
-
-    fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+impl DecayTerm for BackgroundNoise {
+    fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
         let noise = view.reference_energy() * 10f64.powf(values[view.band()] / 10.0);
         ln_energy.iter_mut().for_each(|l| *l = add_energy(*l, noise));
-    }
-
-    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
-        let level = |b: usize| fitted.level_per_s(b).unwrap_or(0.0) * 10f64.powf(fitted.values()[b] / 10.0);
-        vec![ModelChange::Noise(fitted.per_band(level))]
     }
 }

@@ -1,12 +1,11 @@
 //! `channel_fault`: one channel is wrong.
 
 use crate::effect::EffectInfo;
-use crate::effect::FittedCase;
 use crate::effect::next_measurement::NextMeasurement;
-use crate::effect::{Case, Effect, Nuisance, Observable, Parameter};
+use crate::effect::{Case, ChannelChange, Effect, Nuisance};
 use crate::extend::model_change::ModelChange;
 use crate::survey::Survey;
-use sabine_acoustics::Levels;
+use sabine_scene::Levels;
 
 /// One response has the wrong sign or another gain, or two responses were exchanged.
 ///
@@ -27,103 +26,43 @@ impl Effect for ChannelFault {
         .decided_by(8, NextMeasurement::ExchangedChannel)
     }
 
-    fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {
+    fn cases(&self, survey: &Survey) -> Vec<Case> {
         let responses = survey.responses();
-        let mut cases: Vec<Box<dyn Case>> = Vec::new();
+        let mut cases: Vec<Case> = Vec::new();
         for (i, response) in responses.iter().enumerate() {
-            let name = &response.name;
             if responses.len() > 2 {
-                cases.push(Box::new(Polarity { response: i, name: name.clone() }));
+                cases.push(polarity(i, &response.name));
             }
             if responses.len() > 1 && survey.measurement().levels != Levels::PerResponse {
-                cases.push(Box::new(Gain { response: i, name: name.clone() }));
+                cases.push(gain(i, &response.name));
             }
             for (j, other) in responses.iter().enumerate().skip(i + 1) {
-                let name = format!("{name} and {}", other.name);
-                cases.push(Box::new(Exchange { responses: (i, j), name }));
+                cases.push(exchange((i, j), [&response.name, &other.name]));
             }
         }
         cases
     }
 }
 
-struct Polarity {
-    response: usize,
-    name: String,
+fn polarity(response: usize, name: &str) -> Case {
+    let inverted = ModelChange::Inverted(name.to_owned());
+    Case::channels(ChannelChange::Inverted(response))
+        .about(format!("polarity of {name}"))
+        .changing(move |_| vec![inverted.clone()])
 }
 
-impl Case for Polarity {
-    fn subject(&self) -> Option<String> {
-        Some(format!("polarity of {}", self.name))
-    }
-
-    fn observable(&self) -> Observable {
-        Observable::Channels
-    }
-
-    fn parameters(&self, _: &Survey) -> Vec<Parameter> {
-        Vec::new()
-    }
-
-    fn inverted(&self) -> Option<usize> {
-        Some(self.response)
-    }
-
-    fn model_changes(&self, _: &FittedCase<'_>) -> Vec<ModelChange> {
-        vec![ModelChange::Inverted(self.name.clone())]
-    }
+fn gain(response: usize, name: &str) -> Case {
+    let (nuisance, name) = (Nuisance::ResponseGain(response), name.to_owned());
+    Case::prior(nuisance, OPEN_SD_DB).about(format!("gain of {name}")).changing(move |fitted| {
+        let gain_db = fitted.relaxed(nuisance).and_then(|g| g.first().copied());
+        let change = |gain_db| ModelChange::ResponseGain { response: name.clone(), gain_db };
+        gain_db.map(change).into_iter().collect()
+    })
 }
 
-struct Gain {
-    response: usize,
-    name: String,
-}
-
-impl Case for Gain {
-    fn subject(&self) -> Option<String> {
-        Some(format!("gain of {}", self.name))
-    }
-
-    fn parameters(&self, _: &Survey) -> Vec<Parameter> {
-        Vec::new()
-    }
-
-    fn relaxes(&self) -> Vec<(Nuisance, f64)> {
-        vec![(Nuisance::ResponseGain(self.response), OPEN_SD_DB)]
-    }
-
-    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
-        let gain_db = fitted.relaxed(Nuisance::ResponseGain(self.response)).and_then(|g| g.first().copied());
-        let response = self.name.clone();
-        gain_db.map(|gain_db| ModelChange::ResponseGain { response, gain_db }).into_iter().collect()
-    }
-}
-
-struct Exchange {
-    responses: (usize, usize),
-    name: String,
-}
-
-impl Case for Exchange {
-    fn subject(&self) -> Option<String> {
-        Some(format!("{} exchanged", self.name))
-    }
-
-    fn observable(&self) -> Observable {
-        Observable::Channels
-    }
-
-    fn parameters(&self, _: &Survey) -> Vec<Parameter> {
-        Vec::new()
-    }
-
-    fn exchanged(&self) -> Option<(usize, usize)> {
-        Some(self.responses)
-    }
-
-    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
-        let (a, b) = self.responses;
-        let name = |r: usize| fitted.survey().responses()[r].name.clone();
-        vec![ModelChange::Exchanged([name(a), name(b)])]
-    }
+fn exchange((a, b): (usize, usize), names: [&str; 2]) -> Case {
+    let exchanged = ModelChange::Exchanged(names.map(str::to_owned));
+    Case::channels(ChannelChange::Exchanged(a, b))
+        .about(format!("{} and {} exchanged", names[0], names[1]))
+        .changing(move |_| vec![exchanged.clone()])
 }

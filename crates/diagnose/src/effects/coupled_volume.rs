@@ -2,9 +2,8 @@
 
 use super::add_energy;
 use crate::effect::EffectInfo;
-use crate::effect::FittedCase;
 use crate::effect::next_measurement::NextMeasurement;
-use crate::effect::{Case, Effect, Parameter, Stage};
+use crate::effect::{Case, DecayTerm, Effect, FittedCase, Parameter, Stage};
 use crate::extend::extended_model::{BUILD_UP_S, CoupledDecay};
 use crate::extend::model_change::ModelChange;
 use crate::simulate::views::BandView;
@@ -31,18 +30,8 @@ impl Effect for CoupledVolume {
         .decided_by(0, NextMeasurement::DoorsClosed)
     }
 
-    fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
-        vec![Box::new(*self)]
-    }
-}
-
-impl Case for CoupledVolume {
-    fn stage(&self) -> Stage {
-        Stage::Added
-    }
-
-    fn parameters(&self, _: &Survey) -> Vec<Parameter> {
-        let mut found = vec![
+    fn cases(&self, _: &Survey) -> Vec<Case> {
+        let mut parameters = vec![
             Parameter::new("level_1_khz", "dB", -60.0, 20.0, (-90.0, 0.0)).typically(-25.0),
             Parameter::new("level_per_octave", "dB", 0.0, 2.0, (-10.0, 10.0)),
             Parameter::new("decay_time_1_khz", "s", 1.2, 0.7, (0.2, 6.0)),
@@ -50,16 +39,15 @@ impl Case for CoupledVolume {
         ];
         for axis in ["x", "y", "z"] {
             let name = format!("level_along_{axis}");
-            found.push(Parameter::new(name, "dB/m", 0.0, 0.7, (-5.0, 5.0)));
+            parameters.push(Parameter::new(name, "dB/m", 0.0, 0.7, (-5.0, 5.0)));
         }
-        found
+        let starts = [0.7, 1.4].map(|t| vec![-25.0, 0.0, t, -0.1, 0.0, 0.0, 0.0]).to_vec();
+        vec![Case::decay(parameters, *self).at(Stage::Added).starting(starts).changing(changes)]
     }
+}
 
-    fn starts(&self, _: &Survey) -> Vec<Vec<f64>> {
-        [0.7, 1.4].map(|t| vec![-25.0, 0.0, t, -0.1, 0.0, 0.0, 0.0]).to_vec()
-    }
-
-    fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+impl DecayTerm for CoupledVolume {
+    fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
         let survey = view.survey();
         let octaves = survey.octaves_from_1khz(view.band());
         let count = survey.receivers().len() as f64;
@@ -79,21 +67,21 @@ impl Case for CoupledVolume {
             *l = add_energy(*l, energy);
         }
     }
+}
 
-    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
-        let (values, survey) = (fitted.values(), fitted.survey());
-        let octaves = |b: usize| survey.octaves_from_1khz(b);
-        let level = |b: usize| {
-            fitted.level_per_s(b).unwrap_or(0.0) * 10f64.powf((values[0] + values[1] * octaves(b)) / 10.0)
-        };
-        let receivers = survey.receivers().len() as f64;
-        vec![ModelChange::CoupledVolume(CoupledDecay {
-            energy_per_s: fitted.per_band(level),
-            decay_time_s: fitted.per_band(|b| (values[2] * (values[3] * octaves(b)).exp()).clamp(0.1, 20.0)),
-            gradient_db_per_m: [values[4], values[5], values[6]],
-            centre_m: std::array::from_fn(|k| {
-                survey.receivers().iter().map(|r| r.position_m[k]).sum::<f64>() / receivers
-            }),
-        })]
-    }
+fn changes(fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+    let (values, survey) = (fitted.values(), fitted.survey());
+    let octaves = |b: usize| survey.octaves_from_1khz(b);
+    let level = |b: usize| {
+        fitted.level_per_s(b).unwrap_or(0.0) * 10f64.powf((values[0] + values[1] * octaves(b)) / 10.0)
+    };
+    let receivers = survey.receivers().len() as f64;
+    vec![ModelChange::CoupledVolume(CoupledDecay {
+        energy_per_s: fitted.per_band(level),
+        decay_time_s: fitted.per_band(|b| (values[2] * (values[3] * octaves(b)).exp()).clamp(0.1, 20.0)),
+        gradient_db_per_m: [values[4], values[5], values[6]],
+        centre_m: std::array::from_fn(|k| {
+            survey.receivers().iter().map(|r| r.position_m[k]).sum::<f64>() / receivers
+        }),
+    })]
 }

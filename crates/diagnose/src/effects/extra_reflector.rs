@@ -1,9 +1,8 @@
 //! `extra_reflector`: a flat surface that the mesh does not have.
 
 use crate::effect::EffectInfo;
-use crate::effect::FittedCase;
 use crate::effect::next_measurement::NextMeasurement;
-use crate::effect::{AddedReflection, Case, Effect, Observable, Parameter};
+use crate::effect::{AddedReflection, Case, Effect, FittedCase, Parameter, ReflectionTerm};
 use crate::extend::extended_model::ThinPanel;
 use crate::extend::model_change::ModelChange;
 use crate::likelihood::multilateration::{UnassignedPeaks, mirrored, panel_axes};
@@ -42,9 +41,20 @@ impl Effect for ExtraReflector {
         .decided_by(12, NextMeasurement::ObjectsRemoved)
     }
 
-    fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {
+    fn cases(&self, survey: &Survey) -> Vec<Case> {
         // Three distances leave two places, a fourth decides, and fewer than five cannot contradict.
-        if survey.responses().len() >= 5 { vec![Box::new(*self)] } else { Vec::new() }
+        if survey.responses().len() < 5 {
+            return Vec::new();
+        }
+        let source = first_m(survey);
+        let axis = |(name, at): (&str, f64)| {
+            let bounds = (at - FARTHEST_M, at + FARTHEST_M);
+            Parameter::new(format!("image_{name}"), "m", at, IMAGE_SD_M, bounds).typically(at + 1.0)
+        };
+        let level = Parameter::new("reflectance", "dB", REFLECTANCE_DB.0, REFLECTANCE_DB.1, (-30.0, 6.0));
+        let parameters = ["x", "y", "z"].into_iter().zip(source).map(axis).chain([level]).collect();
+        let changes = |fitted: &FittedCase<'_>| panel(fitted).map(ModelChange::Panel).into_iter().collect();
+        vec![Case::reflection(parameters, *self).changing(changes)]
     }
 }
 
@@ -53,30 +63,12 @@ fn first_m(survey: &Survey) -> [f64; 3] {
     survey.responses().first().map_or([0.0; 3], |r| survey.sources()[r.source].position_m)
 }
 
-impl Case for ExtraReflector {
-    fn observable(&self) -> Observable {
-        Observable::Arrivals
+impl ReflectionTerm for ExtraReflector {
+    fn starts(&self, peaks: &UnassignedPeaks<'_>) -> Vec<Vec<f64>> {
+        peaks.images().into_iter().map(|[x, y, z]| vec![x, y, z, REFLECTANCE_DB.0]).collect()
     }
 
-    fn parameters(&self, survey: &Survey) -> Vec<Parameter> {
-        let source = first_m(survey);
-        let axis = |(name, at): (&str, f64)| {
-            let bounds = (at - FARTHEST_M, at + FARTHEST_M);
-            Parameter::new(format!("image_{name}"), "m", at, IMAGE_SD_M, bounds).typically(at + 1.0)
-        };
-        let level = Parameter::new("reflectance", "dB", REFLECTANCE_DB.0, REFLECTANCE_DB.1, (-30.0, 6.0));
-        ["x", "y", "z"].into_iter().zip(source).map(axis).chain([level]).collect()
-    }
-
-    fn seeks(&self) -> bool {
-        true
-    }
-
-    fn starts_among(&self, strays: &UnassignedPeaks<'_>) -> Vec<Vec<f64>> {
-        strays.images().into_iter().map(|[x, y, z]| vec![x, y, z, REFLECTANCE_DB.0]).collect()
-    }
-
-    fn added_reflection(&self, values: &[f64], survey: &Survey, response: usize) -> Option<AddedReflection> {
+    fn reflection(&self, values: &[f64], survey: &Survey, response: usize) -> Option<AddedReflection> {
         let pair = &survey.responses()[response];
         let source = survey.sources()[pair.source].position_m;
         let receiver = survey.receivers()[pair.receiver].position_m;
@@ -89,10 +81,6 @@ impl Case for ExtraReflector {
             arrival: way.arrival,
             level_db: values[3] + 20.0 * (direct_m / way.length_m).log10(),
         })
-    }
-
-    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
-        panel(fitted).map(ModelChange::Panel).into_iter().collect()
     }
 }
 

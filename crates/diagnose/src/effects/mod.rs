@@ -4,12 +4,14 @@ mod air_absorption;
 mod angle_dependent_absorption;
 mod background_noise;
 mod channel_fault;
+mod channel_response;
 mod coupled_volume;
 mod edge_diffraction;
 mod extra_reflector;
 mod nonlinear_distortion;
 mod open_patch;
 mod position_error;
+mod receiver_directivity;
 mod room_dimensions;
 mod room_modes;
 mod sampling_clock;
@@ -25,12 +27,14 @@ pub use air_absorption::AirAbsorption;
 pub use angle_dependent_absorption::AngleDependentAbsorption;
 pub use background_noise::BackgroundNoise;
 pub use channel_fault::ChannelFault;
+pub use channel_response::ChannelResponse;
 pub use coupled_volume::CoupledVolume;
 pub use edge_diffraction::MissingDiffraction;
 pub use extra_reflector::ExtraReflector;
 pub use nonlinear_distortion::NonlinearDistortion;
 pub use open_patch::OpenPatch;
 pub use position_error::PositionError;
+pub use receiver_directivity::ReceiverDirectivity;
 pub use room_dimensions::RoomDimensions;
 pub use room_modes::RoomModes;
 pub use sampling_clock::SamplingClock;
@@ -67,6 +71,8 @@ pub fn catalogue() -> Vec<Box<dyn Effect>> {
         Box::new(NonlinearDistortion),
         Box::new(MissingDiffraction),
         Box::new(RoomModes),
+        Box::new(ReceiverDirectivity),
+        Box::new(ChannelResponse),
     ]
 }
 

@@ -1,10 +1,9 @@
 //! `open_patch`: a wall has a hole.
 
 use crate::effect::EffectInfo;
-use crate::effect::FittedCase;
 use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::reflection_gate::ReflectionGate;
-use crate::effect::{AuxiliaryEvidence, Case, Effect, Parameter};
+use crate::effect::{AuxiliaryEvidence, Case, DecayTerm, Effect, FittedCase, Parameter, ReflectionEvidence};
 use crate::extend::extended_model::ThinPanel;
 use crate::extend::model_change::ModelChange;
 use crate::report::diagnosis::FoundParameter;
@@ -53,35 +52,51 @@ impl Effect for OpenPatch {
         .decided_by(11, NextMeasurement::PatchClosed)
     }
 
-    fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {
-        let one = |(index, plane): (usize, &Plane)| -> Box<dyn Case> {
-            Box::new(OneWall { index, plane: plane.clone() })
-        };
+    fn cases(&self, survey: &Survey) -> Vec<Case> {
+        let one = |(index, plane): (usize, &Plane)| OneWall { index, plane: plane.clone() }.case();
         survey.planes().iter().enumerate().map(one).collect()
     }
 }
 
+#[derive(Clone)]
 struct OneWall {
     index: usize,
     plane: Plane,
 }
 
-impl Case for OneWall {
-    fn subject(&self) -> Option<String> {
-        let [x, y, z] = self.plane.place_m(self.plane.extent_m.map(|[low, high]| 0.5 * (low + high)));
-        Some(format!("surface about {x:.1}, {y:.1}, {z:.1} m"))
+impl OneWall {
+    fn case(self) -> Case {
+        let plane = &self.plane;
+        let [x, y, z] = plane.place_m(plane.extent_m.map(|[low, high]| 0.5 * (low + high)));
+        let most = MAX_SHARE * plane.area_m2;
+        let area = Parameter::new("area", "m2", 0.0, AREA_SD_M2, (0.0, most)).typically(1.5f64.min(most));
+        let starts = vec![vec![0.5], vec![2.0f64.min(0.5 * plane.area_m2)]];
+        let wall = self.clone();
+        let changes = move |fitted: &FittedCase<'_>| {
+            let survey = fitted.survey();
+            let inside = survey.responses().first().map(|r| survey.sources()[r.source].position_m);
+            inside.and_then(|inside| wall.hole(inside, fitted)).map(ModelChange::Panel).into_iter().collect()
+        };
+        Case::decay(vec![area], self)
+            .about(format!("surface about {x:.1}, {y:.1}, {z:.1} m"))
+            .starting(starts)
+            .changing(changes)
     }
 
-    fn parameters(&self, _: &Survey) -> Vec<Parameter> {
-        let most = MAX_SHARE * self.plane.area_m2;
-        vec![Parameter::new("area", "m2", 0.0, AREA_SD_M2, (0.0, most)).typically(1.5f64.min(most))]
+    /// The hole: a square panel that absorbs everything, just before its wall on the side of `inside`.
+    fn hole(&self, inside: [f64; 3], fitted: &FittedCase<'_>) -> Option<ThinPanel> {
+        let centre = [fitted.found("centre_x")?, fitted.found("centre_y")?, fitted.found("centre_z")?];
+        let [normal, along, across] = self.plane.axes;
+        let towards: f64 = (0..3).map(|k| normal[k] * (inside[k] - centre[k])).sum();
+        let off = BEFORE_WALL_M * towards.signum();
+        let half = 0.5 * fitted.found("area")?.max(0.0).sqrt();
+        let before = std::array::from_fn(|k| centre[k] + off * normal[k]);
+        Some(ThinPanel::rectangle(before, [along, across], [half; 2], 1.0))
     }
+}
 
-    fn starts(&self, _: &Survey) -> Vec<Vec<f64>> {
-        vec![vec![0.5], vec![2.0f64.min(0.5 * self.plane.area_m2)]]
-    }
-
-    fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+impl DecayTerm for OneWall {
+    fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
         let open = (values[0] / view.survey().material_area_m2(self.plane.material)).min(0.95);
         if open <= 0.0 {
             return;
@@ -91,11 +106,13 @@ impl Case for OneWall {
         }
     }
 
-    fn weighs_reflections(&self) -> bool {
-        true
+    fn reflection_evidence(&self) -> Option<&dyn ReflectionEvidence> {
+        Some(self)
     }
+}
 
-    fn among_reflections(&self, own: &[(f64, f64)], gates: &[ReflectionGate]) -> Option<AuxiliaryEvidence> {
+impl ReflectionEvidence for OneWall {
+    fn weigh(&self, own: &[(f64, f64)], gates: &[ReflectionGate]) -> Option<AuxiliaryEvidence> {
         let here: Vec<([f64; 2], f64, f64)> = gates
             .iter()
             .filter(|g| g.plane == self.index)
@@ -162,25 +179,6 @@ impl Case for OneWall {
             parameters.push(interval(&format!("centre_{axis}"), "m", all.iter().map(along).zip(&weights)));
         }
         Some(AuxiliaryEvidence { nats, parameters })
-    }
-
-    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
-        let survey = fitted.survey();
-        let inside = survey.responses().first().map(|r| survey.sources()[r.source].position_m);
-        inside.and_then(|inside| self.hole(inside, fitted)).map(ModelChange::Panel).into_iter().collect()
-    }
-}
-
-impl OneWall {
-    /// The hole: a square panel that absorbs everything, just before its wall on the side of `inside`.
-    fn hole(&self, inside: [f64; 3], fitted: &FittedCase<'_>) -> Option<ThinPanel> {
-        let centre = [fitted.found("centre_x")?, fitted.found("centre_y")?, fitted.found("centre_z")?];
-        let [normal, along, across] = self.plane.axes;
-        let towards: f64 = (0..3).map(|k| normal[k] * (inside[k] - centre[k])).sum();
-        let off = BEFORE_WALL_M * towards.signum();
-        let half = 0.5 * fitted.found("area")?.max(0.0).sqrt();
-        let before = std::array::from_fn(|k| centre[k] + off * normal[k]);
-        Some(ThinPanel::rectangle(before, [along, across], [half; 2], 1.0))
     }
 }
 
@@ -259,7 +257,8 @@ mod tests {
     #![allow(clippy::unwrap_used)] // a panic is how a test fails
     use super::*;
     use crate::survey::planes::planes;
-    use sabine_acoustics::{Bands, Material, Scene};
+    use sabine_acoustics::{Bands, Material};
+    use sabine_scene::Scene;
 
     fn wall() -> OneWall {
         let hard = Material::uniform(Bands::T60, 0.1, 0.0).unwrap();
@@ -290,7 +289,7 @@ mod tests {
             .map(|g| gate(&wall, g.0, g.1, true))
             .chain(far.iter().map(|g| gate(&wall, g.0, g.1, false)))
             .collect();
-        let found = wall.among_reflections(&own, &hole).unwrap();
+        let found = wall.weigh(&own, &hole).unwrap();
         assert!(found.nats > 10.0, "{}", found.nats);
         let centre: Vec<f64> = found.parameters[1..].iter().map(|p| p.value).collect();
         let [u, v] = wall.plane.within([centre[0], centre[1], centre[2]]);
@@ -305,9 +304,9 @@ mod tests {
             .chain([(0.5, 0.9, false), (1.5, 2.0, false), (2.6, 3.2, false), (0.8, 3.2, false)])
             .map(|(u, v, missing)| gate(&wall, u, v, missing))
             .collect();
-        assert!(wall.among_reflections(&own, &odd).unwrap().nats < 4.0);
+        assert!(wall.weigh(&own, &odd).unwrap().nats < 4.0);
         let none: Vec<ReflectionGate> =
             near.iter().chain(&far).map(|g| gate(&wall, g.0, g.1, false)).collect();
-        assert!(wall.among_reflections(&own, &none).unwrap().nats < 0.0);
+        assert!(wall.weigh(&own, &none).unwrap().nats < 0.0);
     }
 }

@@ -1,9 +1,8 @@
 //! `room_dimensions`: the room is longer, wider or higher than its model.
 
 use crate::effect::EffectInfo;
-use crate::effect::FittedCase;
 use crate::effect::next_measurement::NextMeasurement;
-use crate::effect::{Case, Effect, Observable, Parameter};
+use crate::effect::{ArrivalTerm, Case, Effect, Parameter};
 use crate::extend::extended_model::Dimensions;
 use crate::extend::model_change::ModelChange;
 use crate::simulate::views::ArrivalView;
@@ -32,41 +31,38 @@ impl Effect for RoomDimensions {
         .decided_by(6, NextMeasurement::Distances)
     }
 
-    fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
-        vec![Box::new(*self)]
-    }
-}
-
-impl Case for RoomDimensions {
-    fn observable(&self) -> Observable {
-        Observable::Arrivals
-    }
-
-    fn parameters(&self, _: &Survey) -> Vec<Parameter> {
+    fn cases(&self, survey: &Survey) -> Vec<Case> {
         let axes = ["x", "y", "z"];
         let scale =
             axes.map(|a| Parameter::new(format!("scale_{a}"), "%", 0.0, 2.0, (-15.0, 15.0)).typically(1.0));
         let shift = axes.map(|a| Parameter::new(format!("shift_{a}"), "m", 0.0, 0.05, (-0.5, 0.5)));
-        scale.into_iter().chain(shift).collect()
+        let parameters = scale.into_iter().chain(shift).collect();
+        vec![Case::arrivals(parameters, *self).starting(starts(survey)).changing(|fitted| {
+            let values = fitted.values();
+            let scale = std::array::from_fn(|k| 1.0 + 0.01 * values[k]);
+            vec![ModelChange::Dimensions(Dimensions::new(scale, std::array::from_fn(|k| values[3 + k])))]
+        })]
     }
+}
 
-    fn starts(&self, survey: &Survey) -> Vec<Vec<f64>> {
-        let [low, high] = survey.box_m();
-        let mut starts = vec![vec![0.0; 6]];
-        for k in 0..3 {
-            for percent in [-START_PERCENT, START_PERCENT] {
-                // One wall moves, or the other, or both.
-                for side in [-0.5, 0.0, 0.5] {
-                    let mut start = vec![0.0; 6];
-                    start[k] = percent;
-                    start[3 + k] = side * 0.01 * percent * (high[k] - low[k]);
-                    starts.push(start);
-                }
+fn starts(survey: &Survey) -> Vec<Vec<f64>> {
+    let [low, high] = survey.box_m();
+    let mut starts = vec![vec![0.0; 6]];
+    for k in 0..3 {
+        for percent in [-START_PERCENT, START_PERCENT] {
+            // One wall moves, or the other, or both.
+            for side in [-0.5, 0.0, 0.5] {
+                let mut start = vec![0.0; 6];
+                start[k] = percent;
+                start[3 + k] = side * 0.01 * percent * (high[k] - low[k]);
+                starts.push(start);
             }
         }
-        starts
     }
+    starts
+}
 
+impl ArrivalTerm for RoomDimensions {
     fn delay_s(&self, values: &[f64], arrival: &ArrivalView<'_>) -> f64 {
         let survey = arrival.survey();
         let [low, high] = survey.box_m();
@@ -85,11 +81,5 @@ impl Case for RoomDimensions {
             })
             .sum();
         longer_m / arrival.speed_m_s()
-    }
-
-    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
-        let values = fitted.values();
-        let scale = std::array::from_fn(|k| 1.0 + 0.01 * values[k]);
-        vec![ModelChange::Dimensions(Dimensions::new(scale, std::array::from_fn(|k| values[3 + k])))]
     }
 }

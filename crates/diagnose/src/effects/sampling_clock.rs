@@ -1,9 +1,8 @@
 //! `sampling_clock`: player and recorder do not count seconds alike.
 
 use crate::effect::EffectInfo;
-use crate::effect::FittedCase;
 use crate::effect::next_measurement::NextMeasurement;
-use crate::effect::{Case, Effect, Observable, Parameter};
+use crate::effect::{ArrivalTerm, Case, Effect, Parameter};
 use crate::extend::model_change::ModelChange;
 use crate::simulate::views::ArrivalView;
 use crate::survey::Survey;
@@ -25,25 +24,15 @@ impl Effect for SamplingClock {
         .against(&[("sound_speed", NextMeasurement::ClockOrThermometer)])
     }
 
-    fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
-        vec![Box::new(*self)]
+    fn cases(&self, _: &Survey) -> Vec<Case> {
+        let deviation = Parameter::new("deviation", "ppm", 0.0, 400.0, (-1000.0, 1000.0)).typically(800.0);
+        let case = Case::arrivals(vec![deviation], *self);
+        vec![case.changing(|fitted| vec![ModelChange::Clock(fitted.values()[0])])]
     }
 }
 
-impl Case for SamplingClock {
-    fn observable(&self) -> Observable {
-        Observable::Arrivals
-    }
-
-    fn parameters(&self, _: &Survey) -> Vec<Parameter> {
-        vec![Parameter::new("deviation", "ppm", 0.0, 400.0, (-1000.0, 1000.0)).typically(800.0)]
-    }
-
+impl ArrivalTerm for SamplingClock {
     fn delay_s(&self, values: &[f64], arrival: &ArrivalView<'_>) -> f64 {
         arrival.time_s() * values[0] * 1e-6
-    }
-
-    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
-        vec![ModelChange::Clock(fitted.values()[0])]
     }
 }

@@ -1,9 +1,8 @@
 //! `sound_speed`: the room was warmer or colder than the room file says.
 
 use crate::effect::EffectInfo;
-use crate::effect::FittedCase;
 use crate::effect::next_measurement::NextMeasurement;
-use crate::effect::{Case, Effect, Observable, Parameter};
+use crate::effect::{ArrivalTerm, Case, Effect, Parameter};
 use crate::extend::model_change::ModelChange;
 use crate::simulate::views::ArrivalView;
 use crate::survey::Survey;
@@ -29,21 +28,15 @@ impl Effect for SoundSpeed {
         .decided_by(7, NextMeasurement::Distances)
     }
 
-    fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
-        vec![Box::new(*self)]
+    fn cases(&self, survey: &Survey) -> Vec<Case> {
+        let stated = survey.air().temperature_c();
+        let temperature = Parameter::new("temperature", "deg C", stated, 5.0, (-20.0, 50.0));
+        let case = Case::arrivals(vec![temperature.typically(stated + 3.0)], *self);
+        vec![case.changing(|fitted| vec![ModelChange::Temperature(fitted.values()[0])])]
     }
 }
 
-impl Case for SoundSpeed {
-    fn observable(&self) -> Observable {
-        Observable::Arrivals
-    }
-
-    fn parameters(&self, survey: &Survey) -> Vec<Parameter> {
-        let stated = survey.air().temperature_c();
-        vec![Parameter::new("temperature", "deg C", stated, 5.0, (-20.0, 50.0)).typically(stated + 3.0)]
-    }
-
+impl ArrivalTerm for SoundSpeed {
     fn delay_s(&self, values: &[f64], arrival: &ArrivalView<'_>) -> f64 {
         let stated = arrival.pair().air;
         let change = values[0] - arrival.survey().air().temperature_c();
@@ -52,9 +45,5 @@ impl Case for SoundSpeed {
             Ok(air) => arrival.length_m() / air.speed_of_sound_m_s() - arrival.time_s(),
             Err(_) => 0.0,
         }
-    }
-
-    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
-        vec![ModelChange::Temperature(fitted.values()[0])]
     }
 }

@@ -1,9 +1,8 @@
 //! `source_directivity`: the source does not radiate alike in all directions.
 
 use crate::effect::EffectInfo;
-use crate::effect::FittedCase;
 use crate::effect::next_measurement::NextMeasurement;
-use crate::effect::{Case, Effect, Parameter};
+use crate::effect::{Case, DecayTerm, Effect, FittedCase, Parameter};
 use crate::extend::model_change::ModelChange;
 use crate::simulate::views::BandView;
 use crate::survey::{Place, Survey};
@@ -38,8 +37,9 @@ impl Effect for SourceDirectivity {
         .decided_by(3, NextMeasurement::TurnedSource)
     }
 
-    fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
-        vec![Box::new(*self)]
+    fn cases(&self, survey: &Survey) -> Vec<Case> {
+        let case = Case::decay(Self::parameters(survey), *self).starting(Self::starts(survey));
+        vec![case.changing(Self::changes)]
     }
 }
 
@@ -56,10 +56,8 @@ impl SourceDirectivity {
         let [azimuth, elevation] = [values[2 + 2 * source], values[3 + 2 * source]].map(f64::to_radians);
         [elevation.cos() * azimuth.cos(), elevation.cos() * azimuth.sin(), elevation.sin()]
     }
-}
 
-impl Case for SourceDirectivity {
-    fn parameters(&self, survey: &Survey) -> Vec<Parameter> {
+    fn parameters(survey: &Survey) -> Vec<Parameter> {
         let mut found = vec![
             Parameter::new("directed_share_1_khz", "", 0.0, 0.3, (0.0, MAX_SHARE)).typically(0.3),
             Parameter::new("directed_share_per_octave", "", 0.0, 0.1, (-0.3, 0.3)).typically(0.05),
@@ -77,7 +75,7 @@ impl Case for SourceDirectivity {
         found
     }
 
-    fn starts(&self, survey: &Survey) -> Vec<Vec<f64>> {
+    fn starts(survey: &Survey) -> Vec<Vec<f64>> {
         if Self::axes_are_stated(survey) {
             return vec![vec![0.3, 0.05]];
         }
@@ -88,7 +86,19 @@ impl Case for SourceDirectivity {
         STARTS_DEG.into_iter().map(one).collect()
     }
 
-    fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+    fn changes(fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+        let (values, survey) = (fitted.values(), fitted.survey());
+        let share = |b: usize| (values[0] + values[1] * survey.octaves_from_1khz(b)).clamp(0.0, MAX_SHARE);
+        let axis = |(i, source): (usize, &Place)| (source.id.clone(), Self::axis(values, survey, i));
+        vec![ModelChange::SourcePattern {
+            directed_share: fitted.per_band(share),
+            axis: survey.sources().iter().enumerate().map(axis).collect(),
+        }]
+    }
+}
+
+impl DecayTerm for SourceDirectivity {
+    fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
         let survey = view.survey();
         let d = (values[0] + values[1] * survey.octaves_from_1khz(view.band())).clamp(0.0, MAX_SHARE);
         if d == 0.0 {
@@ -106,15 +116,5 @@ impl Case for SourceDirectivity {
             let gain = (q * q + 2.0 * q * d * along + d * d * squared) / power;
             *l += gain.max(1e-4).ln();
         }
-    }
-
-    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
-        let (values, survey) = (fitted.values(), fitted.survey());
-        let share = |b: usize| (values[0] + values[1] * survey.octaves_from_1khz(b)).clamp(0.0, MAX_SHARE);
-        let axis = |(i, source): (usize, &Place)| (source.id.clone(), Self::axis(values, survey, i));
-        vec![ModelChange::SourcePattern {
-            directed_share: fitted.per_band(share),
-            axis: survey.sources().iter().enumerate().map(axis).collect(),
-        }]
     }
 }

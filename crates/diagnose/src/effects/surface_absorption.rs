@@ -2,7 +2,7 @@
 
 use crate::effect::EffectInfo;
 use crate::effect::next_measurement::NextMeasurement;
-use crate::effect::{Case, Effect, Nuisance, Parameter};
+use crate::effect::{Case, Effect, Nuisance};
 use crate::survey::Survey;
 
 /// The absorption of one material lies far outside its stated uncertainty: its prior is opened in every octave.
@@ -24,29 +24,10 @@ impl Effect for SurfaceAbsorption {
         .against(&[("air_absorption", NextMeasurement::OtherHumidity)])
     }
 
-    fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {
-        let one = |(material, name): (usize, &String)| -> Box<dyn Case> {
-            Box::new(OneMaterial { material, name: name.clone() })
+    fn cases(&self, survey: &Survey) -> Vec<Case> {
+        let one = |(material, name): (usize, &String)| {
+            Case::prior(Nuisance::Absorption(material), OPEN_SD).about(name.clone())
         };
         survey.materials().iter().enumerate().map(one).collect()
-    }
-}
-
-struct OneMaterial {
-    material: usize,
-    name: String,
-}
-
-impl Case for OneMaterial {
-    fn subject(&self) -> Option<String> {
-        Some(self.name.clone())
-    }
-
-    fn parameters(&self, _: &Survey) -> Vec<Parameter> {
-        Vec::new()
-    }
-
-    fn relaxes(&self) -> Vec<(Nuisance, f64)> {
-        vec![(Nuisance::Absorption(self.material), OPEN_SD)]
     }
 }

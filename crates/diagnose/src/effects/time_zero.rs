@@ -1,13 +1,12 @@
 //! `time_zero`: the first sample is not the instant of emission.
 
 use crate::effect::EffectInfo;
-use crate::effect::FittedCase;
 use crate::effect::next_measurement::NextMeasurement;
-use crate::effect::{Case, Effect, Observable, Parameter};
+use crate::effect::{ArrivalTerm, Case, Effect, Parameter};
 use crate::extend::model_change::ModelChange;
 use crate::simulate::views::ArrivalView;
 use crate::survey::Survey;
-use sabine_acoustics::TimeZero;
+use sabine_scene::TimeZero;
 
 /// One latency in all responses, where the room file says that there is none.
 ///
@@ -26,26 +25,19 @@ impl Effect for TimeZeroOffset {
         .decided_by(4, NextMeasurement::Loopback)
     }
 
-    fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {
+    fn cases(&self, survey: &Survey) -> Vec<Case> {
         // An unknown latency is fitted anyway where the room file admits to one.
-        if survey.measurement().time_zero == TimeZero::Emission { vec![Box::new(*self)] } else { Vec::new() }
+        if survey.measurement().time_zero != TimeZero::Emission {
+            return Vec::new();
+        }
+        let latency = Parameter::new("latency", "ms", 0.0, 10.0, (-200.0, 200.0)).typically(1.0);
+        let case = Case::arrivals(vec![latency], *self);
+        vec![case.changing(|fitted| vec![ModelChange::Latency(1e-3 * fitted.values()[0])])]
     }
 }
 
-impl Case for TimeZeroOffset {
-    fn observable(&self) -> Observable {
-        Observable::Arrivals
-    }
-
-    fn parameters(&self, _: &Survey) -> Vec<Parameter> {
-        vec![Parameter::new("latency", "ms", 0.0, 10.0, (-200.0, 200.0)).typically(1.0)]
-    }
-
+impl ArrivalTerm for TimeZeroOffset {
     fn delay_s(&self, values: &[f64], _: &ArrivalView<'_>) -> f64 {
         1e-3 * values[0]
-    }
-
-    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
-        vec![ModelChange::Latency(1e-3 * fitted.values()[0])]
     }
 }

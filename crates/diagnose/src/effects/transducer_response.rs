@@ -1,12 +1,11 @@
 //! `transducer_response`: loudspeaker and microphone do not treat all octaves alike.
 
 use crate::effect::EffectInfo;
-use crate::effect::FittedCase;
-use crate::effect::{Case, Effect, Parameter, Stage};
+use crate::effect::{Case, DecayTerm, Effect, Parameter, Stage};
 use crate::extend::model_change::ModelChange;
 use crate::simulate::views::BandView;
 use crate::survey::Survey;
-use sabine_acoustics::Levels;
+use sabine_scene::Levels;
 
 /// One gain for each octave, the same in every time bin and at every position. Where levels mean something absolute there is one
 /// for every octave; else they are relative to the octave of 1 kHz, whose gain is the common one that every fit leaves open.
@@ -53,20 +52,10 @@ impl Effect for TransducerResponse {
         )
     }
 
-    fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
-        vec![Box::new(*self)]
-    }
-}
-
-impl Case for TransducerResponse {
-    fn stage(&self) -> Stage {
-        Stage::Transducer
-    }
-
-    fn parameters(&self, survey: &Survey) -> Vec<Parameter> {
+    fn cases(&self, survey: &Survey) -> Vec<Case> {
         let reference = Self::reference(survey);
         let sd_db = if reference.is_some() { RELATIVE_SD_DB } else { GAIN_SD_DB };
-        (0..survey.bands().len())
+        let parameters = (0..survey.bands().len())
             .filter(|b| Some(*b) != reference)
             .map(|b| {
                 let rolled_off = -TYPICAL_DB_PER_OCTAVE * survey.octaves_from_1khz(b).abs();
@@ -74,10 +63,15 @@ impl Case for TransducerResponse {
                     .typically(rolled_off)
                     .in_band(b, survey)
             })
-            .collect()
+            .collect();
+        vec![Case::decay(parameters, *self).at(Stage::Transducer).changing(|fitted| {
+            vec![ModelChange::BandGains(Self::gains_db(fitted.values(), fitted.survey()))]
+        })]
     }
+}
 
-    fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+impl DecayTerm for TransducerResponse {
+    fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
         let band = view.band();
         let gain_db = match Self::reference(view.survey()) {
             Some(reference) if band == reference => return,
@@ -86,9 +80,5 @@ impl Case for TransducerResponse {
         };
         let gain = gain_db * std::f64::consts::LN_10 / 10.0;
         ln_energy.iter_mut().for_each(|l| *l += gain);
-    }
-
-    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
-        vec![ModelChange::BandGains(Self::gains_db(fitted.values(), fitted.survey()))]
     }
 }

@@ -1,9 +1,8 @@
 //! `truncation`: the responses were cut off before they had died away.
 
 use crate::effect::EffectInfo;
-use crate::effect::FittedCase;
 use crate::effect::next_measurement::NextMeasurement;
-use crate::effect::{Case, Effect, Parameter, Stage};
+use crate::effect::{Case, DecayTerm, Effect, Parameter, Stage};
 use crate::extend::model_change::ModelChange;
 use crate::simulate::views::BandView;
 use crate::survey::Survey;
@@ -34,8 +33,15 @@ impl Effect for Truncation {
         .decided_by(2, NextMeasurement::LongerWithSilence)
     }
 
-    fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
-        vec![Box::new(*self)]
+    fn cases(&self, survey: &Survey) -> Vec<Case> {
+        let longest_s = longest_s(survey);
+        let parameters = vec![
+            Parameter::new("end", "s", 1.2 * longest_s, 0.6 * longest_s, (0.02, 2.0 * longest_s))
+                .typically(0.4 * longest_s),
+            Parameter::new("fade", "s", 0.03, 0.05, (0.002, 0.5)),
+        ];
+        let case = Case::decay(parameters, *self).at(Stage::Recorder).starting(starts(longest_s));
+        vec![case.changing(|fitted| vec![ModelChange::Truncation([fitted.values()[0], fitted.values()[1]])])]
     }
 }
 
@@ -43,28 +49,14 @@ fn longest_s(survey: &Survey) -> f64 {
     survey.responses().iter().map(|r| r.duration_s).fold(0.0, f64::max)
 }
 
-impl Case for Truncation {
-    fn stage(&self) -> Stage {
-        Stage::Recorder
-    }
+/// An end beyond what is compared changes nothing, and one before the true end silences what was measured: only close starts lead there.
+fn starts(longest_s: f64) -> Vec<Vec<f64>> {
+    let steps = ((longest_s / START_S) as usize).clamp(8, 120);
+    (1..steps).map(|k| vec![k as f64 / steps as f64 * longest_s, 0.03]).collect()
+}
 
-    fn parameters(&self, survey: &Survey) -> Vec<Parameter> {
-        let longest_s = longest_s(survey);
-        vec![
-            Parameter::new("end", "s", 1.2 * longest_s, 0.6 * longest_s, (0.02, 2.0 * longest_s))
-                .typically(0.4 * longest_s),
-            Parameter::new("fade", "s", 0.03, 0.05, (0.002, 0.5)),
-        ]
-    }
-
-    fn starts(&self, survey: &Survey) -> Vec<Vec<f64>> {
-        // An end beyond what is compared changes nothing, and one before the true end silences what was measured: only close starts
-        // lead there.
-        let steps = ((longest_s(survey) / START_S) as usize).clamp(8, 120);
-        (1..steps).map(|k| vec![k as f64 / steps as f64 * longest_s(survey), 0.03]).collect()
-    }
-
-    fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+impl DecayTerm for Truncation {
+    fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
         let (end_s, fade_s) = (values[0], values[1]);
         for (bin, l) in ln_energy.iter_mut().enumerate() {
             let middle_s = view.file_time_s(bin);
@@ -78,9 +70,5 @@ impl Case for Truncation {
                 / POINTS as f64;
             *l += (mean + LEFT).ln();
         }
-    }
-
-    fn model_changes(&self, fitted: &FittedCase<'_>) -> Vec<ModelChange> {
-        vec![ModelChange::Truncation([fitted.values()[0], fitted.values()[1]])]
     }
 }

@@ -1,6 +1,6 @@
 //! The room with its named causes at work, as a file from which sound can be rendered.
 
-use sabine_acoustics::Scene;
+use sabine_scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -36,6 +36,13 @@ pub struct ExtendedModel {
     /// Axis of each source.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub axis: BTreeMap<String, [f64; 3]>,
+    /// First-order pattern of receivers: directed share by octave, sensitivity in a diffuse field as without; absent ones are
+    /// omnidirectional.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub receiver_directed_share: BTreeMap<String, Vec<f64>>,
+    /// Axis of receivers that have a pattern; the room file's where there is none.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub receiver_axis: BTreeMap<String, [f64; 3]>,
     /// Noise by octave: energy per second relative to that of the direct sound at 1 m.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub noise_per_s: Vec<f64>,
@@ -70,6 +77,9 @@ pub struct ExtendedModel {
     /// Gain of single responses in dB.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub response_gain_db: BTreeMap<String, f64>,
+    /// Gain of single responses by octave, in dB.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub response_band_gain_db: BTreeMap<String, Vec<f64>>,
     /// Responses that were exchanged.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub exchanged: Vec<[String; 2]>,

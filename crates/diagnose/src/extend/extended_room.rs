@@ -1,12 +1,14 @@
 //! The room of an extended model: what a tracer needs to render it.
 
 use crate::error::Error;
-use crate::extend::extended_model::ExtendedModel;
+use crate::extend::extended_model::{Dimensions, ExtendedModel};
 use crate::extend::recording_chain::RecordingChain;
 use sabine_acoustics::{
-    Air, Bands, Conditions, Directivity, Error as Cause, ImpulseResponse, Material, MeasuredRoom,
-    NamedMaterial, Orientation, PerBand, Receiver, Scene, Source, Triangle, write_atomically,
+    Air, Bands, Directivity, Error as Cause, ImpulseResponse, Material, Orientation, OutOfRange, PerBand,
+    write_atomically,
 };
+use sabine_paths::Conditions;
+use sabine_scene::{MeasuredRoom, NamedMaterial, Receiver, Scene, Source, Triangle};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::Path;
@@ -35,21 +37,32 @@ pub struct ExtendedRoom {
     pub wave_below_hz: Option<f64>,
     /// Pattern and axis of each source; `None` is omnidirectional.
     pub directivities: Vec<Option<(Directivity, Orientation)>>,
+    /// The same of each receiver.
+    pub receiver_directivities: Vec<Option<(Directivity, Orientation)>>,
     chain: RecordingChain,
 }
 
 impl ExtendedRoom {
-    /// Materials, air and the pattern of a source (index). Energies are relative to the direct sound on the axis of that source;
-    /// [`ExtendedRoom::finish`] makes up for it, so that its power is that of an omnidirectional one.
+    /// Materials, air and the patterns of a source and a receiver (indices). Energies are relative to the direct sound on both axes;
+    /// [`ExtendedRoom::finish`] makes up for it, so that the source's power and the receiver's sensitivity in a diffuse field are those of
+    /// omnidirectional ones.
     ///
     /// # Panics
-    /// If there is no such source.
-    pub fn conditions<'a>(&'a self, materials: &'a [Material], source: usize) -> Conditions<'a> {
-        let conditions = Conditions::new(materials, &self.air).with_attenuation(&self.attenuation);
-        match &self.directivities[source] {
-            Some((pattern, orientation)) => conditions.with_source(pattern, *orientation),
-            None => conditions,
+    /// If there is no such source or receiver.
+    pub fn conditions<'a>(
+        &'a self,
+        materials: &'a [Material],
+        source: usize,
+        receiver: usize,
+    ) -> Conditions<'a> {
+        let mut conditions = Conditions::new(materials, &self.air).with_attenuation(&self.attenuation);
+        if let Some((pattern, orientation)) = &self.directivities[source] {
+            conditions = conditions.with_source(pattern, *orientation);
         }
+        if let Some((pattern, orientation)) = &self.receiver_directivities[receiver] {
+            conditions = conditions.with_receiver(pattern, *orientation);
+        }
+        conditions
     }
 
     /// The measured room with this model of it in place of the stated one. Its air is [`ExtendedRoom::air`], in attenuation too;
@@ -87,7 +100,7 @@ impl ExtendedRoom {
         let to = to.ok_or_else(|| unknown(receiver))?;
         let distance_m = (0..3).map(|k| (from.position_m[k] - to.position_m[k]).powi(2)).sum::<f64>().sqrt();
         let direct_s = distance_m / self.air.speed_of_sound_m_s();
-        self.chain.apply(&format!("{source}-{receiver}"), direct_s, to.position_m, response, seed)
+        self.chain.apply([source, receiver], direct_s, to.position_m, response, seed)
     }
 }
 
@@ -174,13 +187,28 @@ impl ExtendedModel {
             ..s.clone()
         };
         let sources: Vec<Source> = room.sources().iter().map(moved).collect();
-        let receivers = room
-            .receivers()
-            .iter()
-            .map(|r| Receiver { position_m: at(&r.id, r.position_m), ..r.clone() })
-            .collect();
-        let directivities =
-            sources.iter().map(|source| self.pattern(source, own, bands)).collect::<Result<_, Fault>>()?;
+        let heard = |r: &Receiver| Receiver {
+            position_m: at(&r.id, r.position_m),
+            axis: self.receiver_axis.get(&r.id).copied().or(r.axis),
+            ..r.clone()
+        };
+        let receivers: Vec<Receiver> = room.receivers().iter().map(heard).collect();
+        let of_source = |s: &Source| {
+            let share = Some(&self.directed_share).filter(|share| !share.is_empty());
+            share.map(|share| {
+                first_order(share, s.axis, own, bands).map_err(|e| e.of("directed_share", "axis", &s.id))
+            })
+        };
+        let of_receiver = |r: &Receiver| {
+            let share = self.receiver_directed_share.get(&r.id);
+            share.map(|share| {
+                let names = ("receiver_directed_share", "receiver_axis");
+                first_order(share, r.axis, own, bands).map_err(|e| e.of(names.0, names.1, &r.id))
+            })
+        };
+        let directivities = sources.iter().map(|s| of_source(s).transpose()).collect::<Result<_, Fault>>()?;
+        let receiver_directivities =
+            receivers.iter().map(|r| of_receiver(r).transpose()).collect::<Result<_, Fault>>()?;
         let chain = RecordingChain::new(self.clone(), own);
         let diffraction = self.diffraction;
         Ok(ExtendedRoom {
@@ -192,6 +220,7 @@ impl ExtendedModel {
             diffraction,
             wave_below_hz: self.wave_below_hz,
             directivities,
+            receiver_directivities,
             chain,
         })
     }
@@ -224,35 +253,24 @@ impl ExtendedModel {
         Scene::new(vertices, triangles, materials)
     }
 
-    fn pattern(
-        &self,
-        source: &Source,
-        own: Bands,
-        bands: Bands,
-    ) -> Result<Option<(Directivity, Orientation)>, Fault> {
-        if self.directed_share.is_empty() {
-            return Ok(None);
-        }
-        let field = || format!("axis.{}", source.id);
-        let axis = source.axis.ok_or_else(|| (field(), Cause::UnknownId { id: source.id.clone() }))?;
-        let orientation = Orientation::towards(axis).map_err(|e| (field(), e))?;
-        let omni = self.directed_share.iter().map(|d| 1.0 - d).collect();
-        let pattern = PerBand::new(own, omni)
-            .and_then(|shares| Directivity::first_order_per_band(&shares.resampled(bands)))
-            .map_err(|e| ("directed_share".to_owned(), e))?;
-        Ok(Some((pattern, orientation)))
-    }
-
     /// Everything that can be said without the room; the bands.
     fn check(&self) -> Result<Bands, Fault> {
         let bands = Bands::from_centres_hz(&self.centres_hz).map_err(|e| ("centres_hz".to_owned(), e))?;
         let check = Checks { bands: bands.len() };
         let empty = Vec::new();
         let coupled = self.coupled.as_ref();
-        for (table, columns) in [("absorption", &self.absorption), ("scattering", &self.scattering)] {
+        for (table, columns) in [
+            ("absorption", &self.absorption),
+            ("scattering", &self.scattering),
+            ("receiver_directed_share", &self.receiver_directed_share),
+        ] {
             for (name, values) in columns {
                 check.per_band(&format!("{table}.{name}"), values, (0.0, 1.0), "between 0 and 1")?;
             }
+        }
+        for (name, values) in &self.response_band_gain_db {
+            let field = format!("response_band_gain_db.{name}");
+            check.per_band(&field, values, (-200.0, 200.0), "within 200 dB")?;
         }
         for (field, values, limits, range) in [
             ("gain_db", &self.gain_db, (-200.0, 200.0), "within 200 dB"),
@@ -271,13 +289,14 @@ impl ExtendedModel {
         }
         let (gradient, centre) =
             coupled.map_or((empty.clone(), empty), |c| (c.gradient_db_per_m.to_vec(), c.centre_m.to_vec()));
-        let of_dimensions = |pick: fn(&crate::Dimensions) -> [f64; 3]| {
+        let of_dimensions = |pick: fn(&Dimensions) -> [f64; 3]| {
             self.dimensions.as_ref().map_or(Vec::new(), |d| pick(d).to_vec())
         };
         let one = |value: Option<f64>| value.into_iter().collect::<Vec<f64>>();
         let places = self.position_m.iter().map(|(id, p)| (format!("position_m.{id}"), p));
         let axes = self.axis.iter().map(|(id, p)| (format!("axis.{id}"), p));
-        for (field, values) in places.chain(axes) {
+        let heard = self.receiver_axis.iter().map(|(id, p)| (format!("receiver_axis.{id}"), p));
+        for (field, values) in places.chain(axes).chain(heard) {
             check.each(&field, values, (-1e5, 1e5), "a finite coordinate")?;
         }
         for (name, &gain) in &self.response_gain_db {
@@ -342,8 +361,11 @@ impl ExtendedModel {
             ("absorption", keys(&self.absorption), &materials),
             ("scattering", keys(&self.scattering), &materials),
             ("axis", keys(&self.axis), &sources),
+            ("receiver_directed_share", keys(&self.receiver_directed_share), &receivers),
+            ("receiver_axis", keys(&self.receiver_axis), &receivers),
             ("position_m", keys(&self.position_m), &places),
             ("response_gain_db", keys(&self.response_gain_db), &pairs),
+            ("response_band_gain_db", keys(&self.response_band_gain_db), &pairs),
             ("inverted", self.inverted.clone(), &pairs),
             ("exchanged", exchanged, &pairs),
         ] {
@@ -353,6 +375,39 @@ impl ExtendedModel {
         }
         Ok(())
     }
+}
+
+/// What is wrong with a pattern.
+enum PatternFault {
+    NoAxis,
+    Axis(Cause),
+    Share(Cause),
+}
+
+impl PatternFault {
+    /// The fault of a source or receiver in the fields of its shares and its axis.
+    fn of(self, share: &str, axis: &str, id: &str) -> Fault {
+        match self {
+            Self::NoAxis => (format!("{axis}.{id}"), Cause::UnknownId { id: id.to_owned() }),
+            Self::Axis(cause) => (format!("{axis}.{id}"), cause),
+            Self::Share(cause) => (share.to_owned(), cause),
+        }
+    }
+}
+
+/// A pattern of first order with its orientation.
+fn first_order(
+    directed_share: &[f64],
+    axis: Option<[f64; 3]>,
+    own: Bands,
+    bands: Bands,
+) -> Result<(Directivity, Orientation), PatternFault> {
+    let orientation = Orientation::towards(axis.ok_or(PatternFault::NoAxis)?).map_err(PatternFault::Axis)?;
+    let omni = directed_share.iter().map(|d| 1.0 - d).collect();
+    let pattern = PerBand::new(own, omni)
+        .and_then(|shares| Directivity::first_order_per_band(&shares.resampled(bands)))
+        .map_err(PatternFault::Share)?;
+    Ok((pattern, orientation))
 }
 
 fn keys<T>(table: &BTreeMap<String, T>) -> Vec<String> {
@@ -387,7 +442,9 @@ impl Checks {
         range: &'static str,
     ) -> Result<(), Fault> {
         match values.iter().find(|v| !(low..=high).contains(*v)) {
-            Some(&value) => Err((field.to_owned(), Cause::OutOfRange { field: "value", value, range })),
+            Some(&value) => {
+                Err((field.to_owned(), Cause::OutOfRange(OutOfRange { field: "value", value, range })))
+            }
             None => Ok(()),
         }
     }

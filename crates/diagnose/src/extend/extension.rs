@@ -38,11 +38,11 @@ pub(crate) fn changes(search: &Search<'_>, state: &State, candidate: usize) -> V
         Observable::Channels | Observable::PreArrival => &[],
         Observable::Decay | Observable::Arrivals => {
             let (maximum, first) = place_of(search, state, candidate);
-            &maximum.values[first..first + case.parameters(survey).len()]
+            &maximum.values[first..first + case.parameters.len()]
         }
     };
     let (decays, arrivals) = (baseline.decay_layout(), baseline.arrival_layout());
-    let relaxed = case.relaxes().into_iter().map(|(nuisance, _)| {
+    let relaxed = case.relaxes.iter().map(|&(nuisance, _)| {
         let of_decays = decays.nuisance(nuisance).map(|range| &state.energy.values[range]);
         let of_arrivals = || arrivals.nuisance(nuisance).map(|range| &state.arrivals.values[range]);
         (nuisance, of_decays.or_else(of_arrivals).unwrap_or_default().to_vec())
@@ -57,7 +57,7 @@ pub(crate) fn changes(search: &Search<'_>, state: &State, candidate: usize) -> V
         auxiliary: if has_auxiliary { parameters(search, state, candidate) } else { Vec::new() },
         level_per_s: (0..survey.bands.len()).map(level_per_s).collect(),
         materials: &baseline.simulation.materials,
-        confirmed: if case.seeks() { confirmed(search, state) } else { Vec::new() },
+        confirmed: case.reflection_term().map_or_else(Vec::new, |_| confirmed(search, state)),
     };
     case.model_changes(&fitted)
 }
@@ -73,4 +73,62 @@ fn confirmed(search: &Search<'_>, state: &State) -> Vec<usize> {
     };
     let seen = |pair: &usize| model.added_s(&state.arrivals.values, *pair).iter().any(|t| is_near(*pair, t));
     (0..baseline.pairs()).filter(seen).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::DiagnoseConfig;
+    use crate::effect::Effect;
+    use crate::effects::{BackgroundNoise, ChannelFault, PositionError, TimeZeroOffset};
+    use crate::hand_made::Tables;
+    use crate::infer::candidates::cases;
+    use sabine_scene::{Levels, TimeZero};
+
+    #[test]
+    fn the_model_holds_what_each_chosen_case_found_and_the_fitted_absorption() {
+        let baseline =
+            Tables::new(Levels::Common, TimeZero::Emission).late(3e-3).baseline(DiagnoseConfig::default());
+        let effects: Vec<Box<dyn Effect>> = vec![
+            Box::new(TimeZeroOffset),
+            Box::new(BackgroundNoise),
+            Box::new(PositionError),
+            Box::new(ChannelFault),
+        ];
+        let cases = cases(&effects, baseline.survey());
+        let search = Search::new(&baseline, &cases, effects.len(), vec![true; 3]);
+        let place = |id: &str, subject: &str| {
+            let is = |c: &crate::infer::candidates::CatalogueCase| {
+                c.id == id && c.case.subject.as_deref().unwrap_or("") == subject
+            };
+            cases.iter().position(is).expect("a case")
+        };
+        // In an order other than that of the catalogue: each finds its own values.
+        let chosen = [
+            place("channel_fault", "gain of s0-r1"),
+            place("position_error", "r2"),
+            place("background_noise", ""),
+            place("time_zero", ""),
+            place("channel_fault", "polarity of s0-r0"),
+        ];
+        let state = search.state(&chosen, None).expect("a fit");
+        let model = extended_model(&search, &state);
+        let (energy, arrivals) = (&state.energy, &state.arrivals);
+        assert!((model.latency_s.expect("a latency") - 3e-3).abs() < 2e-4, "{:?}", model.latency_s);
+        let (decays, times) = (baseline.decay_layout(), baseline.arrival_layout());
+        assert_eq!(model.response_gain_db["s0-r1"], energy.values[decays.gain(1)]);
+        for (k, at) in times.receiver(2).enumerate() {
+            let stated = baseline.survey().receivers[2].position_m[k];
+            assert_eq!(model.position_m["r2"][k], stated + arrivals.values[at]);
+        }
+        // Two terms of the decays: the first has no parameters, so that the noise follows the nuisances.
+        let width_s = baseline.simulation.states[0][1].bins.width_s;
+        let level = baseline.simulation.reference[1] / width_s;
+        let noise = level * 10f64.powf(energy.values[decays.len() + 1] / 10.0);
+        assert!((model.noise_per_s[1] / noise - 1.0).abs() < 1e-12);
+        assert_eq!(model.inverted, ["s0-r0"]);
+        assert_eq!(model.absorption["plaster"], energy.values[decays.material(1)]);
+        assert_eq!(model.causes.len(), 5);
+        assert!(model.gain_db.is_empty() && model.temperature_c.is_none() && model.sheets.is_empty());
+    }
 }

@@ -21,6 +21,13 @@ pub enum ModelChange {
         /// Axis of each source.
         axis: BTreeMap<String, [f64; 3]>,
     },
+    /// First-order pattern of receivers by name: directed share by band, 0 to 1, and axis.
+    ReceiverPattern {
+        /// Directed share by band.
+        directed_share: BTreeMap<String, Vec<f64>>,
+        /// Axis.
+        axis: BTreeMap<String, [f64; 3]>,
+    },
     /// Scattering by material and band.
     Scattering(BTreeMap<String, Vec<f64>>),
     /// Noise by band: energy per second relative to that of the direct sound at 1 m.
@@ -57,6 +64,13 @@ pub enum ModelChange {
         /// Its gain in dB.
         gain_db: f64,
     },
+    /// Gain of one response (SOURCE-RECEIVER) by band, in dB.
+    ResponseBandGains {
+        /// The response.
+        response: String,
+        /// Its gains in dB.
+        gain_db: Vec<f64>,
+    },
     /// Two responses that were exchanged.
     Exchanged([String; 2]),
     /// Gain of all responses over the time of the file.
@@ -73,6 +87,10 @@ impl ExtendedModel {
             ModelChange::SourcePattern { directed_share, axis } => {
                 self.directed_share = directed_share;
                 self.axis = axis;
+            }
+            ModelChange::ReceiverPattern { directed_share, axis } => {
+                self.receiver_directed_share.extend(directed_share);
+                self.receiver_axis.extend(axis);
             }
             ModelChange::Scattering(scattering) => self.scattering = scattering,
             ModelChange::Noise(energy_per_s) => self.noise_per_s = energy_per_s,
@@ -91,6 +109,9 @@ impl ExtendedModel {
             ModelChange::ResponseGain { response, gain_db } => {
                 self.response_gain_db.insert(response, gain_db);
             }
+            ModelChange::ResponseBandGains { response, gain_db } => {
+                self.response_band_gain_db.insert(response, gain_db);
+            }
             ModelChange::Exchanged(responses) => self.exchanged.push(responses),
             ModelChange::GainOverTime(gain) => self.gain_over_time = Some(gain),
         }
@@ -103,7 +124,7 @@ mod tests {
     use crate::effect::{Effect, FittedCase, Nuisance};
     use crate::effects::{ChannelFault, PositionError, SoundSpeed, TransducerResponse};
     use crate::hand_made;
-    use sabine_acoustics::{Levels, TimeZero};
+    use sabine_scene::{Levels, TimeZero};
 
     #[test]
     fn changes_of_one_kind_that_concern_different_things_add_up() {
@@ -112,7 +133,7 @@ mod tests {
         for (response, gain_db) in [(0, 3.0), (2, -4.0)] {
             for case in ChannelFault.cases(&survey) {
                 let relaxed = Nuisance::ResponseGain(response);
-                if case.relaxes().iter().any(|(nuisance, _)| *nuisance == relaxed) {
+                if case.relaxes.iter().any(|(nuisance, _)| *nuisance == relaxed) {
                     let mut fitted = FittedCase::of_values(&survey, &[]);
                     fitted.relaxed.push((relaxed, vec![gain_db]));
                     case.model_changes(&fitted).into_iter().for_each(|change| model.apply(change));
@@ -135,9 +156,9 @@ mod tests {
         let silent = ["surface_absorption", "angle_dependent_absorption", "nonlinear_distortion"];
         for effect in crate::effects::catalogue() {
             for case in effect.cases(&survey) {
-                let values: Vec<f64> = case.parameters(&survey).iter().map(|p| p.typical).collect();
+                let values: Vec<f64> = case.parameters.iter().map(|p| p.typical).collect();
                 let mut fitted = FittedCase::of_values(&survey, &values);
-                fitted.relaxed = case.relaxes().into_iter().map(|(n, _)| (n, vec![0.1; 3])).collect();
+                fitted.relaxed = case.relaxes.iter().map(|(n, _)| (*n, vec![0.1; 3])).collect();
                 fitted.level_per_s = vec![1.0; survey.bands().len()];
                 fitted.confirmed = (0..survey.responses().len()).collect();
                 let changes = case.model_changes(&fitted).len();

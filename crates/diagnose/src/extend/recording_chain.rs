@@ -45,7 +45,7 @@ impl RecordingChain {
     /// `direct_s` is when the direct sound comes, in seconds after the emission.
     pub fn apply(
         &self,
-        name: &str,
+        [source, receiver]: [&str; 2],
         direct_s: f64,
         receiver_m: [f64; 3],
         response: ImpulseResponse,
@@ -53,9 +53,11 @@ impl RecordingChain {
     ) -> Result<ImpulseResponse, Error> {
         let rate_hz = response.sample_rate_hz();
         let filters = Filters::new(self.bands, rate_hz)?;
-        let gains = self.gains();
+        let name = format!("{source}-{receiver}");
+        let gains = self.gains(&name);
         let mut samples = response.into_samples();
-        let pattern_gains: Vec<f64> = gains.iter().zip(self.pattern_gains()).map(|(g, p)| g * p).collect();
+        let patterns = self.pattern_gains(receiver);
+        let pattern_gains: Vec<f64> = gains.iter().zip(patterns).map(|(g, p)| g * p).collect();
         filters.amplify(&mut samples, &pattern_gains);
         let rate = f64::from(rate_hz);
         let stretch = 1.0 + 1e-6 * self.model.clock_ppm.unwrap_or(0.0);
@@ -71,7 +73,7 @@ impl RecordingChain {
                     .collect()
             })
             .collect();
-        filters.add_noise(&mut samples, begin_s, rates, generator(seed, name));
+        filters.add_noise(&mut samples, begin_s, rates, generator(seed, &name));
         if let Some(gain) = &self.model.gain_over_time {
             for (i, sample) in samples.iter_mut().enumerate() {
                 *sample = (f64::from(*sample) * 10f64.powf(gain.at(i as f64 / rate) / 20.0)) as f32;
@@ -84,8 +86,8 @@ impl RecordingChain {
                 *sample *= (0.5 - 0.5 * (std::f64::consts::PI * share).cos()) as f32;
             }
         }
-        let gain_db = self.model.response_gain_db.get(name).copied().unwrap_or(0.0);
-        let sign = if self.model.inverted.iter().any(|other| other == name) { -1.0 } else { 1.0 };
+        let gain_db = self.model.response_gain_db.get(&name).copied().unwrap_or(0.0);
+        let sign = if self.model.inverted.contains(&name) { -1.0 } else { 1.0 };
         let gain = sign * 10f64.powf(gain_db / 20.0);
         if gain != 1.0 {
             samples.iter_mut().for_each(|s| *s = (f64::from(*s) * gain) as f32);
@@ -93,19 +95,23 @@ impl RecordingChain {
         Ok(ImpulseResponse::new(samples, rate_hz)?)
     }
 
-    /// Energy gain of loudspeaker and microphone by octave.
-    fn gains(&self) -> Vec<f64> {
+    /// Energy gain of loudspeaker and microphone by octave, and of the channel of a response.
+    fn gains(&self, response: &str) -> Vec<f64> {
+        let own = self.model.response_band_gain_db.get(response);
+        let gain = |list: &[f64], b: usize| list.get(b).map_or(1.0, |db| 10f64.powf(db / 10.0));
         (0..self.bands.len())
-            .map(|b| self.model.gain_db.get(b).map_or(1.0, |db| 10f64.powf(db / 10.0)))
+            .map(|b| gain(&self.model.gain_db, b) * own.map_or(1.0, |own| gain(own, b)))
             .collect()
     }
 
-    /// What makes the power of a directional source, rendered with gain 1 on its axis, that of an omnidirectional one.
-    fn pattern_gains(&self) -> Vec<f64> {
+    /// What makes the power of a directional source, rendered with gain 1 on its axis, that of an omnidirectional one, and likewise the
+    /// sensitivity of a directional receiver in a diffuse field.
+    fn pattern_gains(&self, receiver: &str) -> Vec<f64> {
+        let heard = self.model.receiver_directed_share.get(receiver);
+        let gain =
+            |list: &[f64], b: usize| list.get(b).map_or(1.0, |d| 1.0 / ((1.0 - d).powi(2) + d * d / 3.0));
         (0..self.bands.len())
-            .map(|b| {
-                self.model.directed_share.get(b).map_or(1.0, |d| 1.0 / ((1.0 - d).powi(2) + d * d / 3.0))
-            })
+            .map(|b| gain(&self.model.directed_share, b) * heard.map_or(1.0, |heard| gain(heard, b)))
             .collect()
     }
 

@@ -4,18 +4,23 @@ use crate::config::DiagnoseConfig;
 use crate::effect::Case;
 use crate::error::Error;
 use crate::extend::model_change::ModelChange;
+use crate::infer::candidates::CatalogueCase;
 use crate::likelihood::arrivals::{self, ArrivalData};
 use crate::likelihood::decay::{self, BinResidual, EnergyData, EnergyModel, WarmStart};
-use crate::likelihood::discrepancy::FreeDiscrepancy;
+use crate::likelihood::discrepancy::free_discrepancy;
 use crate::likelihood::laplace::{LaplaceFit, Prior};
 use crate::likelihood::parameters::{ArrivalLayout, DecayLayout};
 use crate::observe::observations::Observations;
 use crate::observe::observed_response::Measured;
 use crate::simulate::scene_tracer::SceneTracer;
-use crate::simulate::simulation::{ABSORPTION, Simulation, bands_of_modes};
+use crate::simulate::schroeder::bands_of_modes;
+use crate::simulate::simulation::{ABSORPTION, Simulation};
+use crate::simulate::tables::{Tables, Unprepared};
 use crate::simulate::traced_pair::TracedPair;
+use crate::simulate::traced_views::TracedRoomView;
 use crate::survey::Survey;
-use sabine_acoustics::{MaterialPrior, MeasuredRoom, Observer, report};
+use sabine_acoustics::{Observer, report};
+use sabine_scene::{MaterialPrior, MeasuredRoom};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
@@ -66,7 +71,7 @@ impl Baseline {
             simulation,
             seconds: BTreeMap::from([("trace", started.elapsed().as_secs_f64())]),
         };
-        baseline.expand(false)?;
+        baseline.simulation.expand(&baseline.observations, false)?;
         baseline.simulation.predict_arrivals()?;
         baseline.fit(observer)?;
         Ok(baseline)
@@ -78,39 +83,61 @@ impl Baseline {
 
     /// Number of pairs, and of responses.
     pub fn pairs(&self) -> usize {
-        self.simulation.pairs.len()
+        self.survey().responses.len()
     }
 
-    /// Expands the simulation about its absorption; with tables and wave solutions, where wanted.
-    fn expand(&mut self, tables: bool) -> Result<(), Error> {
-        self.simulation.expand(&self.observations, tables)?;
-        if !tables || self.survey().bands_of_modes == 0 {
-            return Ok(());
-        }
+    /// Prepares the tables of all decay terms about the present absorption. Says which cases (a flag for each) refused to be prepared, and
+    /// notes why.
+    pub fn prepare(&mut self, cases: &[CatalogueCase]) -> Result<Vec<bool>, Error> {
         let started = Instant::now();
-        if let Some(reason) = self
-            .simulation
-            .tabulate_waves(self.observations.survey.bands_of_modes, &self.observations.survey)?
-        {
-            self.observations.survey.bands_of_modes = 0;
-            self.observations.notes.push(format!("Standing waves are not looked for: {reason}."));
+        let slots = cases.iter().filter_map(|c| c.case.slot).max().map_or(0, |last| last + 1);
+        let mut tables: Vec<Tables> = std::iter::repeat_with(Tables::default).take(slots).collect();
+        let mut refused = vec![false; cases.len()];
+        let room = TracedRoomView {
+            survey: &self.observations.survey,
+            simulation: &self.simulation,
+            pulses: &self.observations.pulses,
+            materials: self.simulation.expanded_materials()?,
+        };
+        let mut reasons = Vec::new();
+        for (own, refused) in cases.iter().zip(&mut refused) {
+            let (Some(term), Some(slot)) = (own.case.decay_term(), own.case.slot) else { continue };
+            match term.prepare(&room) {
+                Ok(found) => tables[slot] = found,
+                Err(Unprepared::Refused(reason)) => {
+                    *refused = true;
+                    reasons.push(reason);
+                }
+                Err(Unprepared::Failed(error)) => return Err(error),
+            }
         }
-        *self.seconds.entry("waves").or_default() += started.elapsed().as_secs_f64();
-        Ok(())
+        self.simulation.tables = tables;
+        for reason in reasons {
+            if !self.observations.notes.contains(&reason) {
+                self.observations.notes.push(reason);
+            }
+        }
+        *self.seconds.entry("tables").or_default() += started.elapsed().as_secs_f64();
+        Ok(refused)
     }
 
     /// Takes a change of the model into the simulation, and expands it again where paths moved.
-    pub fn retrace(&mut self, change: &ModelChange) -> Result<(), Error> {
-        if self.simulation.apply(change, &self.observations.survey)? { self.expand(true) } else { Ok(()) }
+    pub fn retrace(&mut self, change: &ModelChange, cases: &[CatalogueCase]) -> Result<(), Error> {
+        if self.simulation.apply(change, &self.observations.survey)? { self.expand(cases) } else { Ok(()) }
+    }
+
+    fn expand(&mut self, cases: &[CatalogueCase]) -> Result<(), Error> {
+        self.simulation.expand(&self.observations, true)?;
+        self.prepare(cases).map(|_| ())
     }
 
     /// Expands about fitted absorption.
-    pub fn expand_about(&mut self, values: &[f64]) -> Result<(), Error> {
+    pub fn expand_about(&mut self, values: &[f64], cases: &[CatalogueCase]) -> Result<(), Error> {
         let layout = self.decay_layout();
         for (m, material) in self.simulation.absorption.iter_mut().enumerate() {
             material.copy_from_slice(&values[layout.material(m)]);
         }
-        self.expand(true)
+        self.expand(cases)
     }
 
     /// Fits the baseline, expanding about it anew until it stays.
@@ -130,7 +157,7 @@ impl Baseline {
                 }
             }
             let last = moved < TOLERANCE || round + 1 == ROUNDS;
-            self.expand(last)?;
+            self.simulation.expand(&self.observations, last)?;
             if last {
                 break;
             }
@@ -161,6 +188,7 @@ impl Baseline {
             absorption: &self.simulation.absorption,
             priors: &self.priors,
             gain_sd_db: self.config.gain_sd_db,
+            tables: &self.simulation.tables,
             dispersion: &self.dispersion,
         }
     }
@@ -178,31 +206,28 @@ impl Baseline {
     /// Fits decays under the causes that bear on them.
     pub fn fit_energy(
         &self,
-        cases: &[&dyn Case],
+        cases: &[&Case],
         used: &[bool],
         before: Option<WarmStart<'_>>,
     ) -> Result<(LaplaceFit, Vec<usize>), Error> {
         decay::fit(&self.energy_data(), cases, used, before)
     }
 
-    pub fn fit_arrivals(
-        &self,
-        cases: &[&dyn Case],
-        used: &[bool],
-    ) -> Result<(LaplaceFit, Vec<usize>), Error> {
+    pub fn fit_arrivals(&self, cases: &[&Case], used: &[bool]) -> Result<(LaplaceFit, Vec<usize>), Error> {
         arrivals::fit(&self.arrival_data(), cases, used)
     }
 
-    pub fn free_discrepancy(&self) -> FreeDiscrepancy {
+    /// The rival without a name.
+    pub fn free_discrepancy(&self) -> Case {
         let end_s = (0..self.survey().bands.len()).map(|b| self.simulation.compared_s(b)).collect();
-        FreeDiscrepancy { end_s }
+        free_discrepancy(self.survey(), end_s)
     }
 
     /// Fits decays to energies other than those measured.
     pub fn fit_energy_to(
         &self,
         measured: &[Measured],
-        cases: &[&dyn Case],
+        cases: &[&Case],
         used: &[bool],
         before: Option<WarmStart<'_>>,
     ) -> Result<LaplaceFit, Error> {
@@ -211,14 +236,14 @@ impl Baseline {
     }
 
     /// Bins of the given pairs under fitted values.
-    pub fn residuals(&self, cases: &[&dyn Case], values: &[f64], pairs: &[usize]) -> Vec<BinResidual> {
+    pub fn residuals(&self, cases: &[&Case], values: &[f64], pairs: &[usize]) -> Vec<BinResidual> {
         let used = vec![true; self.pairs()];
         let data = self.energy_data();
         EnergyModel::new(&data, cases, &used).residuals(values, pairs.iter().copied())
     }
 
     /// Sets the dispersion of each band to what the bins still scatter once anything smooth has been taken out.
-    pub fn calibrate_dispersion(&mut self, cases: &[&dyn Case], used: &[bool]) -> Result<(), Error> {
+    pub fn calibrate_dispersion(&mut self, cases: &[&Case], used: &[bool]) -> Result<(), Error> {
         let free = self.free_discrepancy();
         let mut all = cases.to_vec();
         all.push(&free);

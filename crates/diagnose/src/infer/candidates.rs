@@ -7,19 +7,33 @@ use crate::survey::Survey;
 pub(crate) struct Candidate<'a> {
     pub effect: usize,
     pub id: &'static str,
-    pub case: &'a dyn Case,
+    pub case: &'a Case,
 }
 
-/// All cases of some effects.
-pub(crate) fn cases(
-    effects: &[Box<dyn Effect>],
-    survey: &Survey,
-) -> Vec<(usize, &'static str, Box<dyn Case>)> {
-    effects
-        .iter()
-        .enumerate()
-        .flat_map(|(i, effect)| effect.cases(survey).into_iter().map(move |case| (i, effect.info().id, case)))
-        .collect()
+/// A case with the number and identifier of its effect.
+#[derive(Debug)]
+pub(crate) struct CatalogueCase {
+    pub effect: usize,
+    pub id: &'static str,
+    pub case: Case,
+}
+
+/// All cases of some effects, each with a slot for its tables.
+pub(crate) fn cases(effects: &[Box<dyn Effect>], survey: &Survey) -> Vec<CatalogueCase> {
+    let mut all: Vec<CatalogueCase> = Vec::new();
+    for (effect, own) in effects.iter().enumerate() {
+        let id = own.info().id;
+        for mut case in own.cases(survey) {
+            case.slot = Some(all.len());
+            all.push(CatalogueCase { effect, id, case });
+        }
+    }
+    all
+}
+
+/// The cases as candidates.
+pub(crate) fn candidates(cases: &[CatalogueCase]) -> Vec<Candidate<'_>> {
+    cases.iter().map(|own| Candidate { effect: own.effect, id: own.id, case: &own.case }).collect()
 }
 
 /// The chosen cases that take part in one fit, in their order.
@@ -27,7 +41,7 @@ pub(crate) fn cases_of<'a>(
     candidates: &[Candidate<'a>],
     chosen: &[usize],
     part: Observable,
-) -> Vec<&'a dyn Case> {
+) -> Vec<&'a Case> {
     chosen.iter().map(|&c| candidates[c].case).filter(|c| c.observable().concerns(part)).collect()
 }
 
@@ -78,15 +92,14 @@ mod tests {
     use super::*;
     use crate::effects::{PositionError, TimeZeroOffset};
     use crate::hand_made;
-    use sabine_acoustics::{Levels, TimeZero};
+    use sabine_scene::{Levels, TimeZero};
 
     #[test]
     fn an_effect_with_many_cases_pays_for_their_number() {
         let survey = hand_made::survey(Levels::Common, TimeZero::Emission);
         let effects: Vec<Box<dyn Effect>> = vec![Box::new(PositionError), Box::new(TimeZeroOffset)];
         let all = cases(&effects, &survey);
-        let candidates: Vec<Candidate<'_>> =
-            all.iter().map(|(effect, id, case)| Candidate { effect: *effect, id, case: &**case }).collect();
+        let candidates = candidates(&all);
         // One source and three receivers; one latency.
         assert_eq!(candidates.len(), 5);
         let scored = |nats: [f64; 5]| {
@@ -107,8 +120,7 @@ mod tests {
         let survey = hand_made::survey(Levels::Common, TimeZero::Emission);
         let effects = crate::effects::catalogue();
         let all = cases(&effects, &survey);
-        let candidates: Vec<Candidate<'_>> =
-            all.iter().map(|(effect, id, case)| Candidate { effect: *effect, id, case: &**case }).collect();
+        let candidates = candidates(&all);
         let chosen: Vec<usize> = (0..candidates.len()).collect();
         let [decays, arrivals] =
             [Observable::Decay, Observable::Arrivals].map(|part| cases_of(&candidates, &chosen, part).len());

@@ -1,6 +1,6 @@
 //! Which of the causes found stand: those that help where they were not fitted, and that beat the discrepancy without a name.
 
-use crate::effect::{Nuisance, Observable};
+use crate::effect::{Nuisance, Observable, Parameter};
 use crate::error::Error;
 use crate::infer::cross_validation::{Folds, Predicted, predict};
 use crate::infer::lack_of_fit::{self, Lack};
@@ -133,7 +133,8 @@ fn least_confirmed(search: &Search<'_>, state: &State, gains: &[HeldOutGain]) ->
         let local = |(nuisance, _): &(Nuisance, f64)| {
             matches!(nuisance, Nuisance::ReceiverPosition(_) | Nuisance::ResponseGain(_))
         };
-        case.exchanged().is_none() && case.inverted().is_none() && !case.relaxes().iter().any(local)
+        let all_local = !case.parameters.is_empty() && case.parameters.iter().all(Parameter::is_local);
+        case.channel_change().is_none() && !all_local && !case.relaxes.iter().any(local)
     };
     // A few positions leave a wide interval: a gain in the mean counts where the decays come nearer, too.
     let helps = |gain: &HeldOutGain| {

@@ -116,8 +116,7 @@ fn split_gain(
     pairs: &[usize],
 ) -> Result<SplitGain, Error> {
     let free = search.baseline.free_discrepancy();
-    let of =
-        |chosen: &[usize], free: Option<&dyn Case>| predictive(search, state, (used, pairs), chosen, free);
+    let of = |chosen: &[usize], free: Option<&Case>| predictive(search, state, (used, pairs), chosen, free);
     let (base, before) = of(&[], None)?;
     let (free, discrepant) = of(&[], Some(&free))?;
     let (named, after) =
@@ -142,7 +141,7 @@ fn predictive(
     state: &State,
     (used, pairs): (&[bool], &[usize]),
     chosen: &[usize],
-    free: Option<&dyn Case>,
+    free: Option<&Case>,
 ) -> Result<(f64, Vec<Compared>), Error> {
     let baseline = search.baseline;
     let mut whole = used.to_vec();
@@ -243,8 +242,12 @@ pub(crate) fn decay_curves(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand_made;
-    use sabine_acoustics::{Levels, TimeZero};
+    use crate::config::DiagnoseConfig;
+    use crate::effect::Effect;
+    use crate::effects::TimeZeroOffset;
+    use crate::hand_made::{self, Tables};
+    use crate::infer::candidates::cases;
+    use sabine_scene::{Levels, TimeZero};
 
     #[test]
     fn every_receiver_that_is_fitted_is_left_out_once_and_never_used_meanwhile() {
@@ -275,5 +278,28 @@ mod tests {
         let folds = Folds::never_fitted(&responses, &[true, false, true], &[1]);
         assert!(folds.never_fitted);
         assert_eq!(folds.splits, [(vec![true, false, true], vec![1])]);
+    }
+
+    #[test]
+    fn a_latency_helps_at_receivers_that_were_left_out_and_an_absent_one_does_not() {
+        for (latency_s, helps) in [(3e-3, true), (0.0, false)] {
+            let tables = Tables::new(Levels::Common, TimeZero::Emission).late(latency_s);
+            let baseline = tables.baseline(DiagnoseConfig::default());
+            let effects: Vec<Box<dyn Effect>> = vec![Box::new(TimeZeroOffset)];
+            let cases = cases(&effects, baseline.survey());
+            let search = Search::new(&baseline, &cases, 1, vec![true; 3]);
+            let state = search.state(&[0], None).expect("a fit");
+            let folds = Folds::in_turn(&baseline.survey().responses, &search.used);
+            let found = predict(&search, &state, &folds, &()).expect("predictions");
+            let held_out = found.held_out.expect("receivers that were left out");
+            assert_eq!(held_out.receivers.len(), 3);
+            assert_eq!(found.gains.len(), 1);
+            let gain = &found.gains[0];
+            assert_eq!(gain.low > 0.0, helps, "{latency_s} s: {gain:?}");
+            // A latency says nothing on decays.
+            assert!((gain.db_rmse_after - gain.db_rmse_before).abs() < 1e-9);
+            // Every response is predicted once in each band.
+            assert_eq!(found.decays.len(), 6);
+        }
     }
 }

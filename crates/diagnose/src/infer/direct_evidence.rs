@@ -1,8 +1,7 @@
 //! Evidence of causes that neither decays nor arrival times can weigh: from single reflections, and from before the direct sound.
 
-use crate::effect::AuxiliaryEvidence;
 use crate::effect::reflection_gate::ReflectionGate;
-use crate::effect::{Case, Observable};
+use crate::effect::{AuxiliaryEvidence, Case, Observable, ReflectionEvidence};
 use crate::infer::baseline::Baseline;
 use crate::infer::candidates::{Candidate, cases_of};
 use crate::likelihood::arrivals;
@@ -17,6 +16,11 @@ pub(crate) struct Fitted<'a> {
     pub arrivals: &'a LaplaceFit,
 }
 
+/// What single reflections say for a case, where they weigh it.
+fn reflection_evidence(case: &Case) -> Option<&dyn ReflectionEvidence> {
+    case.decay_term()?.reflection_evidence()
+}
+
 /// Gates under the chosen causes.
 fn gates(
     baseline: &Baseline,
@@ -29,13 +33,13 @@ fn gates(
         .iter()
         .zip(fitted.energy_firsts)
         .map(|(case, &first)| {
-            let count = case.parameters(baseline.survey()).len();
+            let count = case.parameters.len();
             fitted.energy.values[first..first + count].to_vec()
         })
         .collect();
     // What is weighed by the gates themselves must not act on them beforehand.
-    let (cases, values): (Vec<&dyn Case>, Vec<Vec<f64>>) =
-        cases.into_iter().zip(values).filter(|(c, _)| !c.weighs_reflections()).unzip();
+    let (cases, values): (Vec<&Case>, Vec<Vec<f64>>) =
+        cases.into_iter().zip(values).filter(|(case, _)| reflection_evidence(case).is_none()).unzip();
     let data = baseline.arrival_data();
     let of_times = cases_of(candidates, chosen, Observable::Arrivals);
     let model = arrivals::at_fit(&data, &of_times, fit_used);
@@ -70,11 +74,13 @@ pub(crate) fn own(
     fitted: Fitted<'_>,
     used: &[bool],
 ) -> Vec<(usize, AuxiliaryEvidence)> {
-    let pre_arrival =
-        |c: usize| Some((c, candidates[c].case.pre_arrival(&baseline.observations.pre_arrival, used)?));
+    let pre_arrival = |c: usize| {
+        let term = candidates[c].case.pre_arrival_term()?;
+        Some((c, term.weigh(&baseline.observations.pre_arrival, used)?))
+    };
     let mut found: Vec<(usize, AuxiliaryEvidence)> = chosen.iter().copied().filter_map(pre_arrival).collect();
     let weighing: Vec<usize> =
-        chosen.iter().copied().filter(|&c| candidates[c].case.weighs_reflections()).collect();
+        chosen.iter().copied().filter(|&c| reflection_evidence(candidates[c].case).is_some()).collect();
     if weighing.is_empty() {
         return found;
     }
@@ -88,10 +94,10 @@ pub(crate) fn own(
     found.extend(weighing.into_iter().filter_map(|c| {
         let order = of_energy.iter().position(|&o| o == c)?;
         let first = *fitted.energy_firsts.get(order)?;
-        let count = candidates[c].case.parameters(baseline.survey()).len();
+        let count = candidates[c].case.parameters.len();
         let own: Vec<(f64, f64)> =
             (first..first + count).map(|i| (fitted.energy.values[i], fitted.energy.sd(i))).collect();
-        Some((c, candidates[c].case.among_reflections(&own, &gates)?))
+        Some((c, reflection_evidence(candidates[c].case)?.weigh(&own, &gates)?))
     }));
     found
 }

@@ -56,7 +56,7 @@ struct Direction {
     own: Vec<usize>,
 }
 
-fn cosine(baseline: &Baseline, evidence: Observable, a: &dyn Case, b: &dyn Case) -> Option<f64> {
+fn cosine(baseline: &Baseline, evidence: Observable, a: &Case, b: &Case) -> Option<f64> {
     let used = vec![true; baseline.pairs()];
     let cases = [a, b];
     let (slopes, priors, directions) = if evidence == Observable::Decay {
@@ -71,7 +71,7 @@ fn cosine(baseline: &Baseline, evidence: Observable, a: &dyn Case, b: &dyn Case)
         let place = |nuisance: Nuisance| model.layout.nuisance(nuisance);
         let firsts: Vec<(usize, usize)> =
             (0..2).map(|order| first_of(&model.terms, order)).collect::<Option<_>>()?;
-        let directions = directions(baseline, &cases, &firsts, &mut values, place);
+        let directions = directions(&cases, &firsts, &mut values, place);
         (expected(&model, &values), model.priors().to_vec(), directions)
     } else {
         let data = baseline.arrival_data();
@@ -82,7 +82,7 @@ fn cosine(baseline: &Baseline, evidence: Observable, a: &dyn Case, b: &dyn Case)
             (0..2).map(|order| first_of(&model.terms, order)).collect::<Option<_>>()?;
         // Arrivals belong where they are: the information is taken without the effects.
         let neutral = values.clone();
-        let directions = directions(baseline, &cases, &firsts, &mut values, place);
+        let directions = directions(&cases, &firsts, &mut values, place);
         (expected(&model, &neutral), model.priors().to_vec(), directions)
     };
     let [first, second] = &directions[..] else { return None };
@@ -112,12 +112,11 @@ fn first_of(
     effects: &[crate::likelihood::parameters::ModelTerm<'_>],
     order: usize,
 ) -> Option<(usize, usize)> {
-    effects.iter().find(|p| p.order == order).map(|p| (p.first, p.parameters.len()))
+    effects.iter().find(|p| p.order == order).map(|p| (p.first, p.case.parameters.len()))
 }
 
 fn directions(
-    baseline: &Baseline,
-    cases: &[&dyn Case],
+    cases: &[&Case],
     firsts: &[(usize, usize)],
     values: &mut [f64],
     place: impl Fn(Nuisance) -> Option<std::ops::Range<usize>>,
@@ -128,11 +127,11 @@ fn directions(
         .map(|(case, &(first, count))| {
             let mut along = DVector::zeros(values.len());
             let mut own: Vec<usize> = (first..first + count).collect();
-            for (i, p) in case.parameters(baseline.survey()).iter().enumerate() {
+            for (i, p) in case.parameters.iter().enumerate() {
                 along[first + i] = p.typical - p.neutral;
                 values[first + i] = p.typical;
             }
-            for (nuisance, sd) in case.relaxes() {
+            for &(nuisance, sd) in &case.relaxes {
                 for i in place(nuisance).into_iter().flatten() {
                     along[i] = sd;
                     own.push(i);

@@ -30,7 +30,7 @@ pub(crate) struct Lack {
 /// the model itself; and for single odd bins.
 pub(crate) fn test(
     baseline: &Baseline,
-    cases: &[&dyn Case],
+    cases: &[&Case],
     fitted: WarmStart<'_>,
     used: &[bool],
 ) -> Result<Lack, Error> {
@@ -38,7 +38,7 @@ pub(crate) fn test(
     let gain = |measured: &[Measured]| -> Result<(f64, f64), Error> {
         let base = baseline.fit_energy_to(measured, cases, used, Some(fitted))?;
         let mut all = cases.to_vec();
-        all.push(&free as &dyn Case);
+        all.push(&free);
         let more = baseline.fit_energy_to(measured, &all, used, Some(fitted))?;
         Ok((more.log_likelihood - base.log_likelihood, more.log_evidence - base.log_evidence))
     };
@@ -56,7 +56,7 @@ pub(crate) fn test(
 }
 
 /// A measurement as the fitted model expects it.
-fn simulate(baseline: &Baseline, cases: &[&dyn Case], values: &[f64], number: u64) -> Vec<Measured> {
+fn simulate(baseline: &Baseline, cases: &[&Case], values: &[f64], number: u64) -> Vec<Measured> {
     let mut random =
         Pcg64Mcg::seed_from_u64(baseline.config.seed ^ (number + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
     let all: Vec<usize> = (0..baseline.pairs()).collect();

@@ -3,7 +3,7 @@
 use crate::effect::Case;
 use crate::infer::baseline::Baseline;
 use crate::likelihood::decay::EnergyModel;
-use sabine_acoustics::Levels;
+use sabine_scene::Levels;
 
 /// Measured and predicted energies of the compared bins of one pair and band.
 #[derive(Clone)]
@@ -18,7 +18,7 @@ pub(crate) struct Compared {
 /// All bands of some pairs under fitted values. Where the gain of a response means nothing, the predicted sum is that measured.
 pub(crate) fn compare(
     baseline: &Baseline,
-    cases: &[&dyn Case],
+    cases: &[&Case],
     values: &[f64],
     pairs: &[usize],
 ) -> Vec<Compared> {

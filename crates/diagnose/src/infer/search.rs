@@ -1,10 +1,12 @@
 //! Which causes the data speak for.
 
 use crate::effect::AuxiliaryEvidence;
-use crate::effect::{Case, Nuisance, Observable};
+use crate::effect::{Case, ChannelChange, Nuisance, Observable};
 use crate::error::Error;
 use crate::infer::baseline::Baseline;
-use crate::infer::candidates::{Candidate, EffectScore, Score, by_effect, cases_of};
+use crate::infer::candidates::{
+    Candidate, CatalogueCase, EffectScore, Score, by_effect, candidates, cases_of,
+};
 use crate::infer::direct_evidence;
 use crate::infer::direct_evidence::Fitted;
 use crate::likelihood::decay::WarmStart;
@@ -57,18 +59,12 @@ pub(crate) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    pub fn new(
-        baseline: &'a Baseline,
-        cases: &'a [(usize, &'static str, Box<dyn Case>)],
-        effects: usize,
-        used: Vec<bool>,
-    ) -> Self {
-        let candidates =
-            cases.iter().map(|(effect, id, case)| Candidate { effect: *effect, id, case: &**case }).collect();
+    pub fn new(baseline: &'a Baseline, cases: &'a [CatalogueCase], effects: usize, used: Vec<bool>) -> Self {
+        let candidates = candidates(cases);
         Self { baseline, candidates, effects, used }
     }
 
-    pub fn cases_of(&self, chosen: &[usize], part: Observable) -> Vec<&'a dyn Case> {
+    pub fn cases_of(&self, chosen: &[usize], part: Observable) -> Vec<&'a Case> {
         cases_of(&self.candidates, chosen, part)
     }
 
@@ -89,7 +85,7 @@ impl<'a> Search<'a> {
         Ok(State { chosen: chosen.to_vec(), energy, arrivals, polarity, own, energy_firsts, arrival_firsts })
     }
 
-    pub fn all_cases(&self, chosen: &[usize]) -> Vec<&'a dyn Case> {
+    pub fn all_cases(&self, chosen: &[usize]) -> Vec<&'a Case> {
         chosen.iter().map(|&c| self.candidates[c].case).collect()
     }
 
@@ -100,17 +96,17 @@ impl<'a> Search<'a> {
         let case = self.candidates[candidate].case;
         let mut next = State { chosen, ..state.clone() };
         let evidence = case.observable();
-        let turned = case.inverted().is_some();
-        if evidence.concerns(Observable::Decay) && !turned {
+        let inverts = matches!(case.channel_change(), Some(ChannelChange::Inverted(_)));
+        if evidence.concerns(Observable::Decay) && !inverts {
             let cases = self.cases_of(&next.chosen, Observable::Decay);
             (next.energy, next.energy_firsts) =
                 self.baseline.fit_energy(&cases, &self.used, Some(state.before()))?;
         }
-        if evidence.concerns(Observable::Arrivals) && !turned {
+        if evidence.concerns(Observable::Arrivals) && !inverts {
             let cases = self.cases_of(&next.chosen, Observable::Arrivals);
             (next.arrivals, next.arrival_firsts) = self.baseline.fit_arrivals(&cases, &self.used)?;
         }
-        if turned {
+        if inverts {
             next.polarity = polarity::log_likelihood(
                 &self.baseline.observations.measured,
                 &self.all_cases(&next.chosen),
@@ -149,9 +145,8 @@ impl<'a> Search<'a> {
             if state.chosen.contains(&i) {
                 continue;
             }
-            match candidate.case.exchanged() {
-                None => kept.push(i),
-                Some(_) => {
+            match candidate.case.channel_change() {
+                Some(ChannelChange::Exchanged(..)) => {
                     let mut chosen = state.chosen.clone();
                     chosen.push(i);
                     let gain = by_pair(&chosen, &state.arrivals.values) - now;
@@ -159,6 +154,7 @@ impl<'a> Search<'a> {
                         exchanges.push((gain, i));
                     }
                 }
+                _ => kept.push(i),
             }
         }
         exchanges.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -195,7 +191,7 @@ impl<'a> Search<'a> {
         };
         let case = self.candidates[candidate].case;
         let widened: usize = case
-            .relaxes()
+            .relaxes
             .iter()
             .map(|(nuisance, _)| match nuisance {
                 Nuisance::Absorption(_) => self.baseline.survey().bands.len(),
@@ -203,7 +199,7 @@ impl<'a> Search<'a> {
                 Nuisance::ResponseGain(_) => 1,
             })
             .sum();
-        let free = case.parameters(self.baseline.survey()).len() + widened;
+        let free = case.parameters.len() + widened;
         (2.0 * (likelihood(next) - likelihood(state)) - free as f64).max(0.0).sqrt()
     }
 

@@ -4,7 +4,7 @@ use crate::effect::{Case, Observable};
 use crate::error::Error;
 use crate::extend::extension::changes;
 use crate::infer::baseline::Baseline;
-use crate::infer::candidates::EffectScore;
+use crate::infer::candidates::{CatalogueCase, EffectScore};
 use crate::infer::search::Search;
 use sabine_acoustics::Observer;
 
@@ -38,7 +38,7 @@ impl Selection {
 /// Greedy naming, the dispersion estimated anew after each name, and a backward check.
 pub(crate) fn select(
     baseline: &mut Baseline,
-    cases: &[(usize, &'static str, Box<dyn Case>)],
+    cases: &[CatalogueCase],
     effects: usize,
     used: &[bool],
     observer: &dyn Observer,
@@ -54,8 +54,7 @@ pub(crate) fn select(
                 .into_iter()
                 .filter(|s| {
                     named.chosen.iter().all(|&c| {
-                        search.candidates[c].effect != s.effect
-                            || search.candidates[c].case.subject().is_some()
+                        search.candidates[c].effect != s.effect || search.candidates[c].case.subject.is_some()
                     })
                 })
                 .collect();
@@ -86,16 +85,16 @@ pub(crate) fn select(
             (changes(&search, &state, best.best), state.energy.values)
         };
         // With the cause at work the materials are others: what is compared, and with which spread, follows them.
-        if cases[best.best].2.observable().concerns(Observable::Decay) {
-            baseline.expand_about(&absorption)?;
+        if cases[best.best].case.observable().concerns(Observable::Decay) {
+            baseline.expand_about(&absorption, cases)?;
         }
         for change in &changes {
-            baseline.retrace(change)?;
+            baseline.retrace(change, cases)?;
         }
-        let chosen: Vec<&dyn Case> = named
+        let chosen: Vec<&Case> = named
             .chosen
             .iter()
-            .map(|&c| &*cases[c].2)
+            .map(|&c| &cases[c].case)
             .filter(|c| c.observable().concerns(Observable::Decay))
             .collect();
         baseline.calibrate_dispersion(&chosen, used)?;
@@ -113,6 +112,12 @@ pub(crate) fn select(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::DiagnoseConfig;
+    use crate::effect::Effect;
+    use crate::effects::{PositionError, SurfaceAbsorption, TimeZeroOffset};
+    use crate::hand_made::Tables;
+    use crate::infer::candidates::cases;
+    use sabine_scene::{Levels, TimeZero};
 
     #[test]
     fn a_set_falls_with_the_cause_that_stands_for_it_and_with_no_other() {
@@ -123,5 +128,27 @@ mod tests {
         let mut without_first = all();
         without_first.drop(4);
         assert!(without_first.chosen == [7] && without_first.rivals == ["a", "b"]);
+    }
+
+    /// Names among few effects in rooms made by hand.
+    fn named(tables: Tables) -> (Vec<(&'static str, Option<String>)>, Selection) {
+        let mut baseline = tables.baseline(DiagnoseConfig::default());
+        let effects: Vec<Box<dyn Effect>> =
+            vec![Box::new(PositionError), Box::new(TimeZeroOffset), Box::new(SurfaceAbsorption)];
+        let cases = cases(&effects, baseline.survey());
+        let used = vec![true; baseline.pairs()];
+        let found = select(&mut baseline, &cases, effects.len(), &used, &()).expect("fits");
+        let chosen = found.chosen.iter().map(|&c| (cases[c].id, cases[c].case.subject.clone())).collect();
+        (chosen, found)
+    }
+
+    #[test]
+    fn what_moves_all_responses_is_named_a_latency_and_nothing_is_named_where_nothing_moves() {
+        let tables = || Tables::new(Levels::Common, TimeZero::Emission);
+        let (names, found) = named(tables());
+        assert!(names.is_empty() && found.first.len() == 3, "{names:?}");
+        let (names, found) = named(tables().late(3e-3));
+        assert_eq!(names, [("time_zero", None)]);
+        assert!(found.probability(found.chosen[0]) > 0.95);
     }
 }

@@ -13,7 +13,7 @@ use crate::observe::observed_response::{Measured, PEAK_FLOOR_DB, PEAKS_S};
 use crate::simulate::traced_pair::Arrival;
 use crate::simulate::views::ArrivalView;
 use crate::survey::Survey;
-use sabine_acoustics::TimeZero;
+use sabine_scene::TimeZero;
 
 /// How well the time of a direct sound can be read at [`READ_HZ`]: a third of a sample. Slower recordings are read worse.
 const DIRECT_SD_S: f64 = 2.5e-5;
@@ -67,7 +67,7 @@ fn normal(residual: f64, sd: f64) -> f64 {
 }
 
 impl<'a> ArrivalModel<'a> {
-    pub fn new(data: &'a ArrivalData<'a>, cases: &[&'a dyn Case], used: &'a [bool]) -> Self {
+    pub fn new(data: &'a ArrivalData<'a>, cases: &[&'a Case], used: &'a [bool]) -> Self {
         let survey = data.survey;
         let place = Prior::normal(0.0, data.position_sd_m);
         let layout = ArrivalLayout::of(survey);
@@ -84,7 +84,8 @@ impl<'a> ArrivalModel<'a> {
     }
 
     fn effect_delay_s(&self, values: &[f64], view: &ArrivalView<'_>) -> f64 {
-        self.terms.iter().map(|p| p.case.delay_s(p.own(values), view)).sum()
+        let delay_s = |p: &ModelTerm<'_>| p.case.arrival_term().map(|term| term.delay_s(p.own(values), view));
+        self.terms.iter().filter_map(delay_s).sum()
     }
 
     /// Time of an arrival in the file, and its change with each parameter that matters.
@@ -115,13 +116,14 @@ impl<'a> ArrivalModel<'a> {
         if slopes {
             found.push((latency, 1.0));
             for placed in &self.terms {
+                let Some(term) = placed.case.arrival_term() else { continue };
                 let mut own = placed.own(values).to_vec();
                 for i in 0..own.len() {
                     let (index, value) = (placed.first + i, own[i]);
                     let step = 1e-4 * self.priors[index].sd;
                     let mut at = |moved: f64| {
                         own[i] = moved;
-                        placed.case.delay_s(&own, &view)
+                        term.delay_s(&own, &view)
                     };
                     let (later, earlier) = (at(value + step), at(value - step));
                     own[i] = value;
@@ -226,10 +228,10 @@ impl Model for ArrivalModel<'_> {
 /// Fits from the direct sounds on, reflections joining with ever less tolerance.
 pub(crate) fn fit(
     data: &ArrivalData<'_>,
-    cases: &[&dyn Case],
+    cases: &[&Case],
     used: &[bool],
 ) -> Result<(LaplaceFit, Vec<usize>), Error> {
-    if let Some(place) = cases.iter().rposition(|c| c.seeks()) {
+    if let Some(place) = cases.iter().rposition(|c| c.reflection_term().is_some()) {
         return unassigned_peaks::fit(data, cases, used, place);
     }
     let mut model = ArrivalModel::new(data, cases, used);
@@ -263,11 +265,11 @@ fn offered(model: &mut ArrivalModel<'_>, neutral: &[f64]) -> Vec<Vec<f64>> {
     model.width_s = Some(WIDTHS_S[0]);
     let mut starts: Vec<Vec<f64>> = Vec::new();
     for placed in &model.terms {
-        let options = placed.case.starts(model.data.survey);
+        let options = &placed.case.starts;
         let at = placed.range();
-        starts.extend(options.into_iter().filter(|o| o[..] != neutral[at.clone()]).map(|option| {
+        starts.extend(options.iter().filter(|o| o[..] != neutral[at.clone()]).map(|option| {
             let mut x = neutral.to_vec();
-            x[at.clone()].copy_from_slice(&option);
+            x[at.clone()].copy_from_slice(option);
             x
         }));
     }
@@ -288,7 +290,7 @@ impl Measured {
 /// A model that is ready to be looked at with fitted values.
 pub(crate) fn at_fit<'a>(
     data: &'a ArrivalData<'a>,
-    cases: &[&'a dyn Case],
+    cases: &[&'a Case],
     used: &'a [bool],
 ) -> ArrivalModel<'a> {
     ArrivalModel { width_s: Some(0.0), ..ArrivalModel::new(data, cases, used) }
@@ -300,7 +302,7 @@ mod tests {
     use crate::effect::Effect;
     use crate::effects::{PositionError, RoomDimensions, SamplingClock, SoundSpeed, TimeZeroOffset};
     use crate::hand_made::Tables;
-    use sabine_acoustics::Levels;
+    use sabine_scene::Levels;
 
     #[test]
     fn the_gradient_is_that_of_central_differences() {
@@ -312,7 +314,7 @@ mod tests {
             let used = [true; 3];
             for effect in effects {
                 for case in effect.cases(&tables.survey) {
-                    let model = at_fit(&data, &[&*case], &used);
+                    let model = at_fit(&data, &[&case], &used);
                     let values: Vec<f64> = model
                         .priors
                         .iter()
@@ -350,7 +352,7 @@ mod tests {
         }
         let data = tables.arrival_data();
         let cases = TimeZeroOffset.cases(&tables.survey);
-        let (found, firsts) = fit(&data, &[&*cases[0]], &[true; 3]).expect("a fit");
+        let (found, firsts) = fit(&data, &[&cases[0]], &[true; 3]).expect("a fit");
         assert!((found.values[firsts[0]] - 3.0).abs() < 0.05, "{} ms", found.values[firsts[0]]);
         assert!(found.converged);
     }

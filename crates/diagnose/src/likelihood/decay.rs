@@ -4,21 +4,24 @@
 //! the energy of band-limited noise is (Kuttruff, Room Acoustics, 6th ed., 3.5), and the prediction's own Monte-Carlo error makes it wider.
 
 mod fit;
+#[cfg(test)]
+mod tests;
 mod variance;
 
 pub(crate) use fit::{WarmStart, fit};
 
-use crate::effect::{Case, Stage};
+use crate::effect::{Case, DecayTerm, Parameter, Stage};
 use crate::likelihood::laplace::{Model, Prior, Slopes};
 use crate::likelihood::parameters::{DecayLayout, ModelTerm, ModelTerms};
 use crate::observe::observed_response::Measured;
 use crate::simulate::reflection_reweighting::HitChanges;
+use crate::simulate::tables::Tables;
 use crate::simulate::traced_pair::BandState;
 use crate::simulate::views::BandView;
 use crate::statistics::{HUBER_LOG_RATIO, log_density, median};
 use crate::survey::Survey;
 use rayon::prelude::*;
-use sabine_acoustics::Levels;
+use sabine_scene::Levels;
 
 /// Logarithm of energy in one decibel.
 const LN_PER_DB: f64 = std::f64::consts::LN_10 / 10.0;
@@ -49,6 +52,8 @@ pub(crate) struct EnergyData<'a> {
     /// What is known of it.
     pub priors: &'a [Vec<Prior>],
     pub gain_sd_db: f64,
+    /// Tables of the terms, by slot.
+    pub tables: &'a [Tables],
     /// Factor by which variances exceed what is expected, by band.
     pub dispersion: &'a [f64],
 }
@@ -78,7 +83,7 @@ pub(crate) struct BinResidual {
 }
 
 impl<'a> EnergyModel<'a> {
-    pub fn new(data: &'a EnergyData<'a>, cases: &[&'a dyn Case], used: &'a [bool]) -> Self {
+    pub fn new(data: &'a EnergyData<'a>, cases: &[&'a Case], used: &'a [bool]) -> Self {
         let survey = data.survey;
         let layout = DecayLayout::of(survey);
         let mut priors: Vec<Prior> = Vec::with_capacity(layout.len());
@@ -89,8 +94,8 @@ impl<'a> EnergyModel<'a> {
         let levels = survey.measurement.levels;
         let sd = if levels == Levels::PerResponse { FREE_GAIN_DB } else { data.gain_sd_db };
         priors.extend(survey.responses.iter().map(|_| Prior::normal(0.0, sd)));
-        let mut ordered: Vec<(usize, &dyn Case)> = cases.iter().copied().enumerate().collect();
-        ordered.sort_by_key(|(_, c)| c.stage());
+        let mut ordered: Vec<(usize, &Case)> = cases.iter().copied().enumerate().collect();
+        ordered.sort_by_key(|(_, c)| c.stage);
         let all = ModelTerms::new(priors, ordered, survey, |nuisance| layout.nuisance(nuisance));
         let ModelTerms { priors, terms, assignment } = all;
         Self { data, layout, terms, priors, used, assignment }
@@ -140,8 +145,10 @@ impl<'a> EnergyModel<'a> {
     /// leaks in from its neighbours, each as it is; the rest on their sum.
     fn apply(&self, values: &[f64], view: &BandView<'_>, gain_db: f64, ln_energy: &mut [f64]) {
         let effects = |early: bool, view: &BandView<'_>, ln_energy: &mut [f64]| {
-            for placed in self.terms.iter().filter(|p| (p.case.stage() <= Stage::Transducer) == early) {
-                placed.case.energy(placed.own(values), view, ln_energy);
+            for placed in self.terms.iter().filter(|p| (p.case.stage <= Stage::Transducer) == early) {
+                if let Some(term) = placed.case.decay_term() {
+                    term.apply(placed.own(values), &view.with_table(placed.case.slot), ln_energy);
+                }
             }
         };
         effects(true, view, ln_energy);
@@ -225,7 +232,18 @@ impl<'a> EnergyModel<'a> {
             reference: self.data.reference[band],
             gain: (gain_db * LN_PER_DB).exp(),
             hit_changes,
+            tables: self.data.tables,
+            own_band: band,
+            reflections: false,
+            table: None,
         }
+    }
+
+    /// Whether a parameter of a case may change the prediction of a pair in a band.
+    fn bears_on(&self, parameter: &Parameter, pair: usize, band: usize) -> bool {
+        parameter.band.is_none_or(|own| own == band)
+            && parameter.receiver.is_none_or(|own| own == self.data.survey.responses[pair].receiver)
+            && parameter.response.is_none_or(|own| own == self.assignment[pair])
     }
 
     /// Bins that are compared, and their measured energies.
@@ -295,11 +313,12 @@ impl<'a> EnergyModel<'a> {
         let through = self.through(values, &view, gain_db, &paths);
         let mut rows: Vec<Vec<f64>> =
             (0..m).map(|k| (0..count).map(|bin| path_slopes[bin * m + k] * through[bin]).collect()).collect();
-        // What bends around edges has the same gain.
-        let gained = if view.state.diffracted.is_empty() {
-            through
-        } else {
+        // What is added beside the paths has the same gain.
+        let adds = |p: &ModelTerm<'_>| p.case.decay_term().is_some_and(DecayTerm::adds_sound_of_source);
+        let gained = if self.terms.iter().any(adds) {
             self.with_gain(values, &view, gain_db, &paths)
+        } else {
+            through
         };
         let gain: Vec<f64> = gained.iter().map(|t| t * LN_PER_DB).collect();
         if let Some(index) = self.layout.common_gain() {
@@ -309,8 +328,8 @@ impl<'a> EnergyModel<'a> {
         columns.push(self.layout.gain(self.assignment[pair]));
         rows.push(gain);
         for placed in &self.terms {
-            for (i, p) in placed.parameters.iter().enumerate() {
-                if p.band.is_none_or(|own| own == band) {
+            for (i, p) in placed.case.parameters.iter().enumerate() {
+                if self.bears_on(p, pair, band) {
                     columns.push(placed.first + i);
                     rows.push(self.difference(values, placed.first + i, &view, gain_db, &paths));
                 }
@@ -410,80 +429,5 @@ impl Model for EnergyModel<'_> {
             parts.iter().flat_map(|p| &p.1).for_each(|own| slopes.add(own));
         }
         parts.iter().map(|p| p.0).sum()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::effect::Effect;
-    use crate::effects::{
-        AirAbsorption, AngleDependentAbsorption, BackgroundNoise, CoupledVolume, RoomModes, Scattering,
-        SourceDirectivity, TransducerResponse, Truncation,
-    };
-    use crate::hand_made::Tables;
-    use sabine_acoustics::TimeZero;
-
-    /// Away from the expansion and from all neutral values and bounds.
-    fn somewhere(model: &EnergyModel<'_>) -> Vec<f64> {
-        let one = |(i, p): (usize, &Prior)| {
-            let sd = p.sd.min(0.2 * (p.high - p.low)).min(3.0);
-            (p.mean + 0.3 * sd * (1.0 + (i as f64).sin())).clamp(p.low + 0.1 * sd, p.high - 0.1 * sd)
-        };
-        model.priors.iter().enumerate().map(one).collect()
-    }
-
-    #[test]
-    fn the_gradient_is_that_of_central_differences() {
-        let effects: [&dyn Effect; 9] = [
-            &AirAbsorption,
-            &AngleDependentAbsorption,
-            &BackgroundNoise,
-            &CoupledVolume,
-            &RoomModes,
-            &Scattering,
-            &SourceDirectivity,
-            &TransducerResponse,
-            &Truncation,
-        ];
-        for levels in [Levels::Common, Levels::Absolute, Levels::PerResponse] {
-            let tables = Tables::new(levels, TimeZero::Emission);
-            let data = tables.energy_data();
-            let used = [true; 3];
-            for effect in effects {
-                let cases = effect.cases(&tables.survey);
-                let cases: Vec<&dyn Case> = cases.iter().map(|c| &**c).collect();
-                let model = EnergyModel::new(&data, &cases, &used);
-                let values = somewhere(&model);
-                let mut slopes = Slopes::zero(values.len());
-                model.log_likelihood(&values, Some(&mut slopes));
-                for i in 0..values.len() {
-                    let step = 1e-5 * model.priors[i].sd.min(1.0);
-                    let at = |offset: f64| {
-                        let mut moved = values.clone();
-                        moved[i] += offset;
-                        model.log_likelihood(&moved, None)
-                    };
-                    let expected = (at(step) - at(-step)) / (2.0 * step);
-                    let found = slopes.gradient[i];
-                    let off = (found - expected).abs();
-                    let name = effect.id();
-                    // Slopes of effects are differences themselves, rounded at 1e-6 of the likelihood's size.
-                    assert!(off < 1e-3 * expected.abs() + 2e-3, "{name} {levels:?} {i}: {found} {expected}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn a_response_that_does_not_count_has_no_say() {
-        let tables = Tables::new(Levels::Absolute, TimeZero::Emission);
-        let data = tables.energy_data();
-        let likelihood = |used: [bool; 3]| {
-            let model = EnergyModel::new(&data, &[], &used);
-            model.log_likelihood(&model.start(None), None)
-        };
-        let [first, second] = [[true, false, false], [false, true, true]].map(likelihood);
-        assert!((likelihood([true; 3]) - first - second).abs() < 1e-9);
     }
 }

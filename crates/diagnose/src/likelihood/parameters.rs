@@ -3,10 +3,10 @@
 //! A vector begins with the nuisance parameters, which every model leaves open ([`DecayLayout`], [`ArrivalLayout`]); the parameters of
 //! the cases follow, one [`ModelTerm`] each. No other file knows this order.
 
-use crate::effect::{Case, Nuisance, Parameter};
+use crate::effect::{Case, ChannelChange, Nuisance};
 use crate::likelihood::laplace::Prior;
 use crate::survey::Survey;
-use sabine_acoustics::{Levels, TimeZero};
+use sabine_scene::{Levels, TimeZero};
 use std::ops::Range;
 
 /// Nuisance parameters of the decays: absorption of each material and band, a common gain where levels are common, and a gain of each
@@ -116,8 +116,7 @@ impl ArrivalLayout {
 
 /// A case in a model, and where its parameters stand.
 pub(crate) struct ModelTerm<'a> {
-    pub case: &'a dyn Case,
-    pub parameters: Vec<Parameter>,
+    pub case: &'a Case,
     pub first: usize,
     /// Number of the case, as the caller counts.
     pub order: usize,
@@ -126,7 +125,7 @@ pub(crate) struct ModelTerm<'a> {
 impl ModelTerm<'_> {
     /// Where its parameters stand.
     pub fn range(&self) -> Range<usize> {
-        self.first..self.first + self.parameters.len()
+        self.first..self.first + self.case.parameters.len()
     }
 
     /// Its own part of all values.
@@ -136,10 +135,12 @@ impl ModelTerm<'_> {
 }
 
 /// Which response holds which pair, some having been exchanged.
-pub(crate) fn assignment<'a>(pairs: usize, cases: impl IntoIterator<Item = &'a dyn Case>) -> Vec<usize> {
+pub(crate) fn assignment<'a>(pairs: usize, cases: impl IntoIterator<Item = &'a Case>) -> Vec<usize> {
     let mut assignment: Vec<usize> = (0..pairs).collect();
-    for (a, b) in cases.into_iter().filter_map(|c| c.exchanged()) {
-        assignment.swap(a, b);
+    for change in cases.into_iter().filter_map(Case::channel_change) {
+        if let ChannelChange::Exchanged(a, b) = change {
+            assignment.swap(a, b);
+        }
     }
     assignment
 }
@@ -157,25 +158,24 @@ impl<'a> ModelTerms<'a> {
     /// relax.
     pub fn new(
         mut priors: Vec<Prior>,
-        cases: impl IntoIterator<Item = (usize, &'a dyn Case)>,
+        cases: impl IntoIterator<Item = (usize, &'a Case)>,
         survey: &Survey,
         nuisance: impl Fn(Nuisance) -> Option<Range<usize>>,
     ) -> Self {
         let mut assignment: Vec<usize> = (0..survey.responses.len()).collect();
         let mut terms = Vec::new();
         for (order, case) in cases {
-            for (relaxed, sd) in case.relaxes() {
+            for &(relaxed, sd) in &case.relaxes {
                 for prior in &mut priors[nuisance(relaxed).unwrap_or(0..0)] {
                     prior.sd = prior.sd.max(sd);
                 }
             }
-            if let Some((a, b)) = case.exchanged() {
+            if let Some(ChannelChange::Exchanged(a, b)) = case.channel_change() {
                 assignment.swap(a, b);
             }
-            let parameters = case.parameters(survey);
             let first = priors.len();
-            priors.extend(parameters.iter().map(Prior::of));
-            terms.push(ModelTerm { case, parameters, first, order });
+            priors.extend(case.parameters.iter().map(Prior::of));
+            terms.push(ModelTerm { case, first, order });
         }
         Self { priors, terms, assignment }
     }
@@ -236,7 +236,7 @@ mod tests {
         let priors = vec![Prior::normal(0.0, 0.1); layout.len()];
         let one = |effect: &dyn Effect, i: usize| effect.cases(&survey).swap_remove(i);
         let cases = [one(&TransducerResponse, 0), one(&SurfaceAbsorption, 1), one(&TimeZeroOffset, 0)];
-        let numbered = cases.iter().map(|c| &**c).enumerate();
+        let numbered = cases.iter().enumerate();
         let all = ModelTerms::new(priors, numbered, &survey, |nuisance| layout.nuisance(nuisance));
         let mut next = layout.len();
         for (order, term) in all.terms.iter().enumerate() {

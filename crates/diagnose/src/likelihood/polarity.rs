@@ -1,6 +1,6 @@
 //! Signs of the direct sounds.
 
-use crate::effect::Case;
+use crate::effect::{Case, ChannelChange};
 use crate::observe::observed_response::Measured;
 use crate::statistics::median;
 
@@ -10,7 +10,7 @@ const LIKENESS_SD: f64 = 0.2;
 const ODD_PULSE_SHARE: f64 = 1e-6;
 
 /// Log-likelihood of the signs of the direct sounds.
-pub(crate) fn log_likelihood(measured: &[Measured], cases: &[&dyn Case], used: &[bool]) -> f64 {
+pub(crate) fn log_likelihood(measured: &[Measured], cases: &[&Case], used: &[bool]) -> f64 {
     let likeness = signs(measured);
     let fitted = likeness.iter().zip(used).filter(|(_, used)| **used);
     let typical = median(fitted.filter_map(|(x, _)| x.map(f64::abs)).collect());
@@ -19,7 +19,9 @@ pub(crate) fn log_likelihood(measured: &[Measured], cases: &[&dyn Case], used: &
         .enumerate()
         .filter(|(i, _)| used[*i])
         .filter_map(|(i, x)| {
-            let turned = cases.iter().filter(|c| c.inverted() == Some(i)).count() % 2 == 1;
+            let turned =
+                cases.iter().filter(|c| c.channel_change() == Some(ChannelChange::Inverted(i))).count() % 2
+                    == 1;
             let off = (if turned { -x.as_ref()? } else { *x.as_ref()? }) - typical;
             let density =
                 (-0.5 * (off / LIKENESS_SD).powi(2)).exp() / (LIKENESS_SD * std::f64::consts::TAU.sqrt());
@@ -71,7 +73,7 @@ mod tests {
     use crate::effect::Effect;
     use crate::effects::ChannelFault;
     use crate::hand_made::Tables;
-    use sabine_acoustics::{Levels, TimeZero};
+    use sabine_scene::{Levels, TimeZero};
 
     #[test]
     fn the_response_whose_pulse_is_turned_is_found() {
@@ -85,8 +87,8 @@ mod tests {
         let used = [true; 3];
         let none = log_likelihood(&tables.measured, &[], &used);
         let gains = ChannelFault.cases(&tables.survey).into_iter().filter_map(|case| {
-            let inverted = case.inverted()?;
-            Some((inverted, log_likelihood(&tables.measured, &[&*case], &used) - none))
+            let ChannelChange::Inverted(response) = case.channel_change()? else { return None };
+            Some((response, log_likelihood(&tables.measured, &[&case], &used) - none))
         });
         for (response, gain) in gains {
             assert_eq!(gain > 10.0, response == 1, "{response}: {gain} nats");

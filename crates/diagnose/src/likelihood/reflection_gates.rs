@@ -48,7 +48,7 @@ fn meeting(source: [f64; 3], receiver: [f64; 3], single: &IsolatedReflection) ->
 pub(crate) fn gates(
     observations: &Observations,
     simulation: &Simulation,
-    cases: &[&dyn Case],
+    cases: &[&Case],
     values: &[Vec<f64>],
     absorption: &[f64],
     shift_s: &[Vec<f64>],
@@ -98,7 +98,7 @@ fn relative_energies(
     survey: &Survey,
     simulation: &Simulation,
     (pair, response, band): (usize, usize, usize),
-    (cases, values): (&[&dyn Case], &[Vec<f64>]),
+    (cases, values): (&[&Case], &[Vec<f64>]),
     absorption: &[f64],
 ) -> Vec<f64> {
     let state = &simulation.isolated_reflections[pair].1[band];
@@ -113,10 +113,16 @@ fn relative_energies(
         reference: simulation.reference[band],
         gain: 1.0,
         hit_changes: &hit_changes,
+        tables: &simulation.tables,
+        own_band: band,
+        reflections: true,
+        table: None,
     };
     let mut ln = fitted(state, survey, simulation, absorption, band);
-    for (case, own) in cases.iter().zip(values).filter(|(c, _)| c.stage() == Stage::Room) {
-        case.energy(own, &view, &mut ln);
+    for (case, own) in cases.iter().zip(values).filter(|(c, _)| c.stage == Stage::Room) {
+        if let Some(term) = case.decay_term() {
+            term.apply(own, &view.with_table(case.slot), &mut ln);
+        }
     }
     let direct = ln[0];
     ln.iter().map(|l| (l - direct).exp()).collect()

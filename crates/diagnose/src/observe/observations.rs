@@ -7,7 +7,8 @@ use crate::observe::pre_arrival::PreArrival;
 use crate::statistics::median;
 use crate::survey::planes::planes;
 use crate::survey::{Place, Survey, SurveyedResponse};
-use sabine_acoustics::{ImpulseResponse, Material, MeasuredRoom, Observer, TimeZero, report};
+use sabine_acoustics::{ImpulseResponse, Material, Observer, report};
+use sabine_scene::{MeasuredRoom, TimeZero};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
@@ -25,6 +26,23 @@ pub(crate) struct Observations {
     /// Samples, until the time axes of shadowed responses are set.
     samples: Vec<ImpulseResponse>,
     pulses_by_rate: BTreeMap<u32, Vec<BandPulse>>,
+}
+
+#[cfg(test)]
+impl Observations {
+    /// What was measured, without any file.
+    pub fn by_hand(survey: Survey, measured: Vec<Measured>) -> Self {
+        Self {
+            fitted: vec![true; survey.responses.len()],
+            survey,
+            measured,
+            pre_arrival: PreArrival::default(),
+            pulses: Vec::new(),
+            notes: Vec::new(),
+            samples: Vec::new(),
+            pulses_by_rate: BTreeMap::new(),
+        }
+    }
 }
 
 impl Observations {

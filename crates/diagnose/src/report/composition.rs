@@ -96,7 +96,7 @@ fn causes(
         let own = &search.candidates[candidate];
         Ok(Cause {
             effect: own.id.to_owned(),
-            subject: own.case.subject(),
+            subject: own.case.subject.clone(),
             explanation: effects[own.effect].info().explanation.to_owned(),
             probability: found.probability(candidate),
             nats: without(search, state, candidate)?,
@@ -148,7 +148,7 @@ fn candidate_scores(
         };
         CandidateScore {
             effect: s.id.to_owned(),
-            subject: search.candidates[s.best].case.subject(),
+            subject: search.candidates[s.best].case.subject.clone(),
             nats: s.nats,
             d_prime: s.d_prime,
             nats_beside_causes,

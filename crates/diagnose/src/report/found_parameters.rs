@@ -30,12 +30,12 @@ pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -
         return own.map(|(_, own)| own.parameters.clone()).unwrap_or_default();
     }
     let (maximum, first) = place_of(search, state, candidate);
-    for (i, p) in case.parameters(baseline.survey()).into_iter().enumerate() {
-        push(p.name, maximum.values[first + i], maximum.sd(first + i), p.bounds, p.unit);
+    for (i, p) in case.parameters.iter().enumerate() {
+        push(p.name.clone(), maximum.values[first + i], maximum.sd(first + i), p.bounds, p.unit);
     }
     let bands = baseline.survey().bands;
     let open = (f64::NEG_INFINITY, f64::INFINITY);
-    for (nuisance, _) in case.relaxes() {
+    for &(nuisance, _) in &case.relaxes {
         match nuisance {
             Nuisance::Absorption(m) => {
                 for b in 0..bands.len() {
@@ -70,7 +70,7 @@ pub(crate) fn at_bounds(search: &Search<'_>, state: &State, candidate: usize) ->
         return Vec::new();
     }
     let (maximum, first) = place_of(search, state, candidate);
-    let told = case.parameters(search.baseline.survey()).into_iter().enumerate().filter(|(i, p)| {
+    let told = case.parameters.iter().enumerate().filter(|(i, p)| {
         let value = maximum.values[first + i];
         let at_end = (value <= p.bounds.0 || value >= p.bounds.1) && value != p.neutral;
         at_end && maximum.sd(first + i) < TOLD_SHARE * p.prior_sd

@@ -9,7 +9,7 @@ use crate::report::diagnosis::ResidualCell;
 pub(crate) fn residual_map(
     baseline: &Baseline,
     base: &State,
-    cases: &[&dyn Case],
+    cases: &[&Case],
     state: &State,
 ) -> (Vec<ResidualCell>, Vec<f64>) {
     let all: Vec<usize> = (0..baseline.pairs()).filter(|&p| baseline.observations.fitted[p]).collect();

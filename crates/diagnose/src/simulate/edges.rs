@@ -1,8 +1,9 @@
 //! The ways around the edges of the mesh.
 
 use crate::error::Error;
-use sabine_acoustics::{PathSet, Scene};
+use sabine_paths::PathSet;
 use sabine_propagate::{DiffractingEdges, MeshScene};
+use sabine_scene::Scene;
 
 /// Edges of a mesh around which sound bends.
 pub(crate) struct Edges {

@@ -3,8 +3,12 @@
 pub(crate) mod edges;
 pub(crate) mod hit_groups;
 pub(crate) mod reflection_reweighting;
+pub(crate) mod scattering_share;
 pub(crate) mod scene_tracer;
+pub(crate) mod schroeder;
 pub(crate) mod simulation;
+pub(crate) mod tables;
 pub(crate) mod traced_pair;
 pub(crate) mod traced_room;
+pub(crate) mod traced_views;
 pub(crate) mod views;

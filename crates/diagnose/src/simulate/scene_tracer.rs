@@ -1,8 +1,10 @@
 //! What a diagnosis asks of a tracer.
 
 use crate::error::Error;
-use sabine_acoustics::{Air, PathSet, Propagator, Receiver, Scene, Source};
+use sabine_acoustics::Air;
+use sabine_paths::{PathSet, Propagator};
 use sabine_propagate::{PathTracer, PreparedScene, TracerConfig};
+use sabine_scene::{Receiver, Scene, Source};
 
 /// A tracer that a diagnosis can use: it prepares a scene once and then traces many pairs in it.
 ///

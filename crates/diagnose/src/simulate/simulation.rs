@@ -1,20 +1,23 @@
 //! What the simulated room predicts, expanded about a set of absorptions.
 
 mod retracing;
-mod waves;
-
-pub(crate) use waves::bands_of_modes;
 
 use crate::config::DiagnoseConfig;
 use crate::error::Error;
 use crate::observe::observations::Observations;
 use crate::observe::observed_response::PEAKS_S;
 use crate::simulate::edges::Edges;
+#[cfg(test)]
+use crate::simulate::scene_tracer::Rays;
 use crate::simulate::scene_tracer::{PreparedTracer, SceneTracer};
+use crate::simulate::tables::Tables;
 use crate::simulate::traced_pair::{Arrival, BandState, IsolatedReflection, TracedPair};
 use crate::simulate::traced_room::{trace, traced_s, traced_scene, traced_until_s};
+#[cfg(test)]
+use crate::survey::{Place, Survey};
 use rayon::prelude::*;
-use sabine_acoustics::{Material, MeasuredRoom, Observer, PerBand, Receiver, Scene, Source};
+use sabine_acoustics::{Material, Observer, PerBand};
+use sabine_scene::{MeasuredRoom, Receiver, Scene, Source};
 use std::sync::Arc;
 
 /// Early time over which the reference energy is the mean, in seconds after the direct sound.
@@ -35,6 +38,8 @@ pub(crate) struct Simulation {
     pub states: Vec<Vec<BandState>>,
     /// First bin that the compared range leaves out, `[pair][band]`.
     pub ends: Vec<Vec<usize>>,
+    /// Tables of the terms, by slot.
+    pub tables: Vec<Tables>,
     /// Early exact paths of each pair, and their energies by band.
     pub isolated_reflections: Vec<(Vec<IsolatedReflection>, Vec<BandState>)>,
     pub direct_s: Vec<f64>,
@@ -42,7 +47,7 @@ pub(crate) struct Simulation {
     pub arrivals: Vec<Vec<Arrival>>,
     pub reference: Vec<f64>,
     range_db: f64,
-    traced_s: f64,
+    pub traced_s: f64,
     /// Paths are followed until so long after the emission.
     traced_until_s: f64,
     /// Kelvin by which the air was found to be warmer than stated.
@@ -54,8 +59,8 @@ pub(crate) struct Simulation {
     tracer: Arc<dyn SceneTracer>,
     prepared: Box<dyn PreparedTracer>,
     edges: Option<Edges>,
-    sources: Vec<Source>,
-    receivers: Vec<Receiver>,
+    pub sources: Vec<Source>,
+    pub receivers: Vec<Receiver>,
 }
 
 impl Simulation {
@@ -88,6 +93,7 @@ impl Simulation {
             pairs,
             states: Vec::new(),
             ends: Vec::new(),
+            tables: Vec::new(),
             isolated_reflections: Vec::new(),
             arrivals: Vec::new(),
             reference: Vec::new(),
@@ -113,13 +119,17 @@ impl Simulation {
         Ok(self.materials.iter().zip(&self.absorption).map(one).collect::<Result<_, _>>()?)
     }
 
-    /// Energies of all bins at the present absorption; tables of scattering and angle, and early reflections one by one, too, where
-    /// wanted.
-    pub fn expand(&mut self, observations: &Observations, tables: bool) -> Result<(), Error> {
+    /// The mesh as it is traced, at the size that was found.
+    pub fn traced_scene(&self) -> &Scene {
+        self.resized.as_ref().unwrap_or(&self.scene)
+    }
+
+    /// Energies of all bins at the present absorption; early reflections one by one, too, where wanted.
+    pub fn expand(&mut self, observations: &Observations, reflections: bool) -> Result<(), Error> {
         let materials = self.expanded_materials()?;
-        let one = |pair: &TracedPair| pair.expand(&materials, &observations.pulses, self.traced_s, tables);
+        let one = |pair: &TracedPair| pair.expand(&materials, &observations.pulses, self.traced_s);
         self.states = self.pairs.par_iter().map(one).collect::<Result<_, _>>()?;
-        if tables {
+        if reflections {
             let one = |pair: &TracedPair| pair.isolated_reflections(&materials, PEAKS_S);
             self.isolated_reflections = self.pairs.par_iter().map(one).collect::<Result<_, _>>()?;
         }
@@ -153,9 +163,50 @@ impl Simulation {
 
     /// End of the compared time of each band over all pairs, in seconds after the direct sound.
     pub fn compared_s(&self, band: usize) -> f64 {
-        (0..self.pairs.len())
+        (0..self.states.len())
             .map(|p| self.states[p][band].bins.edge_s(self.ends[p][band]))
             .fold(0.02, f64::max)
+    }
+}
+
+#[cfg(test)]
+impl Simulation {
+    /// Predictions without any path, in a box that could be traced. Energies cannot be expanded again.
+    pub fn by_hand(
+        survey: &Survey,
+        materials: Vec<Material>,
+        states: Vec<Vec<BandState>>,
+        arrivals: Vec<Vec<Arrival>>,
+    ) -> Result<Self, Error> {
+        let faces = std::array::from_fn(|face| materials[face % materials.len()].clone());
+        let scene = Scene::shoebox([5.0, 4.0, 2.5], faces)?;
+        let tracer: Arc<dyn SceneTracer> = Arc::new(Rays { config: DiagnoseConfig::default().tracer() });
+        let source = |p: &Place| Source::omni(p.id.clone(), p.position_m);
+        let receiver = |p: &Place| Receiver::omni(p.id.clone(), p.position_m);
+        Ok(Self {
+            absorption: materials.iter().map(|m| m.absorption().values().to_vec()).collect(),
+            ends: states.iter().map(|bands| bands.iter().map(|b| b.ln_energy.len()).collect()).collect(),
+            tables: Vec::new(),
+            isolated_reflections: Vec::new(),
+            direct_s: survey.responses.iter().map(|r| r.direct_s).collect(),
+            speed_m_s: survey.responses.iter().map(|r| r.air.speed_of_sound_m_s()).collect(),
+            reference: vec![0.05; survey.bands.len()],
+            pairs: Vec::new(),
+            materials,
+            states,
+            arrivals,
+            range_db: 35.0,
+            traced_s: 0.3,
+            traced_until_s: 0.3,
+            warmer_k: 0.0,
+            prepared: tracer.prepare(&scene, 0.3)?,
+            tracer,
+            scene,
+            resized: None,
+            edges: None,
+            sources: survey.sources.iter().map(source).collect::<Result<_, _>>()?,
+            receivers: survey.receivers.iter().map(receiver).collect::<Result<_, _>>()?,
+        })
     }
 }
 

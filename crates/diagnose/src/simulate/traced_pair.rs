@@ -1,26 +1,17 @@
 //! Traced paths between one source and one receiver, and the energies that they predict.
 
-mod diffracted;
 mod gathering;
 mod isolated_reflections;
-mod local_reaction;
-mod scattering;
 
-pub(crate) use diffracted::DiffractedEnergy;
 pub(crate) use isolated_reflections::IsolatedReflection;
-use local_reaction::LOCAL_GRID;
-pub(crate) use scattering::scattering_more;
 
 use crate::observe::band_pulse::{BandPulse, CELL_S};
 use crate::observe::time_bins::Bins;
 use crate::simulate::hit_groups;
 use rayon::prelude::*;
-use sabine_acoustics::{Air, Conditions, Error, Material, PathSet};
+use sabine_acoustics::{Air, Error, Material};
+use sabine_paths::{Conditions, PathSet};
 
-/// Extra scattering at which energies are tabulated.
-pub(crate) const SCATTERING_GRID: [f64; 8] = [-1.0, -0.5, 0.0, 0.1, 0.25, 0.45, 0.7, 0.95];
-/// Place of none in the grid.
-const NO_EXTRA: usize = 2;
 /// What the model itself may be off by, as a share of a bin's energy: a single early pulse is never predicted better.
 const MODEL_SD: f64 = 0.07;
 /// Within so long after the direct sound, in units of one over the bandwidth, single reflections add to it or take from it ...
@@ -34,8 +25,6 @@ const TIME_SD_S: f64 = 4e-5;
 const ISOLATED_S: f64 = 0.04;
 /// Cell of paths that are in none.
 const ISOLATED: u16 = u16::MAX;
-/// A neighbour from which a filter takes less than this share is left out.
-const MIN_LEAK: f64 = 1e-7;
 /// Energy of a bin without paths, as a share of the strongest: it counts as nothing.
 const NOTHING: f64 = 1e-12;
 
@@ -61,6 +50,7 @@ pub(crate) struct TracedPair {
     /// Hits of each path on each material.
     hits: Vec<f32>,
     departures: Vec<[f32; 3]>,
+    arrivals: Vec<[f32; 3]>,
     /// Time after the direct sound.
     times_s: Vec<f32>,
     /// Cell of time that each path falls into; [`ISOLATED`] for early exact ones.
@@ -90,44 +80,19 @@ pub(crate) struct BandState {
     pub time_s: Vec<f64>,
     pub departure: Vec<[f64; 3]>,
     pub departure_products: Vec<[f64; 6]>,
+    pub arrival: Vec<[f64; 3]>,
+    pub arrival_products: Vec<[f64; 6]>,
     /// Expected variance of a measured bin about the prediction, as a share of its energy squared.
     pub variance: Vec<f64>,
     /// The tracer's own part of it.
-    monte_carlo: Vec<f64>,
-    /// What bends around edges.
-    pub diffracted: DiffractedEnergy,
-    /// Logarithm of the change of energy, `[grid][bin]`; empty until tabulated.
-    scattering: Vec<Vec<f64>>,
-    /// By how much the tracer's own relative variance is more there: what scatters is found by chance.
-    scattering_variance: Vec<Vec<f64>>,
-    /// The same for walls that react locally by a share.
-    local_reaction: Vec<Vec<f64>>,
-    /// Logarithm of a wave solution's energy over that of the paths, both as the filter passes them; empty where there is none.
-    pub waves: Vec<f64>,
-}
-
-impl BandState {
-    pub fn scattering_change(&self, bin: usize, extra: f64) -> f64 {
-        between(&SCATTERING_GRID, &self.scattering, bin, extra)
-    }
-
-    pub fn scattering_variance(&self, bin: usize, extra: f64) -> f64 {
-        between(&SCATTERING_GRID, &self.scattering_variance, bin, extra)
-    }
-
-    pub fn local_reaction_change(&self, bin: usize, share: f64) -> f64 {
-        between(&LOCAL_GRID, &self.local_reaction, bin, share)
-    }
+    pub monte_carlo: Vec<f64>,
 }
 
 #[cfg(test)]
 impl BandState {
-    /// A decay that falls by a neper in four bins: two groups of paths in each bin, whose hits grow with time, and tables of scattering and
-    /// of waves that change every bin.
+    /// A decay that falls by a neper in four bins: two groups of paths in each bin, whose hits grow with time.
     pub fn by_hand(bins: Bins, count: usize, materials: usize, offset: f64) -> Self {
         let early = |bin: usize| (-0.25 * bin as f64 - offset).exp();
-        let wavy =
-            |phase: f64| (0..count).map(|bin| 0.4 * (1.3 * bin as f64 + phase).sin()).collect::<Vec<f64>>();
         let group_energy: Vec<f64> =
             (0..count).flat_map(|bin| [0.7 * early(bin), 0.3 * early(bin)]).collect();
         let hits =
@@ -143,39 +108,18 @@ impl BandState {
             time_s: (0..count).map(|bin| bins.centre_s(bin)).collect(),
             departure: (0..count).map(|bin| [0.5 - 0.1 * bin as f64, 0.2, -0.1]).collect(),
             departure_products: vec![[0.4, 0.3, 0.3, 0.05, 0.0, -0.02]; count],
+            arrival: (0..count).map(|bin| [-0.2, 0.4 - 0.05 * bin as f64, 0.1]).collect(),
+            arrival_products: vec![[0.3, 0.4, 0.3, -0.04, 0.03, 0.0]; count],
             variance: (0..count).map(|bin| 0.15 + 0.02 * bin as f64).collect(),
             monte_carlo: vec![0.0; count],
-            diffracted: DiffractedEnergy::default(),
-            scattering: SCATTERING_GRID
-                .iter()
-                .map(|extra| wavy(0.0).iter().map(|w| w * extra).collect())
-                .collect(),
-            scattering_variance: SCATTERING_GRID
-                .iter()
-                .map(|extra| vec![0.05 * extra.abs(); count])
-                .collect(),
-            local_reaction: LOCAL_GRID
-                .iter()
-                .map(|share| wavy(2.0).iter().map(|w| w * share).collect())
-                .collect(),
-            waves: wavy(1.0),
         }
     }
 }
 
-/// What a table, `[grid][bin]`, says between the places of its grid; nothing as long as it is empty.
-fn between(grid: &[f64], table: &[Vec<f64>], bin: usize, x: f64) -> f64 {
-    if table.is_empty() {
-        return 0.0;
-    }
-    let x = x.clamp(grid[0], grid[grid.len() - 1]);
-    let upper = grid.iter().position(|&g| g >= x).unwrap_or(1).max(1);
-    let (low, high) = (grid[upper - 1], grid[upper]);
-    let share = (x - low) / (high - low);
-    table[upper - 1][bin] * (1.0 - share) + table[upper][bin] * share
-}
-
 impl TracedPair {
+    /// A neighbour from which a filter takes less than this share is left out.
+    pub const MIN_LEAK: f64 = 1e-7;
+
     /// `stated` are the materials as far as they are known: they say which paths matter.
     pub fn new(
         paths: PathSet,
@@ -197,9 +141,10 @@ impl TracedPair {
             hits.extend(out.iter().zip(back).map(|(a, b)| f32::from(a + b)));
         }
         let departures = (0..paths.len()).map(|i| paths.departure(i).map(|x| x as f32)).collect();
+        let arrivals = (0..paths.len()).map(|i| paths.arrival(i).map(|x| x as f32)).collect();
         let times_s: Vec<f32> =
             paths.lengths_m().iter().map(|l| (f64::from(*l) / speed_m_s - direct_s) as f32).collect();
-        let energies = paths.energies(stated, &air)?;
+        let energies = paths.energies(&Conditions::new(stated, &air))?;
         let weights: Vec<f32> = (0..paths.len()).map(|i| energies.iter().map(|e| e[i]).sum()).collect();
         let groups = hit_groups::group(&times_s, &weights, &hits, materials);
         let (cells, isolated) = in_cells(&paths, &times_s);
@@ -211,6 +156,7 @@ impl TracedPair {
             direct_s,
             hits,
             departures,
+            arrivals,
             times_s,
             cells,
             isolated,
@@ -230,7 +176,7 @@ impl TracedPair {
 
     /// The exact paths, the shortest first.
     pub fn arrivals(&self, materials: &[Material], within_s: f64) -> Result<Vec<Arrival>, Error> {
-        let energies = self.paths.energies(materials, &self.air)?;
+        let energies = self.paths.energies(&Conditions::new(materials, &self.air))?;
         let mut found: Vec<Arrival> = (0..self.paths.len())
             .filter(|&i| self.paths.is_exact(i) && f64::from(self.times_s[i]) <= within_s)
             .map(|i| Arrival {
@@ -244,6 +190,20 @@ impl TracedPair {
         Ok(found)
     }
 
+    pub fn paths(&self) -> &PathSet {
+        &self.paths
+    }
+
+    /// Paths around an edge between source and receiver, where these do not see each other.
+    pub fn diffracted_paths(&self) -> Option<&PathSet> {
+        self.diffracted.as_ref()
+    }
+
+    /// Whether source and receiver do not see each other, and sound bends around an edge between them.
+    pub fn is_diffracted(&self) -> bool {
+        self.diffracted.is_some()
+    }
+
     pub fn has_direct(&self) -> bool {
         (0..self.paths.len()).any(|i| self.paths.is_direct(i))
     }
@@ -254,10 +214,9 @@ impl TracedPair {
         materials: &[Material],
         kernels: &[BandPulse],
         duration_s: f64,
-        scattering: bool,
     ) -> Result<Vec<BandState>, Error> {
         let bands = materials[0].bands();
-        let energies = self.paths.energies_under(&Conditions::new(materials, &self.air))?;
+        let energies = self.paths.energies(&Conditions::new(materials, &self.air))?;
         let mut states: Vec<BandState> = energies
             .par_iter()
             .enumerate()
@@ -265,25 +224,24 @@ impl TracedPair {
             .collect();
         for (band, state) in states.iter_mut().enumerate() {
             for (b, &share) in kernels[band].shares.iter().enumerate() {
-                if b != band && share > MIN_LEAK {
+                if b != band && share > Self::MIN_LEAK {
                     let sums = self.sums(&energies[b], state.bins, &kernels[band], duration_s);
                     let floor = NOTHING * sums.iter().copied().fold(0.0, f64::max).max(1e-30);
                     state.leaks.push((b, share, sums.iter().map(|e| e.max(floor).ln()).collect()));
                 }
             }
         }
-        let diffracted = self.diffracted_energies(materials, kernels, duration_s)?;
-        states.iter_mut().zip(diffracted).for_each(|(state, diffracted)| state.diffracted = diffracted);
-        if scattering {
-            self.tabulate_scattering(materials, kernels, duration_s, &mut states)?;
-            let local = self.local_reaction(materials, &energies, &states, kernels, duration_s);
-            states.iter_mut().zip(local).for_each(|(state, local)| state.local_reaction = local);
-        }
         Ok(states)
     }
 
     /// The bins that a path's energy falls into, with its share of each.
-    fn shares(time_s: f64, bins: Bins, kernel: &BandPulse, count: usize, mut give: impl FnMut(usize, f64)) {
+    pub fn shares(
+        time_s: f64,
+        bins: Bins,
+        kernel: &BandPulse,
+        count: usize,
+        mut give: impl FnMut(usize, f64),
+    ) {
         let reach = kernel.reach_s().min(2.0 * bins.width_s);
         let first = bins.count(time_s - reach).min(count);
         let mut before = kernel.before(bins.edge_s(first) - time_s);
@@ -301,7 +259,7 @@ impl TracedPair {
     }
 
     /// Energy of each bin, without anything else.
-    fn sums(&self, energies: &[f32], bins: Bins, kernel: &BandPulse, duration_s: f64) -> Vec<f64> {
+    pub fn sums(&self, energies: &[f32], bins: Bins, kernel: &BandPulse, duration_s: f64) -> Vec<f64> {
         let count = bins.count(duration_s);
         let cells = (duration_s / CELL_S).ceil() as usize + 1;
         let mut cell = vec![0.0f64; cells];

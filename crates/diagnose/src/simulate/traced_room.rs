@@ -3,11 +3,13 @@
 use crate::error::Error;
 use crate::observe::observed_response::Measured;
 use crate::simulate::edges::Edges;
+use crate::simulate::scattering_share::scattering_more;
 use crate::simulate::scene_tracer::PreparedTracer;
-use crate::simulate::traced_pair::{TracedPair, scattering_more};
+use crate::simulate::traced_pair::TracedPair;
 use crate::survey::Survey;
 use rayon::prelude::*;
-use sabine_acoustics::{Material, MeasuredRoom, Observer, PerBand, Scene, report};
+use sabine_acoustics::{Material, Observer, PerBand, report};
+use sabine_scene::{MeasuredRoom, Scene};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Extra scattering of the bands of the traced scene, in turn: its paths then serve any scattering.

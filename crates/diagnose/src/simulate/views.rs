@@ -1,6 +1,7 @@
 //! What an effect is shown of a prediction.
 
 use crate::simulate::reflection_reweighting::HitChanges;
+use crate::simulate::tables::Tables;
 use crate::simulate::traced_pair::BandState;
 use crate::survey::{Survey, SurveyedResponse};
 
@@ -17,6 +18,20 @@ pub struct BandView<'a> {
     /// Factor of the gains on all energy of the room.
     pub(crate) gain: f64,
     pub(crate) hit_changes: &'a HitChanges,
+    /// Tables of all terms, and which of them: the band whose bins these are, and whether they are single reflections.
+    pub(crate) tables: &'a [Tables],
+    pub(crate) own_band: usize,
+    pub(crate) reflections: bool,
+    pub(crate) table: Option<&'a (dyn std::any::Any + Send + Sync)>,
+}
+
+impl<'a> BandView<'a> {
+    /// The same with the table of the case that has this slot.
+    pub(crate) fn with_table(&self, slot: Option<usize>) -> BandView<'a> {
+        let tables = slot.and_then(|slot| self.tables.get(slot));
+        let table = tables.and_then(|tables| tables.of(self.pair, self.own_band, self.reflections));
+        BandView { table, ..*self }
+    }
 }
 
 impl BandView<'_> {
@@ -38,6 +53,11 @@ impl BandView<'_> {
     /// The response that it is compared with: another one than the pair's where two were exchanged.
     pub fn recorded(&self) -> &SurveyedResponse {
         &self.survey.responses[self.response]
+    }
+
+    /// Index of that response.
+    pub fn response(&self) -> usize {
+        self.response
     }
 
     /// Number of time bins.
@@ -75,9 +95,15 @@ impl BandView<'_> {
         self.reference
     }
 
-    /// Energy that bends around edges of the mesh into a bin, by theory; none of it is in the prediction as traced.
-    pub fn diffracted_energy(&self, bin: usize) -> f64 {
-        self.gain * self.state.diffracted.of(self.band, bin)
+    /// Factor of the gains of the response on all energy of the room: for energy that a term adds beside that of the paths.
+    pub fn gain(&self) -> f64 {
+        self.gain
+    }
+
+    /// The table that the term has prepared for this band and pair, if it is of this type. Where energy of a neighbouring octave leaks in,
+    /// it is still that of the band whose bins these are.
+    pub fn table<T: std::any::Any>(&self) -> Option<&T> {
+        self.table?.downcast_ref()
     }
 
     /// Energy-weighted mean of the unit vectors in which the paths of a bin leave the source, and of their products
@@ -86,39 +112,15 @@ impl BandView<'_> {
         (self.state.departure[bin], self.state.departure_products[bin])
     }
 
+    /// The same of the unit vectors from the receiver towards where they come from.
+    pub fn arrivals(&self, bin: usize) -> ([f64; 3], [f64; 6]) {
+        (self.state.arrival[bin], self.state.arrival_products[bin])
+    }
+
     /// Natural logarithm of the change of a bin's energy if each meeting with a material left less, by this logarithm of the share.
     pub fn reflection_reweighting(&self, bin: usize, material: usize, ln_kept: f64) -> f64 {
         let materials = self.survey.materials.len();
         self.hit_changes.of(self.state, materials, bin, material, ln_kept)
-    }
-
-    /// Natural logarithm of the change of a bin's energy if the walls reacted locally by a share (-0.5 to 1.3; 1 is all of it): each
-    /// reflection's logarithm moves by so much from that of random-incidence absorption towards that of a real impedance.
-    pub fn local_reaction_change(&self, bin: usize, share: f64) -> f64 {
-        self.state.local_reaction_change(bin, share)
-    }
-
-    /// Natural logarithm of the change of a bin's energy if the surfaces scattered more by `extra` (0 to 0.9, share of what
-    /// they now reflect specularly) or less (-1 to 0, share of what they now scatter).
-    pub fn scattering_change(&self, bin: usize, extra: f64) -> f64 {
-        self.state.scattering_change(bin, extra)
-    }
-
-    /// By how much the tracer's own variance of a bin, as a share of its energy squared, is more if the surfaces scattered by `extra` more: what
-    /// scatters is found by chance.
-    pub fn scattering_variance(&self, bin: usize, extra: f64) -> f64 {
-        self.state.scattering_variance(bin, extra)
-    }
-
-    /// Natural logarithm of a bin's energy in the solution of the wave equation over that of the paths, both behind the octave's
-    /// filter; 0 where there is no solution.
-    pub fn wave_change(&self, bin: usize) -> f64 {
-        self.state.waves.get(bin).copied().unwrap_or(0.0)
-    }
-
-    /// Whether there is a solution of the wave equation in this octave.
-    pub fn has_waves(&self) -> bool {
-        !self.state.waves.is_empty()
     }
 }
 

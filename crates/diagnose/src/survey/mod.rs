@@ -3,7 +3,8 @@
 pub(crate) mod planes;
 
 use crate::survey::planes::Plane;
-use sabine_acoustics::{Air, Bands, Measurement};
+use sabine_acoustics::{Air, Bands};
+use sabine_scene::Measurement;
 
 /// One response of the survey.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! The flat surfaces of a mesh.
 
-use sabine_acoustics::Scene;
+use sabine_scene::Scene;
 
 /// Triangles whose normals differ by less (one less their cosine), and whose planes by less than this in metres, lie in one plane.
 const TILT: f64 = 1e-4;

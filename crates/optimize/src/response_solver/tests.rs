@@ -5,7 +5,9 @@ use crate::AbsorptionPrior;
 use crate::history::History;
 use crate::measured_decay::BinnedDecay;
 use crate::pulse::Pulse;
-use sabine_acoustics::{Air, Bands, Contribution, Levels, PathSet, Reflection};
+use sabine_acoustics::{Air, Bands};
+use sabine_paths::{Contribution, PathSet, Reflection};
+use sabine_scene::Levels;
 
 const OCTAVES: Bands = Bands::T60;
 const WINDOWS: usize = 6;

@@ -3,6 +3,7 @@
 
 use rand::{Rng, SeedableRng};
 use sabine_acoustics::*;
+use sabine_scene::*;
 use std::f64::consts::{PI, TAU};
 
 /// All rooms here have these walls.

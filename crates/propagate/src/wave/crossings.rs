@@ -3,7 +3,7 @@
 use super::axes::Axes;
 use crate::vector::{Vec3, cross, norm, sub};
 use rayon::prelude::*;
-use sabine_acoustics::Scene;
+use sabine_scene::Scene;
 
 /// Triangles reach this much farther (m): cracks between neighbours are closed. Crossings found twice do no harm.
 const REACH_M: f64 = 1e-5;

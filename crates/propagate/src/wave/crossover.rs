@@ -2,10 +2,9 @@
 
 use super::response::WaveResponse;
 use crate::Error;
-use crate::error::check_range;
 use crate::spectrum::Spectrum;
 use realfft::num_complex::Complex;
-use sabine_acoustics::ImpulseResponse;
+use sabine_acoustics::{ImpulseResponse, OutOfRange};
 use std::f64::consts::{PI, SQRT_2};
 
 /// Rounds in which the energy of the octave is matched; each leaves less than a tenth of the difference.
@@ -54,7 +53,7 @@ impl Crossover {
     /// # Errors
     /// [`Error::OutOfRange`] outside these bounds.
     pub fn new(crossover_hz: f64) -> Result<Self, Error> {
-        check_range("crossover_hz", crossover_hz, 20.0, 3500.0, "between 20 and 3,500 Hz")?;
+        OutOfRange::check("crossover_hz", crossover_hz, 20.0, 3500.0, "between 20 and 3,500 Hz")?;
         Ok(Self { crossover_hz })
     }
 
@@ -75,11 +74,17 @@ impl Crossover {
         }
         let least_hz = self.limit_hz() * (1.0 - 1e-9);
         let range = "at least sqrt 2 times the crossover";
-        check_range("limit_hz of the waves", waves.limit_hz, least_hz, f64::INFINITY, range)?;
+        OutOfRange::check("limit_hz of the waves", waves.limit_hz, least_hz, f64::INFINITY, range)?;
         let rate_hz = f64::from(rate);
         let waves_s = (waves.samples.len() - waves.lead) as f64 / rate_hz;
         let range = "at least that of the paths";
-        check_range("duration of the waves (s)", waves_s, paths.duration_s() - 1e-3, f64::INFINITY, range)?;
+        OutOfRange::check(
+            "duration of the waves (s)",
+            waves_s,
+            paths.duration_s() - 1e-3,
+            f64::INFINITY,
+            range,
+        )?;
 
         let margin = (MARGIN_PERIODS / self.crossover_hz * rate_hz) as usize + waves.lead;
         let count = paths.samples().len();

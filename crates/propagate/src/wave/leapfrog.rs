@@ -138,7 +138,8 @@ mod tests {
     use super::*;
     use crate::random::generator;
     use rand::Rng;
-    use sabine_acoustics::{Air, Bands, Material, NamedMaterial, Scene, Source, Triangle};
+    use sabine_acoustics::{Air, Bands, Material};
+    use sabine_scene::{NamedMaterial, Scene, Source, Triangle};
 
     /// A wedge-shaped room with slanted walls, and a screen in it.
     fn room() -> WaveRoom {

@@ -6,7 +6,7 @@ use crate::mesh_scene::MeshScene;
 use crate::vector::Vec3;
 use crate::walk::visible;
 use crate::{Error, MeshReport};
-use sabine_acoustics::{Scene, Source};
+use sabine_scene::{Scene, Source};
 use std::collections::HashMap;
 
 /// Walls whose normal is this near to an axis (cosine) are where the mesh has them; others become stairs.

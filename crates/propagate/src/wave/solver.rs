@@ -9,11 +9,11 @@ use super::room::WaveRoom;
 use super::source_pulse::SourcePulse;
 use crate::Error;
 use crate::band_masks::{BandMasks, Transition};
-use crate::error::check_range;
 use crate::placement::check_placement;
 use crate::spectrum::Spectrum;
 use realfft::num_complex::Complex;
-use sabine_acoustics::{Air, Bands, Material, Observer, Receiver, Scene, Source};
+use sabine_acoustics::{Air, Bands, Material, Observer, OutOfRange};
+use sabine_scene::{Receiver, Scene, Source};
 use std::f64::consts::{PI, SQRT_2};
 
 /// Periods of the lowest mode that a response must hold.
@@ -61,15 +61,21 @@ impl Default for WaveConfig {
 
 impl WaveConfig {
     fn check(&self) -> Result<(), Error> {
-        check_range("limit_hz", self.limit_hz, 20.0, 5000.0, "between 20 and 5,000 Hz")?;
-        check_range("points_per_wavelength", self.points_per_wavelength, 6.0, 100.0, "between 6 and 100")?;
-        check_range("duration_s", self.duration_s, 0.01, 60.0, "between 10 ms and 60 s")?;
+        OutOfRange::check("limit_hz", self.limit_hz, 20.0, 5000.0, "between 20 and 5,000 Hz")?;
+        OutOfRange::check(
+            "points_per_wavelength",
+            self.points_per_wavelength,
+            6.0,
+            100.0,
+            "between 6 and 100",
+        )?;
+        OutOfRange::check("duration_s", self.duration_s, 0.01, 60.0, "between 10 ms and 60 s")?;
         let rate = f64::from(self.sample_rate_hz);
-        check_range("sample_rate_hz", rate, 1e3, 768e3, "between 1 and 768 kHz")?;
+        OutOfRange::check("sample_rate_hz", rate, 1e3, 768e3, "between 1 and 768 kHz")?;
         let most_hz = rate / (2.0 * GONE_ABOVE);
-        check_range("limit_hz", self.limit_hz, 20.0, most_hz, "at most 0.31 times the sample rate")?;
+        OutOfRange::check("limit_hz", self.limit_hz, 20.0, most_hz, "at most 0.31 times the sample rate")?;
         let budget = self.memory_bytes as f64;
-        check_range("memory_bytes", budget, 1_048_576.0, 1.1e12, "between 1 MiB and 1 TiB")
+        Ok(OutOfRange::check("memory_bytes", budget, 1_048_576.0, 1.1e12, "between 1 MiB and 1 TiB")?)
     }
 }
 
@@ -99,6 +105,8 @@ impl WaveConfig {
 ///
 /// ```
 /// use sabine_acoustics::*;
+/// use sabine_paths::*;
+/// use sabine_scene::*;
 /// use sabine_propagate::wave::{WaveConfig, WaveSolver};
 /// // A rigid box of 3.43 m x 2.5 m x 2 m resounds at c / 2L = 50 Hz, here heard 2 m apart along its length.
 /// let rigid = Material::uniform(Bands::SIMULATION, 0.01, 0.0)?;
@@ -274,7 +282,7 @@ impl WaveSolver {
             return Err(Error::TooShortForModes { duration_s, needed_s, lowest_hz });
         }
         let range = "at least the lowest mode of the room, c / (2 longest side)";
-        check_range("limit_hz", self.config.limit_hz, lowest_hz, f64::INFINITY, range)?;
+        OutOfRange::check("limit_hz", self.config.limit_hz, lowest_hz, f64::INFINITY, range)?;
         Ok(lowest_hz)
     }
 }

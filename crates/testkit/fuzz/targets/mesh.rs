@@ -1,6 +1,7 @@
 //! What must hold of a mesh that was read.
 
-use sabine_acoustics::{Bands, Material, Mesh};
+use sabine_acoustics::{Bands, Material};
+use sabine_scene::Mesh;
 use std::path::Path;
 
 /// Reads the file and asks for a scene of it.

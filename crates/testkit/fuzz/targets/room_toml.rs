@@ -5,7 +5,7 @@
 mod scratch;
 
 use libfuzzer_sys::fuzz_target;
-use sabine_acoustics::MeasuredRoom;
+use sabine_scene::MeasuredRoom;
 use std::sync::Once;
 
 static MESH: Once = Once::new();

@@ -101,7 +101,8 @@ impl<const LANES: usize> Weights<LANES> {
 #[cfg(test)]
 mod tests {
     use crate::{LabConfig, Laboratory, ShoeboxImages};
-    use sabine_acoustics::{Bands, Receiver, Source};
+    use sabine_acoustics::Bands;
+    use sabine_scene::{Receiver, Source};
 
     /// Images between two ages, counted one by one.
     #[test]

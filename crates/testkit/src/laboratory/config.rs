@@ -1,6 +1,7 @@
 //! What a laboratory is asked for.
 
-use sabine_acoustics::{Bands, Error, Levels, TimeZero};
+use sabine_acoustics::{Bands, Error, OutOfRange};
+use sabine_scene::{Levels, TimeZero};
 
 /// The room to draw and how it is measured.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,6 +26,8 @@ pub struct LabConfig {
     pub levels: Levels,
     /// Whether the sources' axes are declared.
     pub orientation: bool,
+    /// Whether the microphones' axes are declared.
+    pub microphone_axes: bool,
 }
 
 impl Default for LabConfig {
@@ -40,6 +43,7 @@ impl Default for LabConfig {
             time_zero: TimeZero::Emission,
             levels: Levels::Common,
             orientation: true,
+            microphone_axes: false,
         }
     }
 }
@@ -62,20 +66,8 @@ impl LabConfig {
             ),
         ];
         for (field, value, low, high, range) in checks {
-            check_range(field, value, low, high, range)?;
+            OutOfRange::check(field, value, low, high, range)?;
         }
         Ok(())
     }
-}
-
-/// Checks that a number is finite and within `low..=high`.
-pub(crate) fn check_range(
-    field: &'static str,
-    value: f64,
-    low: f64,
-    high: f64,
-    range: &'static str,
-) -> Result<(), Error> {
-    // Written so that NaN fails.
-    if value >= low && value <= high { Ok(()) } else { Err(Error::OutOfRange { field, value, range }) }
 }

@@ -1,7 +1,13 @@
 //! The effects that a laboratory can hide.
 
-use super::truth::Truth;
-use sabine_acoustics::Error;
+mod typical;
+
+use super::Laboratory;
+use super::stream::{Purpose, stream};
+use super::truth::{Truth, check_octaves};
+use rand::Rng;
+use rand_distr::StandardNormal;
+use sabine_acoustics::{Error, OutOfRange};
 use serde::{Deserialize, Serialize};
 
 /// A physical effect that is at work in the responses and that the declared room does not tell of. Lists per band begin with the
@@ -148,6 +154,18 @@ pub enum Hidden {
         /// Middle of the crossover to the images in Hz, 0 (none) to 1000.
         below_hz: f64,
     },
+    /// Microphones hear q + (1 - q) cos(angle to the axis), normalised to constant sensitivity in a diffuse field.
+    ReceiverDirectivity {
+        /// Omnidirectional share q of each octave, 0 to 1.
+        omni_share: Vec<f64>,
+        /// The axis of all, or `None` for each microphone's own.
+        axis: Option<[f64; 3]>,
+    },
+    /// Each channel has a frequency response of its own.
+    ChannelResponse {
+        /// Gain of each octave in dB, -40 to 40, a list for each response.
+        gains_db: Vec<Vec<f64>>,
+    },
     /// Outside the catalogue: the gain swells and sinks while each response is recorded, as depth sin(2 pi t / period + phase).
     GainDrift {
         /// Greatest deviation in dB.
@@ -225,7 +243,7 @@ pub struct Gap {
 
 impl Hidden {
     /// Identifiers of the catalogue's effects.
-    pub const CATALOGUE: [&'static str; 19] = [
+    pub const CATALOGUE: [&'static str; 21] = [
         "transducer_response",
         "air_absorption",
         "source_directivity",
@@ -245,6 +263,8 @@ impl Hidden {
         "nonlinear_distortion",
         "angle_dependent_absorption",
         "room_modes",
+        "receiver_directivity",
+        "channel_response",
     ];
     /// Names of the effects that no catalogue holds.
     pub const OUTSIDE: [&'static str; 3] = ["gain_drift", "dropouts", "foreign_chirp"];
@@ -277,17 +297,56 @@ impl Hidden {
             Self::NonlinearDistortion { .. } => "nonlinear_distortion",
             Self::AngleDependentAbsorption { .. } => "angle_dependent_absorption",
             Self::RoomModes { .. } => "room_modes",
+            Self::ReceiverDirectivity { .. } => "receiver_directivity",
+            Self::ChannelResponse { .. } => "channel_response",
             Self::GainDrift { .. } => "gain_drift",
             Self::Dropouts { .. } => "dropouts",
             Self::ForeignChirp { .. } => "foreign_chirp",
         }
     }
 
+    /// An effect of a strength: 1 is a strong, plain case, 0 leaves the effect out, and what lies between is proportionate (levels:
+    /// proportionate in amplitude; faults of polarity and order: there or not there). Signs and details follow from the seed.
+    ///
+    /// The id is one of [`Hidden::CATALOGUE`] or [`Hidden::OUTSIDE`]; `channel_fault.polarity`, `channel_fault.gain` and
+    /// `channel_fault.swap` ask for one kind.
+    ///
+    /// # Errors
+    /// [`Error::UnknownId`]; [`Error::OutOfRange`] for a strength outside 0 to 3; [`Error::Length`] for a swap where there is one
+    /// response only.
+    pub fn random(id: &str, strength: f64, lab: &Laboratory, seed: u64) -> Result<Self, Error> {
+        OutOfRange::check("strength", strength, 0.0, 3.0, "between 0 and 3")?;
+        let mut random = stream(seed, Purpose::Effect, 0);
+        match id {
+            "receiver_directivity" => {
+                let share = strength * random.random_range(0.35..0.5);
+                let drawn: [f64; 3] = std::array::from_fn(|_| random.sample(StandardNormal));
+                let length = drawn.iter().map(|c| c * c).sum::<f64>().sqrt().max(1e-9);
+                let in_line = random.random::<bool>() && !lab.config().microphone_axes;
+                Ok(Self::ReceiverDirectivity {
+                    omni_share: vec![(1.0 - share).max(0.0); lab.null().bands_hz.len()],
+                    axis: in_line.then(|| drawn.map(|c| c / length)),
+                })
+            }
+            "channel_response" => {
+                let truth = lab.null();
+                let one = |_| typical::smooth(&mut random, truth.bands_hz.len(), 4.0 * strength);
+                Ok(Self::ChannelResponse { gains_db: (0..truth.responses()).map(one).collect() })
+            }
+            _ => typical::draw(id, strength, lab, seed, &mut random),
+        }
+    }
+
     /// Changes the truth. What acts on samples only is looked up there by the stages that follow.
+    ///
+    /// # Errors
+    /// For an effect that does not fit the room.
     pub(crate) fn apply(&self, truth: &mut Truth) -> Result<(), Error> {
         truth.check(self)?;
         match self {
             Self::TransducerResponse { gains_db } => {
+                let octaves = truth.bands_hz.len();
+                check_octaves(octaves, "gain (dB)", gains_db, (-40.0, 40.0), "between -40 and 40 dB")?;
                 truth.source_gains_db.iter_mut().zip(gains_db).for_each(|(g, more)| *g += more);
             }
             Self::AirAbsorption { relative_humidity_percent } => {
@@ -297,6 +356,27 @@ impl Hidden {
                 for source in &mut truth.sources {
                     source.omni_share.clone_from(omni_share);
                     source.axis = axis.unwrap_or(source.axis);
+                }
+            }
+            Self::ReceiverDirectivity { omni_share, axis } => {
+                let octaves = truth.bands_hz.len();
+                check_octaves(octaves, "omnidirectional share", omni_share, (0.0, 1.0), "between 0 and 1")?;
+                let square = axis.map_or(1.0, |a| a.iter().map(|c| c * c).sum());
+                OutOfRange::check("squared length of the axis", square, 0.999_999, 1.000_001, "1")?;
+                for microphone in &mut truth.microphones {
+                    microphone.omni_share.clone_from(omni_share);
+                    microphone.axis = axis.unwrap_or(microphone.axis);
+                }
+            }
+            Self::ChannelResponse { gains_db } => {
+                let (expected, found) = (truth.responses(), gains_db.len());
+                if expected != found {
+                    return Err(Error::Length { expected, found });
+                }
+                for (own, more) in truth.channel_gains_db.iter_mut().zip(gains_db) {
+                    let range = "between -40 and 40 dB";
+                    check_octaves(own.len(), "gain of a channel (dB)", more, (-40.0, 40.0), range)?;
+                    own.iter_mut().zip(more).for_each(|(g, more)| *g += more);
                 }
             }
             Self::Scattering { scattering } => {

@@ -80,6 +80,7 @@ fn add_images_of<const LANES: usize>(
     columns: &mut Columns,
 ) {
     let (source, receiver) = (&truth.sources[pair.0], truth.receivers_m[pair.1]);
+    let microphone = &truth.microphones[pair.1];
     let bands = truth.bands_hz.len();
     let seed = key(truth.seed, Purpose::Signs, pair.0 * truth.receivers_m.len() + pair.1);
     let end_s = columns.start_s + columns.samples[0].len() as f64 / columns.rate_hz;
@@ -139,11 +140,13 @@ fn add_images_of<const LANES: usize>(
                     + y.departure * source.axis[1]
                     + z.departure * source.axis[2];
                 let cosine = along / length_m;
+                let heard = (0..3).map(|k| offset[k] * microphone.axis[k]).sum::<f64>() / length_m;
                 let scale = sign / length_m / kept.sqrt();
                 for b in 0..bands {
                     let energy =
                         by_angle[b] * row[b] * z.walls[b] * (-medium.exponents_per_m[b] * length_m).exp();
-                    amplitudes[b] = scale * energy.sqrt() * gains[b] * source.gain(b, cosine);
+                    amplitudes[b] =
+                        scale * energy.sqrt() * gains[b] * source.gain(b, cosine) * microphone.gain(b, heard);
                 }
                 if !panels.is_empty() && panel::concerns([x.index, y.index, z.index]) {
                     panel::shade(truth, &panels, receiver, offset, &mut amplitudes);

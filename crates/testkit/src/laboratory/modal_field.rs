@@ -8,7 +8,7 @@ use crate::own_air::energy_exponent_per_m;
 use rayon::prelude::*;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
-use sabine_acoustics::{Bands, Error};
+use sabine_acoustics::{Bands, Error, OutOfRange};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Width of the crossover between standing waves and images, in octaves.
@@ -54,11 +54,9 @@ pub(crate) fn check(truth: &Truth) -> Result<(), Error> {
             let value = (0..3).map(|k| (source.position_m[k] - receiver[k]).abs()).fold(0.0, f64::max);
             if value < LEAST_APART_M {
                 let field = "distance between source and receiver along an axis (m)";
-                return Err(Error::OutOfRange {
-                    field,
-                    value,
-                    range: "at least 0.21 m where rooms have modes",
-                });
+                return Err(
+                    OutOfRange { field, value, range: "at least 0.21 m where rooms have modes" }.into()
+                );
             }
         }
     }

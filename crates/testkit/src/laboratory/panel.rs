@@ -9,7 +9,7 @@ use super::stream::{Purpose, key, mix};
 use super::truth::{Medium, Truth};
 use super::unfolded::{meetings, point};
 use super::{hidden::Hidden, image_field::wall_energy};
-use sabine_acoustics::Error;
+use sabine_acoustics::{Error, OutOfRange};
 
 /// Walls on the way to the panel and from it, at most.
 const MOST_WALLS: i64 = 2;
@@ -100,13 +100,13 @@ impl Panel {
 /// Refuses a panel that is none.
 pub(crate) fn check(truth: &Truth, panel: &Panel) -> Result<(), Error> {
     let square: f64 = panel.axes[0].iter().map(|c| c * c).sum();
-    super::config::check_range("squared length of the normal", square, 0.999_999, 1.000_001, "1")?;
+    OutOfRange::check("squared length of the normal", square, 0.999_999, 1.000_001, "1")?;
     for half in panel.half_m {
-        super::config::check_range("side of the panel (m)", 2.0 * half, 0.0, 20.0, "between 0 and 20 m")?;
+        OutOfRange::check("side of the panel (m)", 2.0 * half, 0.0, 20.0, "between 0 and 20 m")?;
     }
     for corner in panel.corners() {
         for (c, side) in corner.into_iter().zip(truth.size_m) {
-            super::config::check_range("corner of the panel (m)", c, 0.0, side, "within the room")?;
+            OutOfRange::check("corner of the panel (m)", c, 0.0, side, "within the room")?;
         }
     }
     Ok(())
@@ -167,7 +167,7 @@ pub(crate) fn add_reflections(
     columns: &mut Columns,
 ) {
     let (source, receiver) = (&truth.sources[pair.0], truth.receivers_m[pair.1]);
-    let bands = truth.bands_hz.len();
+    let (microphone, bands) = (&truth.microphones[pair.1], truth.bands_hz.len());
     let mut seed = key(truth.seed, Purpose::Panel, pair.0 * truth.receivers_m.len() + pair.1);
     let walls = truth.log_mirrored();
     for panel in panels {
@@ -189,6 +189,13 @@ pub(crate) fn add_reflections(
                         turned * (at[k] - from.place_m[k]) / legs[0] * source.axis[k]
                     })
                     .sum();
+                // So is where it comes from, at an odd image of the receiver.
+                let heard: f64 = (0..3)
+                    .map(|k| {
+                        let turned = if to.index[k] % 2 == 0 { 1.0 } else { -1.0 };
+                        turned * (at[k] - to.place_m[k]) / legs[1] * microphone.axis[k]
+                    })
+                    .sum();
                 let sign = if seed & 1 == 0 { 1.0 } else { -1.0 };
                 let amplitudes: Vec<f64> = (0..bands)
                     .map(|b| {
@@ -197,7 +204,8 @@ pub(crate) fn add_reflections(
                             * panel.reflectance[b]
                             * (-medium.exponents_per_m[b] * length_m).exp()
                             * 10f64.powf(truth.source_gains_db[b] / 10.0);
-                        sign * energy.sqrt() * source.gain(b, cosine) / length_m
+                        let gain = source.gain(b, cosine) * microphone.gain(b, heard);
+                        sign * energy.sqrt() * gain / length_m
                     })
                     .collect();
                 columns.add_exactly(length_m / medium.speed_m_s, &amplitudes);

@@ -3,7 +3,7 @@
 use super::hidden::Hidden;
 use super::truth::Truth;
 use super::unfolded::meetings;
-use sabine_acoustics::Error;
+use sabine_acoustics::{Error, OutOfRange};
 
 /// A rectangle of a face of the box.
 #[derive(Clone, Debug)]
@@ -45,15 +45,9 @@ impl Patch {
         }
         let own = (0..3).filter(|&k| k != self.face / 2);
         for (k, side) in own.zip(self.size_m) {
-            super::config::check_range("side of the hole (m)", side, 0.0, 20.0, "between 0 and 20 m")?;
+            OutOfRange::check("side of the hole (m)", side, 0.0, 20.0, "between 0 and 20 m")?;
             for edge in [self.centre_m[k] - 0.5 * side, self.centre_m[k] + 0.5 * side] {
-                super::config::check_range(
-                    "edge of the hole (m)",
-                    edge,
-                    0.0,
-                    truth.size_m[k],
-                    "within its wall",
-                )?;
+                OutOfRange::check("edge of the hole (m)", edge, 0.0, truth.size_m[k], "within its wall")?;
             }
         }
         Ok(())

@@ -3,12 +3,13 @@
 use super::box_decay::BoxDecay;
 use super::config::LabConfig;
 use super::stream::{Purpose, stream};
-use super::truth::{TrueMaterial, TrueSession, TrueSource, Truth};
+use super::truth::{TrueMaterial, TrueMicrophone, TrueSession, TrueSource, Truth};
 use rand::Rng;
 use rand::seq::SliceRandom;
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
-use sabine_acoustics::{Bands, Error, Levels, TimeZero};
+use sabine_acoustics::{Bands, Error, OutOfRange};
+use sabine_scene::{Levels, TimeZero};
 
 /// Names of materials; nothing follows from them.
 const NAMES: [&str; 10] =
@@ -86,11 +87,13 @@ pub(crate) fn draw(config: &LabConfig) -> Result<(Declared, Truth), Error> {
             relative_humidity_percent,
             pressure_kpa: 101.325,
             receivers_m: Vec::new(),
+            microphones: Vec::new(),
             source_gains_db: vec![0.0; config.bands.len()],
             clock_ppm: 0.0,
             duration_s: 0.0,
             latencies_s: Vec::new(),
             gains_db: Vec::new(),
+            channel_gains_db: Vec::new(),
             inverted: Vec::new(),
             materials: materials(&declared),
             sources: Vec::new(),
@@ -124,7 +127,7 @@ pub(crate) fn draw(config: &LabConfig) -> Result<(Declared, Truth), Error> {
         ));
     }
     let (field, range) = ("rooms drawn in vain", "fewer than 20000");
-    Err(Error::OutOfRange { field, value: TRIES as f64, range })
+    Err(OutOfRange { field, value: TRIES as f64, range }.into())
 }
 
 /// When the slowest octave has fallen far enough for a recording to end, if no wall scatters (which rarely makes it longer).
@@ -139,6 +142,16 @@ pub(crate) fn fallen_s(truth: &Truth) -> Result<f64, Error> {
 fn measure(config: &LabConfig, truth: &mut Truth, sources_m: &[[f64; 3]], receivers_m: &[[f64; 3]]) {
     let mut random = stream(config.seed, Purpose::Jitter, 0);
     truth.receivers_m = receivers_m.iter().map(|p| p.map(|c| c + PLACE_SD_M * normal(&mut random))).collect();
+    let mut random = stream(config.seed, Purpose::Axes, 0);
+    truth.microphones = receivers_m
+        .iter()
+        .map(|_| {
+            // Anywhere.
+            let axis: [f64; 3] = std::array::from_fn(|_| normal(&mut random));
+            let length = axis.iter().map(|c| c * c).sum::<f64>().sqrt().max(1e-9);
+            TrueMicrophone { axis: axis.map(|c| c / length), omni_share: vec![1.0; truth.bands_hz.len()] }
+        })
+        .collect();
     let mut random = stream(config.seed, Purpose::Places, 1);
     let centre = truth.size_m.map(|l| 0.5 * l);
     truth.sources = sources_m
@@ -163,6 +176,7 @@ fn measure(config: &LabConfig, truth: &mut Truth, sources_m: &[[f64; 3]], receiv
     truth.sessions = SESSIONS[..config.sessions].iter().map(|&s| session(truth, s)).collect();
     let responses = sources_m.len() * receivers_m.len();
     truth.inverted = vec![false; responses];
+    truth.channel_gains_db = vec![vec![0.0; truth.bands_hz.len()]; responses];
     let mut random = stream(config.seed, Purpose::Gain, 0);
     truth.gains_db = (0..responses).map(|_| GAIN_SD_DB * normal(&mut random)).collect();
     let mut random = stream(config.seed, Purpose::Level, 0);

@@ -1,9 +1,11 @@
 //! What happens to samples after the microphone: all but the clock, which acts on arrival times.
 
 use super::hidden::{Fault, Hidden};
+use super::steep_bands::colour;
 use super::stream::{Purpose, key, unit};
 use super::truth::Truth;
 use realfft::RealFftPlanner;
+use sabine_acoustics::Bands;
 use std::f64::consts::{PI, TAU};
 
 /// Duration over which a gap opens and closes, in seconds.
@@ -12,7 +14,13 @@ const GAP_EDGE_S: f64 = 1e-3;
 const CHIRP_EDGE: f64 = 0.2;
 
 /// Applies gains, polarity and everything that happens over time to the samples of one response.
-pub(crate) fn record(truth: &Truth, index: usize, rate_hz: f64, samples: &mut [f64]) {
+pub(crate) fn record(truth: &Truth, index: usize, bands: Bands, sample_rate_hz: u32, samples: &mut Vec<f64>) {
+    let rate_hz = f64::from(sample_rate_hz);
+    let octaves = &truth.channel_gains_db[index];
+    if octaves.iter().any(|db| *db != 0.0) {
+        let amplitudes: Vec<f64> = octaves.iter().map(|db| 10f64.powf(db / 20.0)).collect();
+        *samples = colour(bands, std::mem::take(samples), &amplitudes, sample_rate_hz);
+    }
     let sign = if truth.inverted[index] { -1.0 } else { 1.0 };
     let gain = sign * 10f64.powf(truth.gains_db[index] / 20.0);
     samples.iter_mut().for_each(|s| *s *= gain);

@@ -135,8 +135,11 @@ fn fly(truth: &Truth, medium: &Medium, source: usize, band: usize, batch: usize,
                     let length_m = flown_m + 0.5 * (near + far);
                     let step = (length_m / step_m) as usize;
                     if step < steps {
+                        let microphone = &truth.microphones[receiver];
+                        let cosine = -(0..3).map(|k| direction[k] * microphone.axis[k]).sum::<f64>();
+                        let heard = microphone.gain(band, cosine).powi(2);
                         energy[receiver * steps + step] +=
-                            carried * (far - near) * (-medium.exponents_per_m[band] * length_m).exp();
+                            heard * carried * (far - near) * (-medium.exponents_per_m[band] * length_m).exp();
                     }
                 }
             }

@@ -1,6 +1,5 @@
 //! Rooms with a screen, by finite differences.
 
-use super::config::check_range;
 use super::random_room::{GAIN_SD_DB, PLACE_SD_M, normal, unit};
 use super::stream::{Purpose, stream};
 use crate::box_modes::BoxModes;
@@ -9,9 +8,10 @@ use crate::own_air::speed_of_sound_m_s;
 use crate::phonons::{PhononConfig, Phonons};
 use crate::wave_grid::{ThinScreen, WaveGrid};
 use rand_pcg::Pcg64Mcg;
-use sabine_acoustics::{
-    Air, Bands, Error, ImpulseResponse, Levels, Material, MaterialPrior, MeasuredRoom, Measurement,
-    NamedMaterial, NewResponse, NewRoom, PerBand, Receiver, Scene, Source, TimeZero, Triangle,
+use sabine_acoustics::{Air, Bands, Error, ImpulseResponse, Material, OutOfRange, PerBand};
+use sabine_scene::{
+    Levels, MaterialPrior, MeasuredRoom, Measurement, NamedMaterial, NewResponse, NewRoom, Receiver, Scene,
+    Source, TimeZero, Triangle,
 };
 use std::path::Path;
 
@@ -95,8 +95,8 @@ impl ScreenedRoom {
     /// # Errors
     /// [`Error::OutOfRange`] for a configuration outside what [`ScreenedConfig`] says, or for which no room can be found.
     pub fn new(config: ScreenedConfig) -> Result<Self, Error> {
-        check_range("seed", config.seed as f64, 0.0, i64::MAX as f64, "below 2^63")?;
-        check_range("receivers", config.receivers as f64, 2.0, 16.0, "between 2 and 16")?;
+        OutOfRange::check("seed", config.seed as f64, 0.0, i64::MAX as f64, "below 2^63")?;
+        OutOfRange::check("receivers", config.receivers as f64, 2.0, 16.0, "between 2 and 16")?;
         let mut random = stream(config.seed, Purpose::Room, 0);
         let air = Air::new(18.0 + 6.0 * unit(&mut random), 40.0 + 30.0 * unit(&mut random), 101.325)?;
         let cell_m = CELL_M * (0.97 + 0.03 * unit(&mut random));
@@ -120,7 +120,7 @@ impl ScreenedRoom {
         let places = Places { grid: &plain, cells, screen };
         let Some((source, receivers)) = places.draw(config.receivers, config.seed) else {
             let range = "with places on both sides of its screen";
-            return Err(Error::OutOfRange { field: "seed", value: config.seed as f64, range });
+            return Err(OutOfRange { field: "seed", value: config.seed as f64, range }.into());
         };
         let declared = Declared {
             scene: scene(&plain, &screen, config, &absorption)?,
@@ -200,7 +200,11 @@ impl ScreenedRoom {
     ///
     /// # Errors
     /// As [`NewRoom::write`].
-    pub fn write(&self, responses: Vec<ImpulseResponse>, folder: &Path) -> Result<MeasuredRoom, Error> {
+    pub fn write(
+        &self,
+        responses: Vec<ImpulseResponse>,
+        folder: &Path,
+    ) -> Result<MeasuredRoom, sabine_scene::Error> {
         let declared = &self.declared;
         let entry = |(samples, receiver): (ImpulseResponse, &Receiver)| NewResponse {
             source: declared.source.id.clone(),

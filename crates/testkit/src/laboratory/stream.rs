@@ -21,6 +21,7 @@ pub(crate) enum Purpose {
     Chirp,
     Effect,
     Panel,
+    Axes,
 }
 
 /// Random numbers of a seed for one purpose, and one of many things that need them.

@@ -1,11 +1,10 @@
 //! The room as it really is.
 
-use super::config::check_range;
 use super::hidden::{End, Fault, Hidden};
 use super::panel::{self, Panel};
 use super::patch::Patch;
 use crate::own_air::{energy_exponent_per_m, speed_of_sound_m_s};
-use sabine_acoustics::{Air, Bands, Error, write_atomically};
+use sabine_acoustics::{Air, Bands, Error, OutOfRange, write_atomically};
 use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::path::Path;
@@ -30,6 +29,8 @@ pub struct Truth {
     pub pressure_kpa: f64,
     /// Receivers in metres.
     pub receivers_m: Vec<[f64; 3]>,
+    /// The microphone of each receiver.
+    pub microphones: Vec<TrueMicrophone>,
     /// Gain of each octave in dB, whatever the path.
     pub source_gains_db: Vec<f64>,
     /// Samples taken too many, in parts per million.
@@ -40,6 +41,8 @@ pub struct Truth {
     pub latencies_s: Vec<f64>,
     /// Gain of each response in dB.
     pub gains_db: Vec<f64>,
+    /// Gain of each response's channel in each octave, in dB.
+    pub channel_gains_db: Vec<Vec<f64>>,
     /// Whether each response is turned over.
     pub inverted: Vec<bool>,
     /// Materials, in the order of the scene.
@@ -86,11 +89,33 @@ pub struct TrueSource {
     pub omni_share: Vec<f64>,
 }
 
+/// A microphone as it really is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrueMicrophone {
+    /// Unit vector in which it looks.
+    pub axis: [f64; 3],
+    /// Omnidirectional share of each octave.
+    pub omni_share: Vec<f64>,
+}
+
+/// Gain of the pressure by the cosine of the angle to the axis; its mean square over the sphere is 1.
+fn first_order(q: f64, cosine: f64) -> f64 {
+    (q + (1.0 - q) * cosine) / (q * q + (1.0 - q).powi(2) / 3.0).sqrt()
+}
+
 impl TrueSource {
     /// Gain of the pressure in a band, by the cosine of the angle to the axis; its mean square over the sphere is 1.
     pub(crate) fn gain(&self, band: usize, cosine: f64) -> f64 {
-        let q = self.omni_share[band];
-        (q + (1.0 - q) * cosine) / (q * q + (1.0 - q).powi(2) / 3.0).sqrt()
+        first_order(self.omni_share[band], cosine)
+    }
+}
+
+impl TrueMicrophone {
+    /// Gain of the pressure in a band, by the cosine of the angle between the axis and where sound comes from; its mean square over the
+    /// sphere is 1.
+    pub(crate) fn gain(&self, band: usize, cosine: f64) -> f64 {
+        first_order(self.omni_share[band], cosine)
     }
 }
 
@@ -98,12 +123,12 @@ impl Truth {
     /// Reads what [`Laboratory::write`](crate::Laboratory::write) wrote.
     ///
     /// # Errors
-    /// [`Error::Io`] and [`Error::Toml`].
-    pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
+    /// [`Error::Io`] and [`sabine_scene::Error::Toml`].
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, sabine_scene::Error> {
         let path = path.as_ref();
         let text =
             std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
-        toml::from_str(&text).map_err(|source| Error::toml(path, &text, source))
+        toml::from_str(&text).map_err(|source| sabine_scene::Error::toml(path, &text, source))
     }
 
     pub(crate) fn write(&self, path: &Path) -> Result<(), Error> {
@@ -165,36 +190,27 @@ impl Truth {
         (0..self.bands_hz.len()).map(|b| std::array::from_fn(|f| face(b, f))).collect()
     }
 
-    /// Refuses an effect that does not fit the room.
+    /// Refuses an effect that does not fit the room; those that are not here say so themselves ([`Hidden::apply`]).
     pub(crate) fn check(&self, effect: &Hidden) -> Result<(), Error> {
         let bands = self.bands_hz.len();
-        let per_band = |values: &[f64]| {
-            let (expected, found) = (bands, values.len());
-            if expected == found { Ok(()) } else { Err(Error::BandCount { expected, found }) }
-        };
-        let each = |field, values: &[f64], low, high, range| {
-            per_band(values)?;
-            values.iter().try_for_each(|&v| check_range(field, v, low, high, range))
-        };
+        let each =
+            |field, values: &[f64], low, high, range| check_octaves(bands, field, values, (low, high), range);
         let exists = |what, index: usize, count: usize| {
             if index < count { Ok(()) } else { Err(Error::Index { what, index, count }) }
         };
         let responses = self.responses();
         match effect {
-            Hidden::TransducerResponse { gains_db } => {
-                each("gain (dB)", gains_db, -40.0, 40.0, "between -40 and 40 dB")
-            }
-            Hidden::AirAbsorption { relative_humidity_percent } => check_range(
+            Hidden::AirAbsorption { relative_humidity_percent } => Ok(OutOfRange::check(
                 "relative humidity (%)",
                 *relative_humidity_percent,
                 0.0,
                 100.0,
                 "between 0 and 100 %",
-            ),
+            )?),
             Hidden::SourceDirectivity { omni_share, axis } => {
                 each("omnidirectional share", omni_share, 0.0, 1.0, "between 0 and 1")?;
                 let square = axis.map_or(1.0, |a| a.iter().map(|c| c * c).sum());
-                check_range("squared length of the axis", square, 0.999_999, 1.000_001, "1")
+                Ok(OutOfRange::check("squared length of the axis", square, 0.999_999, 1.000_001, "1")?)
             }
             Hidden::Scattering { scattering } => each("scattering", scattering, 0.0, 1.0, "between 0 and 1"),
             Hidden::SurfaceAbsorption { material, absorption } => {
@@ -205,7 +221,7 @@ impl Truth {
                 each("noise level (dB)", levels_db, -300.0, 0.0, "between -300 and 0 dB")
             }
             Hidden::CoupledVolume { level_db, decay_s, critical_distance_m, rise_s, aperture_m } => {
-                check_range(
+                OutOfRange::check(
                     "level of the coupled volume (dB)",
                     *level_db,
                     -300.0,
@@ -213,21 +229,21 @@ impl Truth {
                     "between -300 and 0 dB",
                 )?;
                 each("decay time of the coupled volume (s)", decay_s, 0.05, 10.0, "between 0.05 and 10 s")?;
-                check_range(
+                OutOfRange::check(
                     "critical distance (m)",
                     *critical_distance_m,
                     0.0,
                     100.0,
                     "between 0 and 100 m",
                 )?;
-                check_range("build-up (s)", *rise_s, 1e-4, 1.0, "between 0.0001 and 1 s")?;
-                aperture_m.iter().try_for_each(|&c| {
-                    check_range("position of the aperture (m)", c, -1.0, 100.0, "near the room")
-                })
+                OutOfRange::check("build-up (s)", *rise_s, 1e-4, 1.0, "between 0.0001 and 1 s")?;
+                Ok(aperture_m.iter().try_for_each(|&c| {
+                    OutOfRange::check("position of the aperture (m)", c, -1.0, 100.0, "near the room")
+                })?)
             }
             Hidden::Truncation { end_s, fade_s } => {
-                check_range("end (s)", *end_s, 0.0, 100.0, "between 0 and 100 s")?;
-                check_range("fade (s)", *fade_s, 0.0, *end_s, "between 0 and the end")
+                OutOfRange::check("end (s)", *end_s, 0.0, 100.0, "between 0 and 100 s")?;
+                Ok(OutOfRange::check("fade (s)", *fade_s, 0.0, *end_s, "between 0 and the end")?)
             }
             // The air says for itself what temperatures it takes.
             Hidden::SoundSpeed { temperature_offset_k } => Air::new(
@@ -237,26 +253,28 @@ impl Truth {
             )
             .map(|_| ()),
             Hidden::SamplingClock { ppm } => {
-                check_range("clock error (ppm)", *ppm, -2e4, 2e4, "between -20000 and 20000 ppm")
+                Ok(OutOfRange::check("clock error (ppm)", *ppm, -2e4, 2e4, "between -20000 and 20000 ppm")?)
             }
-            Hidden::RoomDimensions { scale } => scale
-                .iter()
-                .try_for_each(|&s| check_range("scale of the room", s, 0.8, 1.25, "between 0.8 and 1.25")),
+            Hidden::RoomDimensions { scale } => Ok(scale.iter().try_for_each(|&s| {
+                OutOfRange::check("scale of the room", s, 0.8, 1.25, "between 0.8 and 1.25")
+            })?),
             Hidden::PositionError { end, index, offset_m } => {
                 match end {
                     End::Source => exists("source", *index, self.sources.len()),
                     End::Receiver => exists("receiver", *index, self.receivers_m.len()),
                 }?;
-                offset_m.iter().try_for_each(|&o| check_range("offset (m)", o, -10.0, 10.0, "within 10 m"))
+                Ok(offset_m
+                    .iter()
+                    .try_for_each(|&o| OutOfRange::check("offset (m)", o, -10.0, 10.0, "within 10 m"))?)
             }
             Hidden::TimeZero { latency_s } => {
-                check_range("latency (s)", *latency_s, -0.1, 1.0, "between -0.1 and 1 s")
+                Ok(OutOfRange::check("latency (s)", *latency_s, -0.1, 1.0, "between -0.1 and 1 s")?)
             }
             Hidden::ChannelFault { fault } => match *fault {
                 Fault::Polarity { response } => exists("response", response, responses),
                 Fault::Gain { response, gain_db } => {
                     exists("response", response, responses)?;
-                    check_range("gain (dB)", gain_db, -60.0, 60.0, "between -60 and 60 dB")
+                    Ok(OutOfRange::check("gain (dB)", gain_db, -60.0, 60.0, "between -60 and 60 dB")?)
                 }
                 Fault::Swap { a, b } => {
                     exists("response", a, responses).and_then(|()| exists("response", b, responses))
@@ -268,38 +286,55 @@ impl Truth {
             }
             Hidden::OpenPatch { face, centre_m, size_m } => Patch::new(*face, *centre_m, *size_m).check(self),
             Hidden::AngleDependentAbsorption { share } => {
-                check_range("share of local reaction", *share, 0.0, 1.0, "between 0 and 1")
+                Ok(OutOfRange::check("share of local reaction", *share, 0.0, 1.0, "between 0 and 1")?)
             }
             Hidden::NonlinearDistortion { sweep_s, from_hz, to_hz, quadratic, cubic, lead_in_s } => {
-                check_range("length of the sweep (s)", *sweep_s, 0.1, 60.0, "between 0.1 and 60 s")?;
-                check_range("first frequency (Hz)", *from_hz, 1.0, 20e3, "between 1 Hz and 20 kHz")?;
-                check_range("last frequency (Hz)", *to_hz, 2.0 * from_hz, 96e3, "an octave above the first")?;
+                OutOfRange::check("length of the sweep (s)", *sweep_s, 0.1, 60.0, "between 0.1 and 60 s")?;
+                OutOfRange::check("first frequency (Hz)", *from_hz, 1.0, 20e3, "between 1 Hz and 20 kHz")?;
+                OutOfRange::check(
+                    "last frequency (Hz)",
+                    *to_hz,
+                    2.0 * from_hz,
+                    96e3,
+                    "an octave above the first",
+                )?;
                 for factor in [quadratic, cubic] {
-                    check_range("factor of a power", *factor, -1.0, 1.0, "between -1 and 1")?;
+                    OutOfRange::check("factor of a power", *factor, -1.0, 1.0, "between -1 and 1")?;
                 }
-                check_range("lead-in (s)", *lead_in_s, 0.0, 5.0, "between 0 and 5 s")
+                Ok(OutOfRange::check("lead-in (s)", *lead_in_s, 0.0, 5.0, "between 0 and 5 s")?)
             }
-            Hidden::RoomModes { below_hz } => {
-                check_range("crossover of the modes (Hz)", *below_hz, 0.0, 1000.0, "between 0 and 1000 Hz")
-            }
+            Hidden::RoomModes { below_hz } => Ok(OutOfRange::check(
+                "crossover of the modes (Hz)",
+                *below_hz,
+                0.0,
+                1000.0,
+                "between 0 and 1000 Hz",
+            )?),
             Hidden::GainDrift { depth_db, period_s, phase_rad } => {
-                check_range("depth (dB)", *depth_db, -40.0, 40.0, "between -40 and 40 dB")?;
-                check_range("period (s)", *period_s, 1e-3, 100.0, "between 0.001 and 100 s")?;
-                check_range("phase (rad)", *phase_rad, -100.0, 100.0, "between -100 and 100")
+                OutOfRange::check("depth (dB)", *depth_db, -40.0, 40.0, "between -40 and 40 dB")?;
+                OutOfRange::check("period (s)", *period_s, 1e-3, 100.0, "between 0.001 and 100 s")?;
+                Ok(OutOfRange::check("phase (rad)", *phase_rad, -100.0, 100.0, "between -100 and 100")?)
             }
             Hidden::Dropouts { gaps } => gaps.iter().try_for_each(|gap| {
                 exists("response", gap.response, responses)?;
-                check_range("beginning of a gap (s)", gap.start_s, 0.0, 100.0, "between 0 and 100 s")?;
-                check_range("length of a gap (s)", gap.length_s, 0.0, 10.0, "between 0 and 10 s")
+                OutOfRange::check("beginning of a gap (s)", gap.start_s, 0.0, 100.0, "between 0 and 100 s")?;
+                Ok(OutOfRange::check("length of a gap (s)", gap.length_s, 0.0, 10.0, "between 0 and 10 s")?)
             }),
             Hidden::ForeignChirp { start_s, length_s, from_hz, to_hz, level_db } => {
-                check_range("beginning (s)", *start_s, 0.0, 100.0, "between 0 and 100 s")?;
-                check_range("length (s)", *length_s, 1e-3, 10.0, "between 0.001 and 10 s")?;
+                OutOfRange::check("beginning (s)", *start_s, 0.0, 100.0, "between 0 and 100 s")?;
+                OutOfRange::check("length (s)", *length_s, 1e-3, 10.0, "between 0.001 and 10 s")?;
                 for frequency_hz in [from_hz, to_hz] {
-                    check_range("frequency (Hz)", *frequency_hz, 10.0, 96e3, "between 10 Hz and 96 kHz")?;
+                    OutOfRange::check(
+                        "frequency (Hz)",
+                        *frequency_hz,
+                        10.0,
+                        96e3,
+                        "between 10 Hz and 96 kHz",
+                    )?;
                 }
-                check_range("level (dB)", *level_db, -300.0, 60.0, "between -300 and 60 dB")
+                Ok(OutOfRange::check("level (dB)", *level_db, -300.0, 60.0, "between -300 and 60 dB")?)
             }
+            _ => Ok(()),
         }
     }
 
@@ -313,6 +348,21 @@ impl Truth {
             }
         }
     }
+}
+
+/// Refuses a list that does not have a value within limits for each octave.
+pub(crate) fn check_octaves(
+    octaves: usize,
+    field: &'static str,
+    values: &[f64],
+    (low, high): (f64, f64),
+    range: &'static str,
+) -> Result<(), Error> {
+    let (expected, found) = (octaves, values.len());
+    if expected != found {
+        return Err(Error::BandCount { expected, found });
+    }
+    Ok(values.iter().try_for_each(|&v| OutOfRange::check(field, v, low, high, range))?)
 }
 
 /// What the air does.

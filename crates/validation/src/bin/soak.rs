@@ -5,8 +5,9 @@
 //! the limit; the first quarter is left for caches to fill.
 
 use clap::Parser;
-use sabine::acoustics::{Channel, MeasuredRoom, Signal, read_audio};
+use sabine::acoustics::{Channel, Signal, read_audio};
 use sabine::propagate::TracerConfig;
+use sabine::scene::MeasuredRoom;
 use sabine::{MatchConfig, MatchInput, Recording, match_room};
 use std::path::Path;
 use std::process::ExitCode;

@@ -63,9 +63,9 @@ impl Findings {
         }
     }
 
-    /// Seconds of all stages; wave solutions are made within others.
+    /// Seconds of all stages; tables of effects are made within others.
     pub fn total_s(&self) -> f64 {
-        self.seconds.iter().filter(|(stage, _)| stage != "waves").map(|(_, s)| s).sum()
+        self.seconds.iter().filter(|(stage, _)| stage != "tables").map(|(_, s)| s).sum()
     }
 }
 

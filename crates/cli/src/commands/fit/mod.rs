@@ -11,17 +11,19 @@ use crate::demo::Demo;
 use crate::failure::Failure;
 use crate::output::OutputFolder;
 use crate::page::Page;
-use crate::room::RoomArguments;
+use crate::room::{PlaceArguments, RoomArguments};
 use clap::{Args, ValueEnum};
 use sabine::acoustics::{
-    Air, Bands, Error as AcousticsError, Estimate, Material, MeasuredRoom, PathSet, PerBand, Propagator,
-    Reading, Receiver, RoomParameters, SampleFormat, Scene, Signal, Source, encode_wav,
+    Air, Bands, Error as AcousticsError, Estimate, Material, PerBand, Reading, RoomParameters, SampleFormat,
+    Signal, encode_wav,
 };
 use sabine::optimize::{
-    AbsorptionPrior, DecayMisfit, FitConfig, MaterialFit, MaterialFitter, MeasuredDecay, MeasuredPair,
-    Retrace, RetraceConfig, SlopeObjective,
+    AbsorptionPrior, DecayMisfit, FitConfig, FitProblem, MaterialFit, MaterialFitter, MeasuredDecay,
+    MeasuredPair, Retrace, RetraceConfig, SlopeObjective,
 };
+use sabine::paths::{Conditions, PathSet, Propagator};
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
+use sabine::scene::{MeasuredRoom, Receiver, Scene, Source};
 use std::path::PathBuf;
 use std::time::Instant;
 use summary::{Compared, Seconds, Summary, mean_of};
@@ -40,7 +42,7 @@ const DURATION_S: (f64, f64) = (0.3, 6.0);
 pub struct Arguments {
     #[command(flatten)]
     room: RoomArguments,
-    /// Reverberation times at 125 Hz to 8 kHz, in seconds
+    /// Reverberation times at 125 Hz to 8 kHz, in seconds, between --source and --receiver
     #[arg(long, value_delimiter = ',', value_name = "S,...", conflicts_with = "responses")]
     t60: Option<Vec<f64>>,
     /// Fit to the room's measured responses (the default without --t60)
@@ -52,12 +54,8 @@ pub struct Arguments {
     /// What is made to meet --t60
     #[arg(long, value_enum, default_value_t = Slope::Edc)]
     objective: Slope,
-    /// Source of --t60 and of the rendered response [default: the first]
-    #[arg(long, value_name = "ID")]
-    source: Option<String>,
-    /// Receiver of --t60 and of the rendered response [default: the first]
-    #[arg(long, value_name = "ID")]
-    receiver: Option<String>,
+    #[command(flatten)]
+    place: PlaceArguments,
     /// Standard deviation of the length of a reflected path by errors of positions and mesh, in metres; for --responses
     #[arg(long, default_value_t = 0.1, value_name = "M")]
     path_error_m: f64,
@@ -129,7 +127,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
     let names: Vec<&str> = file.scene().materials().iter().map(|m| m.name.as_str()).collect();
     let summary = Summary::new(&names, &outcome);
-    let response = renderer.render(&outcome.independent, &outcome.fit.materials, &room.air)?;
+    let response =
+        renderer.render(&outcome.independent, &Conditions::new(&outcome.fit.materials, &room.air))?;
     let json = serde_json::to_string_pretty(&summary)?;
     out.write("impulse_response.wav", &encode_wav(&Signal::from(response), SampleFormat::Float32)?)?;
     out.write("fit.json", json.as_bytes())?;
@@ -205,39 +204,25 @@ impl<'a> Room<'a> {
         tracer.trace(&self.scene, source, receiver, &self.air, &())
     }
 
-    /// Source and receiver that were asked for, or the first.
-    fn places(&self) -> Result<(&Source, &Receiver), Failure> {
-        let (sources, receivers) = (self.file.sources(), self.file.receivers());
-        let source = match &self.arguments.source {
-            Some(id) => self.file.source(id)?,
-            None => sources.first().ok_or("room.toml: sources: there is none")?,
-        };
-        let receiver = match &self.arguments.receiver {
-            Some(id) => self.file.receiver(id)?,
-            None => receivers.first().ok_or("room.toml: receivers: there is none")?,
-        };
-        Ok((source, receiver))
-    }
-
     fn fit_t60(&self, t60_s: &[f64], bar: &Bar) -> Result<Outcome, Failure> {
         let targets = PerBand::new(OCTAVES, t60_s.iter().map(|&t| Estimate::exact(t)).collect())?;
         let longest_s = t60_s.iter().copied().fold(0.0, f64::max);
         let duration_s = (DURATION_FACTOR * longest_s).clamp(DURATION_S.0, DURATION_S.1);
         let fitter = self.fitter()?;
         fitter.check_t60(&targets, OCTAVES, &self.air, duration_s)?;
-        let retraced = Retraced { room: self, places: self.places()?, duration_s };
+        let retraced = Retraced { room: self, places: self.arguments.place.of(self.file)?, duration_s };
         let config = RetraceConfig { seed: self.arguments.seed, ..RetraceConfig::default() };
         let done = fitter.fit_t60_retracing(
             &retraced,
-            &self.materials,
-            &self.priors,
-            &self.air,
+            &FitProblem::new(&self.materials, &self.priors, &self.air),
             &targets,
             &config,
             bar,
         )?;
         let independent = done.independent_paths.into_iter().next().ok_or("no paths")?;
-        let curve = |materials: &[Material]| independent.energy_response(materials, &self.air, 5e-3);
+        let curve = |materials: &[Material]| {
+            independent.energy_response(&Conditions::new(materials, &self.air), 5e-3)
+        };
         let (before, after) = (curve(&self.materials)?, curve(&done.fit.materials)?);
         let points = |energy: &sabine::acoustics::EnergyResponse, b: usize| {
             let level = energy.decay_curve(b).level_db().into_iter().enumerate();
@@ -306,8 +291,12 @@ impl<'a> Room<'a> {
             pairs.iter().zip(&held_out).filter(|(_, held)| !**held).map(|(pair, _)| *pair).collect();
         let start = Instant::now();
         let measurement = self.file.measurement();
-        let done =
-            fitter.fit_responses(&fitted, measurement, &self.materials, &self.priors, &self.air, bar)?;
+        let done = fitter.fit_responses(
+            &fitted,
+            measurement,
+            &FitProblem::new(&self.materials, &self.priors, &self.air),
+            bar,
+        )?;
         let fit_s = start.elapsed().as_secs_f64();
 
         // Held against rays that the fit has not seen.
@@ -376,7 +365,8 @@ impl Retrace for Retraced<'_> {
         let seed = self.room.arguments.seed;
         let config = RenderConfig { sample_rate_hz: RATE_HZ, seed, ..RenderConfig::default() };
         let renderer = PressureRenderer::new(config).map_err(failed)?;
-        let response = renderer.render(&paths[0], materials, &self.room.air).map_err(failed)?;
+        let response =
+            renderer.render(&paths[0], &Conditions::new(materials, &self.room.air)).map_err(failed)?;
         Ok(Some(RoomParameters::measure(&response, OCTAVES)?.t30_s))
     }
 }

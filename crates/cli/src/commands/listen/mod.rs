@@ -13,11 +13,12 @@ use crate::bar::Bar;
 use crate::demo::Demo;
 use crate::failure::Failure;
 use crate::output::OutputFolder;
-use crate::room::RoomArguments;
+use crate::room::{PlaceArguments, RoomArguments};
 use analysis::{Analysis, Unit};
 use clap::{Args, Subcommand};
 use ratings::Ratings;
-use sabine::acoustics::{Channel, MeasuredRoom, SampleFormat, encode_wav, read_audio, write_atomically};
+use sabine::acoustics::{Channel, SampleFormat, encode_wav, read_audio, write_atomically};
+use sabine::scene::MeasuredRoom;
 use sabine::{MatchConfig, MatchInput, Recording, match_room};
 use screening::Roles;
 use std::collections::BTreeSet;
@@ -50,12 +51,8 @@ struct MakeArguments {
     speech: Option<PathBuf>,
     #[command(flatten)]
     room: RoomArguments,
-    /// Source in the room file [default: that of its first response]
-    #[arg(long, value_name = "ID")]
-    source: Option<String>,
-    /// Receiver in the room file [default: that of its first response]
-    #[arg(long, value_name = "ID")]
-    receiver: Option<String>,
+    #[command(flatten)]
+    place: PlaceArguments,
     /// Dry speech, one file for each item of the test [default: two of the built-in demo]
     #[arg(long, value_name = "F.wav", num_args = 1..)]
     dry: Vec<PathBuf>,
@@ -174,16 +171,7 @@ fn make_test(arguments: &MakeArguments) -> Result<(), Failure> {
 
 /// The response that is the truth of this test.
 fn measured_response(room: &MeasuredRoom, arguments: &MakeArguments) -> Result<usize, Failure> {
-    let wanted = |wanted: &Option<String>, id: &str| wanted.as_deref().is_none_or(|wanted| wanted == id);
-    for (id, check) in [(&arguments.source, true), (&arguments.receiver, false)] {
-        if let Some(id) = id {
-            if check { room.source(id).map(|_| ())? } else { room.receiver(id).map(|_| ())? }
-        }
-    }
-    let found = room.responses().iter().position(|entry| {
-        wanted(&arguments.source, &room.sources()[entry.source].id)
-            && wanted(&arguments.receiver, &room.receivers()[entry.receiver].id)
-    });
+    let found = arguments.place.response(room)?;
     found.ok_or_else(|| {
         "room.toml: responses: none between this source and this receiver: without a measured response there is no reference"
             .into()

@@ -1,13 +1,12 @@
 //! From an estimate to a response that meets it.
 
 use crate::failure::Failure;
-use sabine::acoustics::{
-    Air, Bands, DiffuseRoom, ImpulseResponse, Material, MeasuredRoom, PathSet, PerBand, Propagator, Receiver,
-    RoomTargets, Scene, Signal, Source, equalisation,
-};
+use sabine::acoustics::{Air, Bands, ImpulseResponse, Material, PerBand, RoomTargets, Signal, equalisation};
 use sabine::eqfilter::{AboveBand, EqDesigner, EqFilterConfig};
-use sabine::optimize::{AbsorptionPrior, FitConfig, MaterialFitter};
+use sabine::optimize::{AbsorptionPrior, FitConfig, FitProblem, MaterialFitter};
+use sabine::paths::{Conditions, PathSet, Propagator};
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
+use sabine::scene::{DiffuseRoom, MeasuredRoom, Receiver, Scene, Source};
 use std::time::Instant;
 
 /// Sample rate of the responses in Hz.
@@ -78,7 +77,7 @@ impl Matcher {
             let (from, to) = (source.id.clone(), receiver.id.clone());
             return Err(sabine::Error::NoPath { source_id: from, receiver: to }.into());
         }
-        let first = renderer.render(&paths, &materials, &air)?;
+        let first = renderer.render(&paths, &Conditions::new(&materials, &air))?;
         let above = Some(AboveBand { from_band_hz: 8000.0, gain_db: -50.0 });
         let config = EqFilterConfig { above, ..EqFilterConfig::default() };
         Ok(Self {
@@ -125,9 +124,13 @@ impl Matcher {
             self.paths = (duration_s, paths);
         }
         let paths = &self.paths.1;
-        let fit =
-            self.fitter.fit_t60(&[paths], &self.materials, &self.priors, &self.air, targets.t60_s(), &())?;
-        let response = self.renderer.render(paths, &fit.materials, &self.air)?;
+        let fit = self.fitter.fit_t60(
+            &[paths],
+            &FitProblem::new(&self.materials, &self.priors, &self.air),
+            targets.t60_s(),
+            &(),
+        )?;
+        let response = self.renderer.render(paths, &Conditions::new(&fit.materials, &self.air))?;
         let simulated = equalisation(&response, Bands::EQ)?;
         let gains_db = PerBand::from_fn(Bands::EQ, |band| {
             // An octave in which the simulation cannot be read is left as it is.

@@ -8,7 +8,7 @@ mod session;
 
 use crate::demo::Demo;
 use crate::failure::Failure;
-use crate::room::RoomArguments;
+use crate::room::{PlaceArguments, RoomArguments};
 use clap::Args;
 use matcher::Matcher;
 use sabine::Recording;
@@ -27,12 +27,8 @@ pub struct Arguments {
     speech: Option<PathBuf>,
     #[command(flatten)]
     room: RoomArguments,
-    /// Source in the room file [default: its first]
-    #[arg(long, value_name = "ID")]
-    source: Option<String>,
-    /// Receiver in the room file [default: its first]
-    #[arg(long, value_name = "ID")]
-    receiver: Option<String>,
+    #[command(flatten)]
+    place: PlaceArguments,
     /// Sound that is heard in the room meanwhile, again and again (WAV) [default: the built-in demo]
     #[arg(long, value_name = "F.wav")]
     dry: Option<PathBuf>,
@@ -72,14 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let dry = read_audio(&dry_path, Channel::Mono)?;
     Recording { name: &demo.name(&dry_path), signal: &dry }.check_not_silent()?;
     let (room, _) = arguments.room.read(&mut demo)?;
-    let source = match &arguments.source {
-        Some(id) => room.source(id)?,
-        None => room.sources().first().ok_or("room.toml: sources: there is none")?,
-    };
-    let receiver = match &arguments.receiver {
-        Some(id) => room.receiver(id)?,
-        None => room.receivers().first().ok_or("room.toml: receivers: there is none")?,
-    };
+    let (source, receiver) = arguments.place.of(&room)?;
 
     let estimator = Estimator::pretrained()?;
     let live = LiveEstimator::with_windows(&estimator, arguments.windows as usize);

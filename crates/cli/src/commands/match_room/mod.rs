@@ -9,7 +9,7 @@ use crate::channel::channel;
 use crate::demo::Demo;
 use crate::failure::Failure;
 use crate::output::OutputFolder;
-use crate::room::RoomArguments;
+use crate::room::{PlaceArguments, RoomArguments};
 use clap::Args;
 use sabine::acoustics::{Channel, SampleFormat, Signal, encode_wav};
 use sabine::diagnose::ExtendedModel;
@@ -34,12 +34,8 @@ pub struct Arguments {
     /// is theirs
     #[arg(long, value_name = "F.toml")]
     model: Option<PathBuf>,
-    /// Source in the room file [default: its first]
-    #[arg(long, value_name = "ID")]
-    source: Option<String>,
-    /// Receiver in the room file [default: its first]
-    #[arg(long, value_name = "ID")]
-    receiver: Option<String>,
+    #[command(flatten)]
+    place: PlaceArguments,
     /// Sound to place in the room (WAV) [default: the built-in demo]
     #[arg(long, value_name = "F.wav")]
     dry: Option<PathBuf>,
@@ -83,21 +79,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         diffraction = extended.diffraction;
         room = extended.measured_room(&room)?;
     }
-    let first = |ids: Vec<&str>| ids.first().map(ToString::to_string).unwrap_or_default();
-    let source =
-        arguments.source.clone().unwrap_or_else(|| first(room.sources().iter().map(|s| &*s.id).collect()));
-    let receiver = arguments
-        .receiver
-        .clone()
-        .unwrap_or_else(|| first(room.receivers().iter().map(|r| &*r.id).collect()));
+    let (source, receiver) = arguments.place.of(&room)?;
     let matched = out.path_of(MATCHED);
     let files = MatchFiles {
         speech: &speech_path,
         dry: &dry_path,
         channel,
         room: &room,
-        source: &source,
-        receiver: &receiver,
+        source: &source.id,
+        receiver: &receiver.id,
         matched: &matched,
     };
     let mut config = MatchConfig { seed: arguments.seed, wave_below_hz, ..MatchConfig::default() };
@@ -113,8 +103,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         speech: Recording { name: &speech_name, signal: &found.speech.sound },
         dry: Recording { name: &dry_name, signal: &found.dry.sound },
         room: &room,
-        source: &source,
-        receiver: &receiver,
+        source: &source.id,
+        receiver: &receiver.id,
     };
     let summary = MatchSummary::new(&found.matched);
     write_results(&mut out, &input, &room_name, &found, &summary)?;

@@ -10,15 +10,16 @@ use crate::channel::channel;
 use crate::demo::Demo;
 use crate::failure::Failure;
 use crate::output::OutputFolder;
-use crate::room::RoomArguments;
+use crate::room::{PlaceArguments, RoomArguments};
 use clap::Args;
 use report::Voices;
 use sabine::acoustics::{
-    Bands, Channel, Material, PerBand, Propagator, Reading, SampleFormat, Signal, encode_wav,
-    library_material, material_library, read_audio, resample,
+    Bands, Channel, Material, PerBand, Reading, SampleFormat, Signal, encode_wav, library_material,
+    material_library, read_audio, resample,
 };
 use sabine::eqfilter::convolve;
 use sabine::optimize::{PredictedChange, RoomPrediction};
+use sabine::paths::{Conditions, Propagator};
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -45,12 +46,8 @@ pub struct Arguments {
     /// Or its absorption at 125 Hz to 8 kHz; scattering stays as it is
     #[arg(long, value_delimiter = ',', value_name = "A,...")]
     absorption: Option<Vec<f64>>,
-    /// Source in the room file [default: its first]
-    #[arg(long, value_name = "ID")]
-    source: Option<String>,
-    /// Receiver in the room file [default: its first]
-    #[arg(long, value_name = "ID")]
-    receiver: Option<String>,
+    #[command(flatten)]
+    place: PlaceArguments,
     /// Dry voice to hear in both rooms, its first 20 s (WAV) [default: the built-in demo]
     #[arg(long, value_name = "F.wav")]
     dry: Option<PathBuf>,
@@ -107,14 +104,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (room, room_name) = arguments.room.read(&mut demo)?;
     let dry_path = demo.or(arguments.dry.as_deref(), "speech/dry_guest.wav")?;
     let dry = excerpt(&read_audio(&dry_path, arguments.channel.unwrap_or_default())?)?;
-    let source = match &arguments.source {
-        Some(id) => room.source(id)?,
-        None => room.sources().first().ok_or("room.toml: sources: there is none")?,
-    };
-    let receiver = match &arguments.receiver {
-        Some(id) => room.receiver(id)?,
-        None => room.receivers().first().ok_or("room.toml: receivers: there is none")?,
-    };
+    let (source, receiver) = arguments.place.of(&room)?;
     let named = room.scene().materials();
     let Some(replaced) = named.iter().position(|m| m.name == arguments.material) else {
         let names: Vec<&str> = named.iter().map(|m| m.name.as_str()).collect();
@@ -151,7 +141,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let renderer = PressureRenderer::new(render)?;
     let mut voices = Vec::new();
     for (file, materials) in [("before.wav", &before), ("after.wav", &after)] {
-        let response = Signal::from(renderer.render(&paths, materials, &air)?);
+        let response = Signal::from(renderer.render(&paths, &Conditions::new(materials, &air))?);
         out.write(file, &encode_wav(&response, SampleFormat::Float32)?)?;
         voices.push(convolve(resample(&dry, response.sample_rate_hz())?.samples(), response.samples()));
     }

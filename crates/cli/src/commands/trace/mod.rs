@@ -10,17 +10,17 @@ use crate::bar::Bar;
 use crate::demo::Demo;
 use crate::failure::Failure;
 use crate::output::OutputFolder;
-use crate::room::RoomArguments;
+use crate::room::{PlaceArguments, RoomArguments};
 use clap::{Args, ValueEnum};
 use sabine::acoustics::{
-    Conditions, DiffuseRoom, Directivity, MeasuredRoom, NoReading, Orientation, PathParameters, PathSet,
-    PerBand, Propagator, Reading, Receiver, RoomNote, SampleFormat, Signal, Source, encode_wav,
-    write_atomically,
+    Directivity, NoReading, Orientation, PerBand, Reading, SampleFormat, Signal, encode_wav, write_atomically,
 };
 use sabine::diagnose::ExtendedModel;
+use sabine::paths::{Conditions, PathParameters, PathSet, Propagator};
 use sabine::propagate::{
     AmbisonicRenderer, MeshReport, PathTracer, PressureRenderer, RenderConfig, TracerConfig,
 };
+use sabine::scene::{DiffuseRoom, MeasuredRoom, Receiver, RoomNote, Source};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -42,12 +42,8 @@ pub struct Arguments {
     /// plan and parameters are those of the room, without loudspeaker response, noise and recorder
     #[arg(long, value_name = "F.toml")]
     model: Option<PathBuf>,
-    /// Source in the room file [default: its first]
-    #[arg(long, value_name = "ID")]
-    source: Option<String>,
-    /// Receiver in the room file [default: its first]
-    #[arg(long, value_name = "ID")]
-    receiver: Option<String>,
+    #[command(flatten)]
+    place: PlaceArguments,
     /// Number of rays
     #[arg(long, default_value_t = 40_000)]
     rays: usize,
@@ -139,9 +135,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let model = arguments.model.as_ref();
     let extended = model.map(|path| ExtendedModel::read(path)?.room(&stated)).transpose()?;
     let room = extended.as_ref().map_or_else(|| Ok(stated.clone()), |model| model.measured_room(&stated))?;
-    let source = chosen(arguments.source.as_deref(), room.sources(), |id| room.source(id), "source")?;
-    let receiver =
-        chosen(arguments.receiver.as_deref(), room.receivers(), |id| room.receiver(id), "receiver")?;
+    let (source, receiver) = arguments.place.of(&room)?;
     let renderer =
         RenderConfig { sample_rate_hz: arguments.rate, seed: arguments.seed, ..Default::default() };
     let (mono, ambisonic) =
@@ -150,8 +144,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let materials: Vec<_> = room.scene().materials().iter().map(|named| named.material.clone()).collect();
     let air = room.air();
     let pattern = pattern(arguments.pattern)?;
-    let mut conditions = match (&extended, room.sources().iter().position(|s| s.id == source.id)) {
-        (Some(model), Some(index)) => model.conditions(&materials, index),
+    let from = room.sources().iter().position(|s| s.id == source.id);
+    let to = room.receivers().iter().position(|r| r.id == receiver.id);
+    let mut conditions = match (&extended, from, to) {
+        (Some(model), Some(from), Some(to)) => model.conditions(&materials, from, to),
         _ => Conditions::new(&materials, &air),
     };
     let towards = |from: [f64; 3], to: [f64; 3]| Orientation::towards([0, 1, 2].map(|i| to[i] - from[i]));
@@ -171,7 +167,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let trace_s = start.elapsed().as_secs_f64();
     bar.finish();
     let start = Instant::now();
-    let mut response = mono.render_under(&paths, &conditions)?;
+    let mut response = mono.render(&paths, &conditions)?;
     let render_s = start.elapsed().as_secs_f64();
     let joined = |below: WaveRoomBelow| below.join(source, receiver, &conditions, &response, &bar);
     let waves = below.map(joined).transpose()?;
@@ -229,19 +225,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         write_atomically(path, |file| writeln!(file, "{text}"))?;
     }
     Ok(())
-}
-
-/// What the arguments name, or the first of the room file.
-fn chosen<'r, T>(
-    id: Option<&str>,
-    all: &'r [T],
-    find: impl FnOnce(&str) -> Result<&'r T, sabine::acoustics::Error>,
-    what: &str,
-) -> Result<&'r T, Failure> {
-    match id {
-        Some(id) => Ok(find(id)?),
-        None => all.first().ok_or_else(|| format!("the room file names no {what}").into()),
-    }
 }
 
 fn pattern(pattern: Pattern) -> Result<Option<Directivity>, sabine::acoustics::Error> {

@@ -1,7 +1,8 @@
 //! The room from above, with the direct sound and the first reflections.
 
 use crate::page::escape;
-use sabine::acoustics::{Conditions, MeasuredRoom, PathSet, Receiver, Reflection, Source};
+use sabine::paths::{Conditions, PathSet, Reflection};
+use sabine::scene::{MeasuredRoom, Receiver, Source};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -150,7 +151,7 @@ fn first_reflections(
     paths: &PathSet,
     conditions: &Conditions,
 ) -> Result<(bool, Vec<FirstReflection>), sabine::acoustics::Error> {
-    let energies = paths.energies_under(conditions)?;
+    let energies = paths.energies(conditions)?;
     let energies = &energies[reference_band(room)];
     let speed_m_s = conditions.air.speed_of_sound_m_s();
     let first_m = paths.lengths_m().iter().copied().fold(f32::INFINITY, f32::min);

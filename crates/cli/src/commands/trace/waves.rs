@@ -1,8 +1,10 @@
 //! `--wave-below`: the low end of the response from the wave equation.
 
 use crate::failure::Failure;
-use sabine::acoustics::{Conditions, ImpulseResponse, MeasuredRoom, Observer, Receiver, Source};
+use sabine::acoustics::{ImpulseResponse, Observer};
+use sabine::paths::Conditions;
 use sabine::propagate::wave::{Crossover, JoinedResponse, WaveConfig, WaveRoom, WaveSolver};
+use sabine::scene::{MeasuredRoom, Receiver, Source};
 use serde_json::{Value, json};
 use std::time::Instant;
 

@@ -9,14 +9,16 @@ use crate::room::read_room;
 use clap::{Args, ValueEnum};
 use route::{Walk, read_corners};
 use sabine::acoustics::{
-    Air, Bands, Channel, Conditions, Material, NamedMaterial, Orientation, PerBand, Receiver, SampleFormat,
-    Scene, Source, Triangle, read_audio, resample, write_wav_channels,
+    Air, Bands, Channel, Material, Orientation, PerBand, SampleFormat, read_audio, resample,
+    write_wav_channels,
 };
 use sabine::eqfilter::{PartitionedConfig, PartitionedConvolver, ResponsePreparer};
+use sabine::paths::Conditions;
 use sabine::propagate::{
     AmbisonicRenderer, HeadResponses, MovingConfig, MovingTracer, PressureRenderer, RenderConfig,
     TracerConfig,
 };
+use sabine::scene::{NamedMaterial, Receiver, Scene, Source, Triangle};
 use std::collections::BTreeMap;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -286,12 +288,12 @@ impl Renderer {
 
     fn response(
         &self,
-        paths: &sabine::acoustics::PathSet,
+        paths: &sabine::paths::PathSet,
         conditions: &Conditions,
         facing: Orientation,
     ) -> Result<Vec<Vec<f32>>, Failure> {
         Ok(match self {
-            Self::Mono(renderer) => vec![renderer.render_under(paths, conditions)?.into_samples()],
+            Self::Mono(renderer) => vec![renderer.render(paths, conditions)?.into_samples()],
             Self::Ambisonic(renderer) => renderer.render(paths, conditions, facing)?.channels().to_vec(),
             Self::Binaural(renderer, head) => {
                 let heard = head.binaural(&renderer.render(paths, conditions, facing)?)?;

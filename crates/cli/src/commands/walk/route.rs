@@ -1,8 +1,10 @@
 //! The way of the walk: its corners, its speed, and what is in the way.
 
 use crate::failure::Failure;
-use sabine::acoustics::{Orientation, RayScene, Scene};
+use sabine::acoustics::Orientation;
+use sabine::paths::RayScene;
 use sabine::propagate::MeshScene;
+use sabine::scene::Scene;
 use std::fmt;
 use std::path::Path;
 

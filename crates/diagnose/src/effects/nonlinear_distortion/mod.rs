@@ -4,7 +4,7 @@ mod harmonics;
 
 use crate::effect::EffectInfo;
 use crate::effect::next_measurement::NextMeasurement;
-use crate::effect::{AuxiliaryEvidence, Case, Effect, Observable, Parameter};
+use crate::effect::{AuxiliaryEvidence, Case, Effect, PreArrivalTerm};
 use crate::observe::pre_arrival::PreArrival;
 use crate::survey::Survey;
 use std::collections::BTreeMap;
@@ -35,27 +35,22 @@ impl Effect for NonlinearDistortion {
         .decided_by(9, NextMeasurement::Quieter)
     }
 
-    fn cases(&self, survey: &Survey) -> Vec<Box<dyn Case>> {
-        if PreArrival::any(survey) { vec![Box::<Harmonics>::default()] } else { Vec::new() }
+    fn cases(&self, survey: &Survey) -> Vec<Case> {
+        if !PreArrival::any(survey) {
+            return Vec::new();
+        }
+        vec![Case::pre_arrival(harmonics::parameters(), Harmonics::default())]
     }
 }
 
-/// The case, with what was found so far by the responses that count: fits ask for the same ones again and again.
+/// The harmonics, with what was found so far by the responses that count: fits ask for the same ones again and again.
 #[derive(Default)]
 struct Harmonics {
     found: Mutex<BTreeMap<Vec<bool>, Option<AuxiliaryEvidence>>>,
 }
 
-impl Case for Harmonics {
-    fn observable(&self) -> Observable {
-        Observable::PreArrival
-    }
-
-    fn parameters(&self, _: &Survey) -> Vec<Parameter> {
-        harmonics::parameters()
-    }
-
-    fn pre_arrival(&self, responses: &PreArrival, used: &[bool]) -> Option<AuxiliaryEvidence> {
+impl PreArrivalTerm for Harmonics {
+    fn weigh(&self, responses: &PreArrival, used: &[bool]) -> Option<AuxiliaryEvidence> {
         let known = self.found.lock().unwrap_or_else(PoisonError::into_inner).get(used).cloned();
         known.unwrap_or_else(|| {
             // A fit that does not converge says nothing.

@@ -30,9 +30,9 @@ impl<'a> ArrivalModel<'a> {
     /// Reflections that effects add to a pair.
     pub(super) fn added(&self, values: &[f64], pair: usize) -> Vec<AddedArrival> {
         let one = |placed: &ModelTerm<'_>| {
-            let survey = self.data.survey;
+            let (term, survey) = (placed.case.reflection_term()?, self.data.survey);
             let range = placed.range();
-            let added = placed.case.added_reflection(&values[range.clone()], survey, pair)?;
+            let added = term.reflection(&values[range.clone()], survey, pair)?;
             // What comes from where a predicted reflection comes from is that one: a wall must not be found a second time.
             let image = |direction: [f64; 3], length_m: f64| direction.map(|d| d * length_m);
             let own = image(added.arrival, added.length_m);
@@ -52,7 +52,7 @@ impl<'a> ArrivalModel<'a> {
                 let at = |offset: f64| {
                     let mut moved = values[range.clone()].to_vec();
                     moved[index - range.start] += offset;
-                    placed.case.added_reflection(&moved, survey, pair)
+                    term.reflection(&moved, survey, pair)
                 };
                 if let (Some(up), Some(down)) = (at(step), at(-step)) {
                     slopes.push((
@@ -116,12 +116,14 @@ impl<'a> ArrivalModel<'a> {
             arrival: single.arrival,
         };
         let moved: Vec<Nuisance> =
-            self.terms.iter().flat_map(|p| p.case.relaxes()).map(|(nuisance, _)| nuisance).collect();
+            self.terms.iter().flat_map(|p| &p.case.relaxes).map(|(nuisance, _)| *nuisance).collect();
         let mut later_s = 0.0;
         for placed in &self.terms {
             let own = placed.own(values);
-            if !is_warmer(placed.case, own, self.data.survey) {
-                later_s += placed.case.delay_s(own, &view);
+            if let Some(term) =
+                placed.case.arrival_term().filter(|_| !is_warmer(placed.case, own, self.data.survey))
+            {
+                later_s += term.delay_s(own, &view);
             }
         }
         for (place, first, direction) in [
@@ -145,7 +147,7 @@ impl<'a> ArrivalModel<'a> {
 }
 
 /// Whether a case changes the temperature, which is in the times of paths once they are traced again.
-fn is_warmer(case: &dyn Case, own: &[f64], survey: &Survey) -> bool {
+fn is_warmer(case: &Case, own: &[f64], survey: &Survey) -> bool {
     let stated = survey.air.temperature_c();
     let changes = case.model_changes(&FittedCase::of_values(survey, own));
     changes.iter().any(|change| matches!(change, ModelChange::Temperature(celsius) if *celsius != stated))
@@ -154,21 +156,23 @@ fn is_warmer(case: &dyn Case, own: &[f64], survey: &Survey) -> bool {
 /// Fits without the case at `place`, then with it from wherever the peaks that are left point; the best end counts.
 pub(super) fn fit(
     data: &ArrivalData<'_>,
-    cases: &[&dyn Case],
+    cases: &[&Case],
     used: &[bool],
     place: usize,
 ) -> Result<(LaplaceFit, Vec<usize>), Error> {
     let mut others = cases.to_vec();
     let sought = others.remove(place);
     let (known, known_firsts) = super::fit(data, &others, used)?;
-    let starts = sought.starts_among(&at_fit(data, &others, used).strays(&known.values));
+    let starts = sought
+        .reflection_term()
+        .map_or_else(Vec::new, |term| term.starts(&at_fit(data, &others, used).strays(&known.values)));
     let mut model = ArrivalModel::new(data, cases, used);
     let mut origin: Vec<f64> = model.priors.iter().map(|p| p.mean).collect();
     let nuisances = known_firsts.first().copied().unwrap_or(known.values.len());
     origin[..nuisances].copy_from_slice(&known.values[..nuisances]);
     for (i, placed) in model.terms.iter().enumerate().filter(|(i, _)| *i != place) {
         let first = known_firsts[if i < place { i } else { i - 1 }];
-        let count = placed.parameters.len();
+        let count = placed.case.parameters.len();
         origin[placed.range()].copy_from_slice(&known.values[first..first + count]);
     }
     let own = model.terms[place].first;

@@ -20,7 +20,7 @@ pub(crate) struct WarmStart<'a> {
 /// The best of the fits from all starts, and where the parameters of each case stand, in the order of `cases`.
 pub(crate) fn fit(
     data: &EnergyData<'_>,
-    cases: &[&dyn Case],
+    cases: &[&Case],
     used: &[bool],
     before: Option<WarmStart<'_>>,
 ) -> Result<(LaplaceFit, Vec<usize>), Error> {
@@ -35,9 +35,9 @@ pub(crate) fn fit(
     let mut more: Vec<Vec<f64>> = Vec::new();
     for (order, case) in cases.iter().enumerate() {
         let first = model.first_of(order);
-        let count = case.parameters(data.survey).len();
+        let count = case.parameters.len();
         let known = before.and_then(|b| b.values.get(*b.firsts.get(order)?..)?.get(..count));
-        let options = known.map_or_else(|| case.starts(data.survey), |known| vec![known.to_vec()]);
+        let options = known.map_or_else(|| case.starts.clone(), |known| vec![known.to_vec()]);
         starts = options
             .iter()
             .flat_map(|option| {
@@ -49,7 +49,7 @@ pub(crate) fn fit(
             })
             .collect();
         if known.is_none() {
-            for (nuisance, _) in case.relaxes() {
+            for &(nuisance, _) in &case.relaxes {
                 let Nuisance::Absorption(material) = nuisance else { continue };
                 let plain = unstrained.get_or_insert_with(|| {
                     let mut plain = model.start(None);

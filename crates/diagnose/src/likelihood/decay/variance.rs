@@ -32,7 +32,9 @@ impl EnergyModel<'_> {
         let changes = HitChanges::default();
         let view = self.view((pair, band), self.gain_db(values, pair), &changes);
         for placed in &self.terms {
-            placed.case.variance(placed.own(values), &view, &mut variances);
+            if let Some(term) = placed.case.decay_term() {
+                term.variance(placed.own(values), &view.with_table(placed.case.slot), &mut variances);
+            }
         }
         variances
     }
@@ -57,8 +59,8 @@ impl EnergyModel<'_> {
     ) {
         let mut rows: Vec<(usize, Vec<f64>)> = Vec::new();
         for placed in &self.terms {
-            for (i, p) in placed.parameters.iter().enumerate() {
-                if p.band.is_some_and(|own| own != band) {
+            for (i, p) in placed.case.parameters.iter().enumerate() {
+                if !self.bears_on(p, pair, band) {
                     continue;
                 }
                 let index = placed.first + i;

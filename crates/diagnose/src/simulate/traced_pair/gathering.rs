@@ -1,16 +1,17 @@
 //! Energy, time, direction and hits of each bin, gathered from the paths.
 
 use super::{
-    BandState, CELL_S, COHERENT_BANDWIDTH_TIMES, COHERENT_SD, DiffractedEnergy, ISOLATED_S, MODEL_SD,
-    NOTHING, TIME_SD_S, TracedPair,
+    BandState, CELL_S, COHERENT_BANDWIDTH_TIMES, COHERENT_SD, ISOLATED_S, MODEL_SD, NOTHING, TIME_SD_S,
+    TracedPair,
 };
 use crate::observe::band_pulse::BandPulse;
 use crate::observe::time_bins::Bins;
 use crate::simulate::hit_groups;
+use sabine_paths::PathSet;
 use std::collections::BTreeMap;
 
-/// Of a bin: energy, time, departure, its products.
-const COLUMNS: usize = 11;
+/// Of a bin: energy, time, departure, its products, arrival, its products.
+const COLUMNS: usize = 20;
 
 /// Sums over the paths of one band, by bin.
 struct Gathered {
@@ -49,6 +50,51 @@ impl TracedPair {
         let gathered = self.gather(energies, bins, pulse, duration_s);
         let (_, monte_carlo) = self.sums_and_variance(energies, bins, pulse, duration_s);
         gathered.finish(bins, pulse, pulse.shares[band], self.paths.materials(), &monte_carlo)
+    }
+
+    /// Energy of each bin, and its variance by chance, from the scatter between batches of rays.
+    pub fn sums_and_variance(
+        &self,
+        energies: &[f32],
+        bins: Bins,
+        kernel: &BandPulse,
+        duration_s: f64,
+    ) -> (Vec<f64>, Vec<f64>) {
+        let count = bins.count(duration_s);
+        let cells = (duration_s / CELL_S).ceil() as usize + 1;
+        let batches = usize::from(PathSet::BATCHES);
+        let mut exact = vec![0.0f64; cells];
+        let mut by_batch = vec![0.0f32; cells * batches];
+        for (i, (&cell, &e)) in self.cells.iter().zip(energies).enumerate() {
+            let cell = usize::from(cell);
+            if cell >= cells {
+                continue;
+            }
+            match self.paths.batch(i) {
+                Some(batch) => by_batch[cell * batches + usize::from(batch)] += e,
+                None => exact[cell] += f64::from(e),
+            }
+        }
+        let mut sums = vec![0.0f64; count];
+        for &i in &self.isolated {
+            let (time_s, e) = (f64::from(self.times_s[i as usize]), f64::from(energies[i as usize]));
+            Self::shares(time_s, bins, kernel, count, |bin, share| sums[bin] += share * e);
+        }
+        let mut sampled = vec![0.0f64; count * batches];
+        for (cell, parts) in by_batch.chunks(batches).enumerate() {
+            let time_s = (cell as f64 + 0.5) * CELL_S;
+            let own = exact[cell];
+            if own > 0.0 || parts.iter().any(|e| *e > 0.0) {
+                Self::shares(time_s, bins, kernel, count, |bin, share| {
+                    sums[bin] += share * own;
+                    let target = &mut sampled[bin * batches..(bin + 1) * batches];
+                    target.iter_mut().zip(parts).for_each(|(s, r)| *s += share * f64::from(*r));
+                });
+            }
+        }
+        let monte_carlo_variance = sampled.chunks(batches).map(variance_of_sum).collect();
+        sums.iter_mut().zip(sampled.chunks(batches)).for_each(|(s, parts)| *s += parts.iter().sum::<f64>());
+        (sums, monte_carlo_variance)
     }
 
     fn gather(&self, energies: &[f32], bins: Bins, pulse: &BandPulse, duration_s: f64) -> Gathered {
@@ -90,7 +136,13 @@ impl TracedPair {
     fn row(&self, path: usize, energy: f64) -> [f64; COLUMNS] {
         let time_s = f64::from(self.times_s[path]);
         let [x, y, z] = self.departures[path].map(f64::from);
-        [1.0, time_s, x, y, z, x * x, y * y, z * z, x * y, x * z, y * z].map(|v| v * energy)
+        let [u, v, w] = self.arrivals[path].map(f64::from);
+        let departure = [x, y, z, x * x, y * y, z * z, x * y, x * z, y * z];
+        let arrival = [u, v, w, u * u, v * v, w * w, u * v, u * w, v * w];
+        let mut row = [energy; COLUMNS];
+        row[1] *= time_s;
+        row[2..].iter_mut().zip(departure.into_iter().chain(arrival)).for_each(|(r, factor)| *r *= factor);
+        row
     }
 
     /// An early exact path, which keeps its very time.
@@ -180,6 +232,8 @@ impl Gathered {
             state.time_s.push(if s[0] > floor { s[1] / e } else { bins.centre_s(bin) });
             state.departure.push(std::array::from_fn(|k| s[2 + k] / e));
             state.departure_products.push(std::array::from_fn(|k| s[5 + k] / e));
+            state.arrival.push(std::array::from_fn(|k| s[11 + k] / e));
+            state.arrival_products.push(std::array::from_fn(|k| s[14 + k] / e));
             for row in self.rows[bin].values().filter(|r| r[0] > 0.0) {
                 state.group_energy.push(row[0]);
                 state.group_hits.extend(row[1..].iter().map(|h| h / row[0]));
@@ -219,15 +273,19 @@ impl BandState {
             time_s: Vec::with_capacity(count),
             departure: Vec::with_capacity(count),
             departure_products: Vec::with_capacity(count),
+            arrival: Vec::with_capacity(count),
+            arrival_products: Vec::with_capacity(count),
             variance: Vec::with_capacity(count),
             monte_carlo: Vec::with_capacity(count),
-            diffracted: DiffractedEnergy::default(),
-            scattering: Vec::new(),
-            scattering_variance: Vec::new(),
-            local_reaction: Vec::new(),
-            waves: Vec::new(),
         }
     }
+}
+
+/// Variance of the sum of independent batches, from their scatter.
+fn variance_of_sum(batches: &[f64]) -> f64 {
+    let count = batches.len() as f64;
+    let mean = batches.iter().sum::<f64>() / count;
+    batches.iter().map(|b| (b - mean).powi(2)).sum::<f64>() * count / (count - 1.0)
 }
 
 /// Variance of the energy of single pulses of random sign: four times the sum over pairs of w_i w_j r_ij^2.

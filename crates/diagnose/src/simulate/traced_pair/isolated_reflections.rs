@@ -1,8 +1,9 @@
 //! Early paths one by one.
 
-use super::{BandState, DiffractedEnergy, SCATTERING_GRID, TracedPair};
+use super::{BandState, TracedPair};
 use crate::observe::time_bins::Bins;
-use sabine_acoustics::{Conditions, Error, Material};
+use sabine_acoustics::{Error, Material};
+use sabine_paths::Conditions;
 
 /// An early path that was found exactly.
 #[derive(Clone, Copy, Debug)]
@@ -13,6 +14,10 @@ pub(crate) struct IsolatedReflection {
     pub arrival: [f64; 3],
     /// Reflections.
     pub order: usize,
+}
+
+fn products([x, y, z]: [f64; 3]) -> [f64; 6] {
+    [x * x, y * y, z * z, x * y, x * z, y * z]
 }
 
 impl TracedPair {
@@ -38,7 +43,7 @@ impl TracedPair {
                 order: order(i),
             })
             .collect();
-        let energies = self.paths.energies_under(&Conditions::new(materials, &self.air))?;
+        let energies = self.paths.energies(&Conditions::new(materials, &self.air))?;
         let bands = materials[0].bands();
         let states = energies
             .iter()
@@ -48,7 +53,6 @@ impl TracedPair {
                 ln_energy: chosen.iter().map(|&i| f64::from(energies[i]).max(1e-30).ln()).collect(),
                 own_share: 1.0,
                 leaks: Vec::new(),
-                waves: Vec::new(),
                 groups: (0..=chosen.len()).collect(),
                 group_energy: chosen.iter().map(|&i| f64::from(energies[i]).max(1e-30)).collect(),
                 group_hits: chosen
@@ -57,28 +61,11 @@ impl TracedPair {
                     .collect(),
                 time_s: isolated_reflections.iter().map(|s| s.after_direct_s).collect(),
                 departure: isolated_reflections.iter().map(|s| s.departure).collect(),
-                departure_products: isolated_reflections
-                    .iter()
-                    .map(|s| {
-                        let [x, y, z] = s.departure;
-                        [x * x, y * y, z * z, x * y, x * z, y * z]
-                    })
-                    .collect(),
+                departure_products: isolated_reflections.iter().map(|s| products(s.departure)).collect(),
+                arrival: isolated_reflections.iter().map(|s| s.arrival).collect(),
+                arrival_products: isolated_reflections.iter().map(|s| products(s.arrival)).collect(),
                 variance: vec![0.0; isolated_reflections.len()],
                 monte_carlo: Vec::new(),
-                scattering_variance: Vec::new(),
-                diffracted: DiffractedEnergy::default(),
-                // A share more of each reflection is scattered, and lost to the mirror; what was scattered never comes back as one.
-                local_reaction: Vec::new(),
-                scattering: SCATTERING_GRID
-                    .iter()
-                    .map(|extra| {
-                        isolated_reflections
-                            .iter()
-                            .map(|s| s.order as f64 * (1.0 - extra.max(0.0)).ln())
-                            .collect()
-                    })
-                    .collect(),
             })
             .collect();
         Ok((isolated_reflections, states))

@@ -1,6 +1,6 @@
 //! Effects that mean nothing: a control. Whatever names one of them names by chance.
 
-use sabine::diagnose::{BandView, Case, Effect, EffectInfo, Parameter, Survey};
+use sabine::diagnose::{BandView, Case, DecayTerm, Effect, EffectInfo, Parameter, Survey};
 
 /// Identifiers of the shams.
 pub const IDS: [&str; 14] = [
@@ -41,17 +41,14 @@ impl Effect for Sham {
         EffectInfo::new(IDS[self.number], "Control", "Nothing: this is a control.")
     }
 
-    fn cases(&self, _: &Survey) -> Vec<Box<dyn Case>> {
-        vec![Box::new(*self)]
+    fn cases(&self, _: &Survey) -> Vec<Case> {
+        let size = Parameter::new("size", "dB", 0.0, SIZE_DB, (-20.0, 20.0)).typically(SIZE_DB);
+        vec![Case::decay(vec![size], *self)]
     }
 }
 
-impl Case for Sham {
-    fn parameters(&self, _: &Survey) -> Vec<Parameter> {
-        vec![Parameter::new("size", "dB", 0.0, SIZE_DB, (-20.0, 20.0)).typically(SIZE_DB)]
-    }
-
-    fn energy(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+impl DecayTerm for Sham {
+    fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
         let octave = view.survey().octaves_from_1khz(view.band());
         let receiver = view.pair().receiver;
         for (bin, l) in ln_energy.iter_mut().enumerate() {

@@ -4,7 +4,7 @@ use crate::trial::{Outcome, Trial};
 use std::collections::BTreeMap;
 
 /// Edges of the classes of d'.
-const CLASSES: [f64; 6] = [0.0, 3.0, 5.0, 7.0, 10.0, f64::INFINITY];
+const CLASSES: [f64; 5] = [0.0, 3.0, 5.0, PLAIN, f64::INFINITY];
 /// From here on a single name is due.
 const PLAIN: f64 = 7.0;
 
@@ -116,7 +116,11 @@ fn figures(trials: &[Trial]) {
             .flatten()
             .copied()
             .collect();
-        let what = format!("detected, mean d' of the case {} to {}", class[0], class[1]);
+        let what = if class[1].is_finite() {
+            format!("detected, d' {} to {}", class[0], class[1])
+        } else {
+            format!("detected, d' from {} on", class[0])
+        };
         share(&what, own.iter().map(|t| t.outcome != Outcome::Missed));
     }
     let due: Vec<&Trial> = cases
@@ -126,7 +130,7 @@ fn figures(trials: &[Trial]) {
         .copied()
         .filter(|t| t.outcome != Outcome::Missed)
         .collect();
-    share("right single name, detected, mean d' from 7 on", due.iter().map(|t| t.outcome == Outcome::Right));
+    share("right single name, detected, d' from 7 on", due.iter().map(|t| t.outcome == Outcome::Right));
     println!("| the same with names permuted among the rooms | {:.0} % | |", 100.0 * by_permuted_names(&due));
     let right_or_set = |t: &&Trial| matches!(t.outcome, Outcome::Right | Outcome::Set);
     share("right name or a set that holds it, likewise", due.iter().map(right_or_set));

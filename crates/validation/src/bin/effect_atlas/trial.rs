@@ -3,8 +3,9 @@
 use crate::AnyError;
 use crate::decide;
 use crate::sham::{IDS, Sham};
-use sabine::acoustics::{Bands, TimeZero};
+use sabine::acoustics::Bands;
 use sabine::diagnose::{Cause, DiagnoseConfig, Diagnoser, Diagnosis, Verdict, catalogue};
+use sabine::scene::TimeZero;
 use sabine_testkit::{Fault, Hidden, LabConfig, Laboratory};
 use serde::{Deserialize, Serialize};
 use std::path::Path;

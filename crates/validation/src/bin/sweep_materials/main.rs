@@ -9,13 +9,15 @@ mod rooms;
 use clap::Parser;
 use rooms::{Room, rooms};
 use sabine::acoustics::{
-    Air, Bands, Error as AcousticsError, Estimate, Material, MaterialPrior, PathSet, PerBand, Propagator,
-    Reading, RoomParameters,
+    Air, Bands, Error as AcousticsError, Estimate, Material, PerBand, Reading, RoomParameters,
 };
 use sabine::optimize::{
-    AbsorptionPrior, FitConfig, MaterialFit, MaterialFitter, Retrace, RetraceConfig, SlopeObjective,
+    AbsorptionPrior, FitConfig, FitProblem, MaterialFit, MaterialFitter, Retrace, RetraceConfig,
+    SlopeObjective,
 };
+use sabine::paths::{Conditions, PathSet, Propagator};
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
+use sabine::scene::MaterialPrior;
 use sabine_cli::output::OutputFolder;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -189,7 +191,7 @@ impl Traced<'_> {
         let of = |seed: u64| {
             let config = RenderConfig { sample_rate_hz: 32_000, seed, ..RenderConfig::default() };
             let renderer = PressureRenderer::new(config).map_err(failed)?;
-            let response = renderer.render(paths, materials, &self.air).map_err(failed)?;
+            let response = renderer.render(paths, &Conditions::new(materials, &self.air)).map_err(failed)?;
             Ok(RoomParameters::measure(&response, Bands::T60)?.t30_s)
         };
         (0..self.responses).map(|i| of(self.noise_seed + i)).collect()
@@ -265,9 +267,7 @@ fn fit_room(
     };
     let edc = fitter(SlopeObjective::DecayCurve)?.fit_t60_retracing(
         &traced,
-        &materials,
-        &priors,
-        &air,
+        &FitProblem::new(&materials, &priors, &air),
         &targets,
         &config,
         &(),
@@ -281,7 +281,8 @@ fn fit_room(
     let mut single_fit_s = 0.0;
     let mut single = |objective, paths: &[&PathSet]| -> Result<MaterialFit, AnyError> {
         let start = Instant::now();
-        let fit = fitter(objective)?.fit_t60(paths, &materials, &priors, &air, &targets, &())?;
+        let fit =
+            fitter(objective)?.fit_t60(paths, &FitProblem::new(&materials, &priors, &air), &targets, &())?;
         single_fit_s = start.elapsed().as_secs_f64();
         Ok(fit)
     };
@@ -292,7 +293,7 @@ fn fit_room(
         (Method::Edc, edc.fit),
     ];
     for (method, fit) in fits {
-        let energy = other.energy_response(&fit.materials, &air, 1e-3)?;
+        let energy = other.energy_response(&Conditions::new(&fit.materials, &air), 1e-3)?;
         let rendered = listener.read(other, &fit.materials)?;
         let averaged = mean(&rendered);
         for b in 0..octaves.len() {

@@ -7,7 +7,7 @@ use std::fmt::Write;
 const METHODS: [(Method, &str); 4] = [
     (Method::Edc, "decay curve, verified"),
     (Method::EdcOnce, "decay curve, first rays"),
-    (Method::Paper, "paper"),
+    (Method::Paper, "the paper's"),
     (Method::Li2018, "Li 2018"),
 ];
 
@@ -36,13 +36,13 @@ fn quantile(sorted: &[f64], share: f64) -> f64 {
 /// Median, 95th percentile and maximum of the error of each method.
 pub fn tables(points: &[Point]) -> String {
     let mut text = String::from(
-        "| objective | read from | targets | reachable | not read | median % | 95th percentile % | largest % |\n|---|---|---|---|---|---|---|---|\n",
+        "| objective | read from | reachable | not read | median % | 95th percentile % | largest % |\n|---|---|---|---|---|---|---|\n",
     );
     type Reading = fn(&Point) -> Option<f64>;
     let readings: [(&str, Reading); 3] = [
         ("mean of responses", |p| p.mean_rendered_s),
         ("one response", |p| p.rendered_s),
-        ("energy", |p| p.energy_s),
+        ("energy of other rays", |p| p.energy_s),
     ];
     let sure = (Method::Edc, "decay curve, where the fit has no doubt", true);
     for (method, name, sure) in METHODS.map(|(m, name)| (m, name, false)).into_iter().chain([sure]) {
@@ -52,9 +52,9 @@ pub fn tables(points: &[Point]) -> String {
             let percent = |value: f64| if value.is_nan() { "-".to_owned() } else { format!("{value:.2}") };
             let _ = writeln!(
                 text,
-                "| {name} | {what} | {} | {} | {unread} | {} | {} | {} |",
-                mine().count(),
+                "| {name} | {what} | {} of {} | {unread} | {} | {} | {} |",
                 mine().filter(|p| p.reachable).count(),
+                mine().count(),
                 percent(quantile(&errors, 0.5)),
                 percent(quantile(&errors, 0.95)),
                 percent(quantile(&errors, 1.0)),

@@ -1,6 +1,7 @@
 //! Five rooms of the sizes that Tang et al. 2020 fitted materials in, built from their plans.
 
-use sabine::acoustics::{Bands, Error, NamedMaterial, Receiver, Scene, Source, Triangle, library_material};
+use sabine::acoustics::{Bands, Error, library_material};
+use sabine::scene::{NamedMaterial, Receiver, Scene, Source, Triangle};
 
 /// A room with a source and a receiver in it.
 pub struct Room {

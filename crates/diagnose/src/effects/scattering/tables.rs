@@ -1,0 +1,94 @@
+//! Energies and the tracer's own variance at other scattering.
+
+use crate::error::Error;
+use crate::simulate::scattering_share::scattering_more;
+use crate::simulate::tables::{Tables, between};
+use crate::simulate::traced_views::{TracedPairView, TracedRoomView};
+use sabine_acoustics::Material;
+
+/// Extra scattering at which energies are tabulated.
+const GRID: [f64; 8] = [-1.0, -0.5, 0.0, 0.1, 0.25, 0.45, 0.7, 0.95];
+/// Place of none in the grid.
+const NO_EXTRA: usize = 2;
+/// Energy of a bin without paths, as a share of the strongest: it counts as nothing.
+const NOTHING: f64 = 1e-12;
+
+/// What other scattering does to the bins of one band and pair, `[grid][bin]`.
+#[derive(Clone, Debug)]
+pub(super) struct ScatteringTable {
+    /// Logarithm of the change of energy.
+    change: Vec<Vec<f64>>,
+    /// By how much the tracer's own relative variance is more: what scatters is found by chance. None for single reflections.
+    variance: Option<Vec<Vec<f64>>>,
+}
+
+impl ScatteringTable {
+    /// Natural logarithm of the change of a bin's energy if the surfaces scattered more by `extra` (0 to 0.95, share of what they now
+    /// reflect specularly) or less (-1 to 0, share of what they now scatter).
+    pub fn change(&self, bin: usize, extra: f64) -> f64 {
+        between(&GRID, &self.change, bin, extra)
+    }
+
+    pub fn variance(&self, bin: usize, extra: f64) -> f64 {
+        self.variance.as_ref().map_or(0.0, |variance| between(&GRID, variance, bin, extra))
+    }
+}
+
+/// Tables for all bins and early reflections.
+pub(super) fn prepare(room: &TracedRoomView<'_>) -> Result<Tables, Error> {
+    let bins = room.by_pair(of_bins)?;
+    let reflections = room.by_pair(|pair| Ok(of_reflections(pair)))?;
+    Ok(Tables::of_bins(bins).with_reflections(reflections))
+}
+
+fn of_bins(pair: &TracedPairView<'_>) -> Result<Vec<ScatteringTable>, Error> {
+    let materials = pair.room().materials();
+    let mut found =
+        vec![ScatteringTable { change: Vec::new(), variance: Some(Vec::new()) }; materials[0].bands().len()];
+    for (place, &extra) in GRID.iter().enumerate() {
+        let changed: Vec<Material> =
+            materials.iter().map(|m| scattering_more(m, extra)).collect::<Result<_, _>>()?;
+        let energies = if place == NO_EXTRA { Vec::new() } else { pair.energies(&changed)? };
+        for (band, table) in found.iter_mut().enumerate() {
+            let ln_energy = pair.ln_energy(band);
+            let (change, variance) = match energies.get(band) {
+                Some(energies) => changes(pair, band, energies),
+                None => (vec![0.0; ln_energy.len()], vec![0.0; ln_energy.len()]),
+            };
+            table.change.push(change);
+            table.variance.get_or_insert_default().push(variance);
+        }
+    }
+    Ok(found)
+}
+
+/// Logarithm of the change of each bin's energy, and of the tracer's own variance what is more.
+fn changes(pair: &TracedPairView<'_>, band: usize, energies: &[f32]) -> (Vec<f64>, Vec<f64>) {
+    let (sums, monte_carlo) = pair.bin_energies_and_variance(band, energies);
+    let floor = NOTHING * sums.iter().copied().fold(0.0, f64::max).max(1e-30);
+    let bins = || sums.iter().map(|s| s.max(floor)).zip(pair.ln_energy(band));
+    let change = bins().map(|(e, l)| e.ln() - l).collect();
+    let more = |((e, _), (now, own)): ((f64, _), (&f64, &f64))| (now / (e * e) - own).max(0.0);
+    let variance = bins().zip(monte_carlo.iter().zip(pair.monte_carlo(band))).map(more).collect();
+    (change, variance)
+}
+
+/// A share more of each reflection is scattered, and lost to the mirror; what was scattered never comes back as one.
+fn of_reflections(pair: &TracedPairView<'_>) -> Vec<ScatteringTable> {
+    let at = |extra: &f64| pair.reflection_orders().map(|n| n as f64 * (1.0 - extra.max(0.0)).ln()).collect();
+    let table = ScatteringTable { change: GRID.iter().map(at).collect(), variance: None };
+    vec![table; pair.room().materials()[0].bands().len()]
+}
+
+#[cfg(test)]
+impl ScatteringTable {
+    /// Changes in proportion to the extra scattering, other ones in each bin.
+    pub fn by_hand(bins: usize) -> Self {
+        let change = |extra: &f64| (0..bins).map(|bin| 0.4 * extra * (1.3 * bin as f64).sin()).collect();
+        let variance = |extra: &f64| vec![0.05 * extra.abs(); bins];
+        Self {
+            change: GRID.iter().map(change).collect(),
+            variance: Some(GRID.iter().map(variance).collect()),
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! The likelihood of the decays on tables made by hand.
+
+use super::*;
+use crate::effect::Effect;
+use crate::effects::{
+    AirAbsorption, AngleDependentAbsorption, BackgroundNoise, CoupledVolume, RoomModes, Scattering,
+    SourceDirectivity, TransducerResponse, Truncation,
+};
+use crate::hand_made::Tables as HandMade;
+use sabine_scene::TimeZero;
+
+/// Away from the expansion and from all neutral values and bounds.
+fn somewhere(model: &EnergyModel<'_>) -> Vec<f64> {
+    let one = |(i, p): (usize, &Prior)| {
+        let sd = p.sd.min(0.2 * (p.high - p.low)).min(3.0);
+        (p.mean + 0.3 * sd * (1.0 + (i as f64).sin())).clamp(p.low + 0.1 * sd, p.high - 0.1 * sd)
+    };
+    model.priors.iter().enumerate().map(one).collect()
+}
+
+#[test]
+fn the_gradient_is_that_of_central_differences() {
+    let effects: [&dyn Effect; 9] = [
+        &AirAbsorption,
+        &AngleDependentAbsorption,
+        &BackgroundNoise,
+        &CoupledVolume,
+        &RoomModes,
+        &Scattering,
+        &SourceDirectivity,
+        &TransducerResponse,
+        &Truncation,
+    ];
+    for levels in [Levels::Common, Levels::Absolute, Levels::PerResponse] {
+        let tables = HandMade::new(levels, TimeZero::Emission);
+        let used = [true; 3];
+        for effect in effects {
+            let mut cases = effect.cases(&tables.survey);
+            let prepared = tables.prepared(&mut cases);
+            let data = EnergyData { tables: &prepared, ..tables.energy_data() };
+            let cases: Vec<&Case> = cases.iter().collect();
+            let model = EnergyModel::new(&data, &cases, &used);
+            let values = somewhere(&model);
+            let mut slopes = Slopes::zero(values.len());
+            model.log_likelihood(&values, Some(&mut slopes));
+            for i in 0..values.len() {
+                let step = 1e-5 * model.priors[i].sd.min(1.0);
+                let at = |offset: f64| {
+                    let mut moved = values.clone();
+                    moved[i] += offset;
+                    model.log_likelihood(&moved, None)
+                };
+                let expected = (at(step) - at(-step)) / (2.0 * step);
+                let found = slopes.gradient[i];
+                let off = (found - expected).abs();
+                let name = effect.id();
+                // Slopes of effects are differences themselves, rounded at 1e-6 of the likelihood's size.
+                assert!(off < 1e-3 * expected.abs() + 2e-3, "{name} {levels:?} {i}: {found} {expected}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_response_that_does_not_count_has_no_say() {
+    let tables = HandMade::new(Levels::Absolute, TimeZero::Emission);
+    let data = tables.energy_data();
+    let likelihood = |used: [bool; 3]| {
+        let model = EnergyModel::new(&data, &[], &used);
+        model.log_likelihood(&model.start(None), None)
+    };
+    let [first, second] = [[true, false, false], [false, true, true]].map(likelihood);
+    assert!((likelihood([true; 3]) - first - second).abs() < 1e-9);
+}

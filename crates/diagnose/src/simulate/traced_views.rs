@@ -1,0 +1,177 @@
+//! What a term is shown of the traced room, for tables of its own.
+
+use crate::error::Error;
+use crate::observe::band_pulse::BandPulse;
+use crate::simulate::simulation::Simulation;
+use crate::simulate::traced_pair::{BandState, TracedPair};
+use crate::survey::{Survey, SurveyedResponse};
+use rayon::prelude::*;
+use sabine_acoustics::{Air, Material};
+use sabine_paths::{Conditions, PathSet};
+use sabine_scene::{Receiver, Scene, Source};
+
+/// The traced room at the materials about which predictions are expanded.
+pub struct TracedRoomView<'a> {
+    pub(crate) survey: &'a Survey,
+    pub(crate) simulation: &'a Simulation,
+    pub(crate) pulses: &'a [BandPulse],
+    pub(crate) materials: Vec<Material>,
+}
+
+impl TracedRoomView<'_> {
+    /// The survey.
+    pub fn survey(&self) -> &Survey {
+        self.survey
+    }
+
+    /// Materials about which predictions are expanded. Scattering is as stated.
+    pub fn materials(&self) -> &[Material] {
+        &self.materials
+    }
+
+    /// The mesh as it is traced: at the size that was found, its materials' scattering spread over the bands.
+    pub fn scene(&self) -> &Scene {
+        self.simulation.traced_scene()
+    }
+
+    /// A source (index) where it was found to stand.
+    pub fn source(&self, index: usize) -> &Source {
+        &self.simulation.sources[index]
+    }
+
+    /// A receiver (index) where it was found to stand.
+    pub fn receiver(&self, index: usize) -> &Receiver {
+        &self.simulation.receivers[index]
+    }
+
+    /// Number of pairs.
+    pub fn len(&self) -> usize {
+        self.simulation.pairs.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// A pair (index).
+    pub fn pair(&self, index: usize) -> TracedPairView<'_> {
+        TracedPairView { room: self, pair: &self.simulation.pairs[index], index }
+    }
+
+    /// Something of each pair, computed on all threads.
+    ///
+    /// # Errors
+    /// The first that `one` gives.
+    pub fn by_pair<T: Send>(
+        &self,
+        one: impl Fn(&TracedPairView<'_>) -> Result<T, Error> + Sync,
+    ) -> Result<Vec<T>, Error> {
+        (0..self.len()).into_par_iter().map(|index| one(&self.pair(index))).collect()
+    }
+}
+
+/// The traced paths of one pair, and the bins in which their energy is predicted.
+#[derive(Clone, Copy)]
+pub struct TracedPairView<'a> {
+    room: &'a TracedRoomView<'a>,
+    pair: &'a TracedPair,
+    index: usize,
+}
+
+impl<'a> TracedPairView<'a> {
+    fn state(&self, band: usize) -> &'a BandState {
+        &self.room.simulation.states[self.index][band]
+    }
+
+    /// The room.
+    pub fn room(&self) -> &'a TracedRoomView<'a> {
+        self.room
+    }
+
+    /// What the survey says of it.
+    pub fn response(&self) -> &'a SurveyedResponse {
+        &self.room.survey.responses[self.index]
+    }
+
+    /// Its paths.
+    pub fn paths(&self) -> &'a PathSet {
+        self.pair.paths()
+    }
+
+    /// Paths around edges of the mesh, where source and receiver do not see each other; no part of [`TracedPairView::paths`].
+    pub fn diffracted_paths(&self) -> Option<&'a PathSet> {
+        self.pair.diffracted_paths()
+    }
+
+    /// The air, as it was found.
+    pub fn air(&self) -> Air {
+        self.pair.air
+    }
+
+    /// When the first path arrives, in seconds after the emission.
+    pub fn direct_s(&self) -> f64 {
+        self.pair.direct_s
+    }
+
+    /// Energies of its paths under other materials, `[band][path]`.
+    ///
+    /// # Errors
+    /// [`Error::Acoustics`] for materials of other bands.
+    pub fn energies(&self, materials: &[Material]) -> Result<Vec<Vec<f32>>, Error> {
+        Ok(self.pair.paths().energies(&Conditions::new(materials, &self.pair.air))?)
+    }
+
+    /// Natural logarithm of the predicted energy in the bins of a band, without what its filter lets in of others.
+    pub fn ln_energy(&self, band: usize) -> &'a [f64] {
+        &self.state(band).ln_energy
+    }
+
+    /// Predicted energy in a bin as the band's filter lets it pass, with what leaks in from its neighbours.
+    pub fn filtered_energy(&self, band: usize, bin: usize) -> f64 {
+        let state = self.state(band);
+        let leaks = state.leaks.iter().map(|(_, share, ln)| share * ln[bin].exp());
+        state.own_share * state.ln_energy[bin].exp() + leaks.sum::<f64>()
+    }
+
+    /// The tracer's own variance of the bins of a band, as a share of their energy squared.
+    pub fn monte_carlo(&self, band: usize) -> &'a [f64] {
+        &self.state(band).monte_carlo
+    }
+
+    /// Gathers energies of the paths, one each, in the bins of a band.
+    pub fn bin_energies(&self, band: usize, energies: &[f32]) -> Vec<f64> {
+        let (bins, pulse) = (self.state(band).bins, &self.room.pulses[band]);
+        self.pair.sums(energies, bins, pulse, self.room.simulation.traced_s)
+    }
+
+    /// The same with the variance by chance, from the scatter between batches of rays.
+    pub fn bin_energies_and_variance(&self, band: usize, energies: &[f32]) -> (Vec<f64>, Vec<f64>) {
+        let (bins, pulse) = (self.state(band).bins, &self.room.pulses[band]);
+        self.pair.sums_and_variance(energies, bins, pulse, self.room.simulation.traced_s)
+    }
+
+    /// Spreads a pulse of energy 1 that arrives so long after the first path over the bins of a band, as the band's filter does; returns one
+    /// share for each bin that there is.
+    pub fn spread_pulse(&self, band: usize, after_direct_s: f64, add: impl FnMut(usize, f64)) {
+        let (bins, pulse) = (self.state(band).bins, &self.room.pulses[band]);
+        TracedPair::shares(after_direct_s, bins, pulse, self.state(band).ln_energy.len(), add);
+    }
+
+    /// Share of an octave's energy that the filter of a band lets pass; none where it is too little to count.
+    pub fn filter_share(&self, band: usize, octave: usize) -> Option<f64> {
+        let share = self.room.pulses[band].shares[octave];
+        (octave == band || share > TracedPair::MIN_LEAK).then_some(share)
+    }
+
+    /// Numbers of reflections of the early exact paths, in the order in which tables of reflections hold them.
+    pub fn reflection_orders(&self) -> impl Iterator<Item = usize> + 'a {
+        let reflections = &self.room.simulation.isolated_reflections;
+        reflections.get(self.index).into_iter().flat_map(|(all, _)| all.iter().map(|r| r.order))
+    }
+
+    /// End of the compared time of a band, in seconds after the first path.
+    pub fn compared_s(&self, band: usize) -> f64 {
+        self.state(band).bins.edge_s(self.room.simulation.ends[self.index][band])
+    }
+}

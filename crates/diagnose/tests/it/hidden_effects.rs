@@ -1,0 +1,320 @@
+//! Effects hidden in the responses of laboratory rooms must be found, and none where there is none.
+//!
+//! The rooms and their physics are those of `sabine_testkit`, which shares no code with the tracer or the diagnosis.
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
+use sabine_acoustics::{Bands, FilterBank, ImpulseResponse};
+use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, ExtendedModel, Verdict};
+use sabine_paths::{Conditions, Propagator};
+use sabine_propagate::{PathTracer, TracerConfig};
+use sabine_scene::{Levels, MeasuredRoom, Receiver};
+use sabine_testkit::{Hidden, LabConfig, Laboratory};
+
+fn lab(seed: u64) -> Laboratory {
+    Laboratory::new(LabConfig { seed, receivers: 8, ..LabConfig::default() }).unwrap()
+}
+
+fn diagnose(lab: &Laboratory, hidden: &[Hidden]) -> Diagnosis {
+    let folder = tempfile::tempdir().unwrap();
+    let room = lab.write(hidden, &folder.path().join("room"), None).unwrap();
+    let config = DiagnoseConfig { rays: 2000, ..DiagnoseConfig::default() };
+    Diagnoser::new(config).unwrap().diagnose(&room, &[], &()).unwrap()
+}
+
+/// The one cause that is named, with a gain at positions not seen.
+fn only_cause(found: &Diagnosis, effect: &str) -> sabine_diagnose::Cause {
+    let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
+    assert_eq!(found.verdict, Verdict::Explained, "{named:?} {:?}", found.lack_of_fit);
+    assert_eq!(named, [effect]);
+    let cause = found.causes[0].clone();
+    let gain = cause.held_out_gain.clone().unwrap();
+    assert!(gain.low > 0.0, "{gain:?}");
+    cause
+}
+
+fn holds(cause: &sabine_diagnose::Cause, parameter: &str, truth: f64) {
+    let p = cause.parameters.iter().find(|p| p.name == parameter).unwrap();
+    assert!(p.low <= truth && truth <= p.high, "{truth} is not within {p:?}");
+}
+
+#[test]
+fn a_room_without_effects_is_adequate() {
+    for seed in [501, 502] {
+        let found = diagnose(&lab(seed), &[]);
+        assert_eq!(
+            found.verdict,
+            Verdict::Adequate,
+            "{:?} {:?}",
+            found.candidates.first(),
+            found.lack_of_fit
+        );
+        assert!(found.causes.is_empty());
+        // Bins scatter as far as the paths say that they do.
+        for d in &found.lack_of_fit.dispersion {
+            assert!((0.6..1.5).contains(d), "{:?}", found.lack_of_fit.dispersion);
+        }
+    }
+}
+
+#[test]
+fn a_latency_is_found() {
+    let found = diagnose(&lab(511), &[Hidden::TimeZero { latency_s: 4e-3 }]);
+    holds(&only_cause(&found, "time_zero"), "latency", 4.0);
+}
+
+#[test]
+fn another_temperature_is_found() {
+    let lab = lab(512);
+    let found = diagnose(&lab, &[Hidden::SoundSpeed { temperature_offset_k: 8.0 }]);
+    let cause = only_cause(&found, "sound_speed");
+    let p = &cause.parameters[0];
+    // The laboratory jitters places by 5 mm: the interval may miss by little.
+    assert!((p.value - lab.air().temperature_c() - 8.0).abs() < 0.8, "{p:?}");
+}
+
+#[test]
+fn a_source_that_stands_elsewhere_is_found() {
+    let lab = lab(513);
+    let hidden = Hidden::random("position_error", 1.0, &lab, 513).unwrap();
+    let Hidden::PositionError { index, end, offset_m } = hidden else { panic!("{hidden:?}") };
+    let found = diagnose(&lab, &[Hidden::PositionError { end, index, offset_m }]);
+    let cause = only_cause(&found, "position_error");
+    for (p, truth) in cause.parameters.iter().zip(offset_m) {
+        assert!((p.value - truth).abs() < 0.03, "{p:?} {truth}");
+    }
+}
+
+#[test]
+fn a_room_of_other_size_is_found() {
+    let found = diagnose(&lab(514), &[Hidden::RoomDimensions { scale: [1.03, 1.0, 0.975] }]);
+    let cause = only_cause(&found, "room_dimensions");
+    for (name, truth) in [("scale_x", 3.0), ("scale_z", -2.5)] {
+        let p = cause.parameters.iter().find(|p| p.name == name).unwrap();
+        assert!((p.value - truth).abs() < 0.4, "{p:?}");
+    }
+}
+
+#[test]
+fn a_cut_end_is_found() {
+    let lab = lab(515);
+    let hidden = Hidden::random("truncation", 1.0, &lab, 515).unwrap();
+    let Hidden::Truncation { end_s, .. } = hidden else { panic!("{hidden:?}") };
+    let found = diagnose(&lab, &[hidden]);
+    let cause = only_cause(&found, "truncation");
+    assert!((cause.parameters[0].value - end_s).abs() < 0.005, "{:?} {end_s}", cause.parameters[0]);
+}
+
+#[test]
+fn a_clock_and_a_temperature_cannot_be_told_apart() {
+    let found = diagnose(&lab(516), &[Hidden::TimeZero { latency_s: 4e-3 }]);
+    let twins = found.isolability.iter().find(|i| i.effects == ["sound_speed", "sampling_clock"]).unwrap();
+    assert!(twins.cosine > 0.99 && !twins.separable && twins.would_decide.contains("loopback"));
+    let strangers = found.isolability.iter().find(|i| i.effects == ["time_zero", "sound_speed"]);
+    assert!(strangers.or(found.isolability.last()).is_some_and(|i| i.cosine < 0.99));
+}
+
+#[test]
+fn dry_air_is_found() {
+    // Twelve positions: with eight, the humidity of other rooms was not found.
+    let lab = Laboratory::new(LabConfig { seed: 45, ..LabConfig::default() }).unwrap();
+    let hidden = Hidden::random("air_absorption", 1.0, &lab, 45).unwrap();
+    let Hidden::AirAbsorption { relative_humidity_percent } = hidden else { panic!("{hidden:?}") };
+    let cause = only_cause(&diagnose(&lab, &[hidden]), "air_absorption");
+    holds(&cause, "relative_humidity", relative_humidity_percent);
+}
+
+#[test]
+fn a_directional_source_is_found() {
+    let lab = lab(522);
+    let hidden = Hidden::random("source_directivity", 1.0, &lab, 522).unwrap();
+    let Hidden::SourceDirectivity { ref omni_share, .. } = hidden else { panic!("{hidden:?}") };
+    let truth = 1.0 - omni_share[3];
+    let cause = only_cause(&diagnose(&lab, &[hidden]), "source_directivity");
+    assert!((cause.parameters[0].value - truth).abs() < 0.06, "{:?} {truth}", cause.parameters[0]);
+}
+
+#[test]
+fn the_axis_of_a_directional_source_is_found_where_the_room_file_states_none() {
+    let config = LabConfig { seed: 530, receivers: 8, orientation: false, ..LabConfig::default() };
+    let lab = Laboratory::new(config).unwrap();
+    let hidden = Hidden::random("source_directivity", 1.0, &lab, 530).unwrap();
+    let truth = lab.truth(std::slice::from_ref(&hidden)).unwrap().sources[0].axis;
+    let found = diagnose(&lab, &[hidden]);
+    only_cause(&found, "source_directivity");
+    let axis = found.model.axis.values().next().unwrap();
+    let cosine: f64 = axis.iter().zip(truth).map(|(a, b)| a * b).sum();
+    assert!(cosine > 15f64.to_radians().cos(), "{axis:?} {truth:?}");
+}
+
+#[test]
+fn rough_walls_are_found() {
+    let lab = lab(523);
+    let hidden = Hidden::random("scattering", 1.0, &lab, 523).unwrap();
+    only_cause(&diagnose(&lab, &[hidden]), "scattering");
+}
+
+#[test]
+fn a_material_that_is_another_is_found() {
+    let lab = lab(524);
+    let hidden = Hidden::random("surface_absorption", 1.0, &lab, 524).unwrap();
+    let Hidden::SurfaceAbsorption { material, .. } = hidden else { panic!("{hidden:?}") };
+    let cause = only_cause(&diagnose(&lab, &[hidden]), "surface_absorption");
+    assert_eq!(cause.subject.as_deref(), Some(lab.scene().materials()[material].name.as_str()));
+}
+
+#[test]
+fn noise_is_found() {
+    let lab = lab(525);
+    let hidden = Hidden::random("background_noise", 1.0, &lab, 525).unwrap();
+    only_cause(&diagnose(&lab, &[hidden]), "background_noise");
+}
+
+#[test]
+fn a_second_room_is_found() {
+    let lab = lab(526);
+    let hidden = Hidden::random("coupled_volume", 1.0, &lab, 526).unwrap();
+    only_cause(&diagnose(&lab, &[hidden]), "coupled_volume");
+}
+
+#[test]
+fn a_loudspeaker_that_is_not_flat_is_found() {
+    let lab = lab(527);
+    let hidden = Hidden::random("transducer_response", 1.0, &lab, 527).unwrap();
+    let Hidden::TransducerResponse { ref gains_db } = hidden else { panic!("{hidden:?}") };
+    let truth = gains_db.clone();
+    let cause = only_cause(&diagnose(&lab, &[hidden]), "transducer_response");
+    // Relative to 1 kHz, for the common gain is unknown.
+    for (band, hz) in [(2, 500), (4, 2000), (5, 4000), (6, 8000)] {
+        let name = format!("gain_{hz}_hz");
+        let p = cause.parameters.iter().find(|p| p.name == name).unwrap();
+        // Found: 0.65 dB at 500 Hz, less above.
+        assert!((p.value - (truth[band] - truth[3])).abs() < 0.8, "{p:?} {truth:?}");
+        assert!(p.high - p.low < 3.0, "{p:?}");
+    }
+}
+
+#[test]
+fn faults_of_single_channels_are_found() {
+    let lab = lab(528);
+    for (kind, subject) in [("polarity", "polarity"), ("gain", "gain"), ("swap", "exchanged")] {
+        let hidden = Hidden::random(&format!("channel_fault.{kind}"), 1.0, &lab, 528).unwrap();
+        let found = diagnose(&lab, &[hidden]);
+        let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
+        assert_eq!(named, ["channel_fault"], "{kind}: {:?}", found.verdict);
+        assert!(found.causes[0].subject.as_ref().unwrap().contains(subject), "{kind} {:?}", found.causes[0]);
+    }
+}
+
+/// Level of the direct sound at each receiver as the extended model renders it, relative to an omnidirectional microphone, in dB at 1 kHz.
+fn rendered_direct_db(model: &ExtendedModel, room: &MeasuredRoom) -> Vec<f64> {
+    let extended = model.room(room).unwrap();
+    let materials: Vec<_> = extended.scene.materials().iter().map(|m| m.material.clone()).collect();
+    let config = TracerConfig { rays: 100, duration_s: 0.1, ..TracerConfig::default() };
+    let tracer = PathTracer::new(config).unwrap();
+    let band = 3;
+    let one = |(r, receiver): (usize, &Receiver)| {
+        let source = &extended.sources[0];
+        let paths = tracer.trace(&extended.scene, source, receiver, &extended.air, &()).unwrap();
+        let direct = (0..paths.len()).find(|&i| paths.is_direct(i)).unwrap();
+        let heard = paths.energies(&extended.conditions(&materials, 0, r)).unwrap()[band][direct];
+        let omni = paths.energies(&Conditions::new(&materials, &extended.air)).unwrap()[band][direct];
+        // What follows propagation carries the pattern's gain in a diffuse field, from a pulse to a pulse.
+        let mut pulse = vec![0.0; 20_000];
+        pulse[10_000] = 1.0;
+        let pulse = ImpulseResponse::new(pulse, 32_000).unwrap();
+        let finished = extended.finish(&source.id, &receiver.id, pulse.clone(), 0).unwrap();
+        let energy = |response: &ImpulseResponse| -> f64 {
+            let split = FilterBank::new(Bands::T60, 32_000).unwrap().analyse(response.samples());
+            split.values()[band].iter().map(|s| f64::from(*s).powi(2)).sum()
+        };
+        10.0 * (f64::from(heard) / f64::from(omni) * energy(&finished) / energy(&pulse)).log10()
+    };
+    extended.receivers.iter().enumerate().map(one).collect()
+}
+
+#[test]
+fn directional_microphones_are_found_and_rendered() {
+    // Axes that the room file states, one axis for all, an axis for each.
+    for (seed, microphone_axes, axis) in
+        [(541, true, None), (542, false, Some([0.6, 0.0, 0.8])), (543, false, None)]
+    {
+        let config = LabConfig { seed, receivers: 8, microphone_axes, ..LabConfig::default() };
+        let lab = Laboratory::new(config).unwrap();
+        let hidden = Hidden::ReceiverDirectivity { omni_share: vec![0.55; 7], axis };
+        let folder = tempfile::tempdir().unwrap();
+        let room = lab.write(std::slice::from_ref(&hidden), &folder.path().join("room"), None).unwrap();
+        let config = DiagnoseConfig { rays: 2000, ..DiagnoseConfig::default() };
+        let found = Diagnoser::new(config).unwrap().diagnose(&room, &[], &()).unwrap();
+        let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
+        assert_eq!(found.verdict, Verdict::Explained, "{seed}: {named:?} {:?}", found.lack_of_fit);
+        assert_eq!(named, ["receiver_directivity"], "{seed}");
+        let each = found.causes[0].parameters.len() == 24;
+        assert_eq!(each, !microphone_axes && axis.is_none(), "{seed}: {:?}", found.causes[0].parameters);
+        let truth = lab.truth(&[hidden]).unwrap();
+        let levels_db = rendered_direct_db(&found.model, &room);
+        for ((microphone, place), level_db) in truth.microphones.iter().zip(&truth.receivers_m).zip(levels_db)
+        {
+            let from: [f64; 3] = std::array::from_fn(|k| truth.sources[0].position_m[k] - place[k]);
+            let length = from.iter().map(|c| c * c).sum::<f64>().sqrt();
+            let cosine = (0..3).map(|k| from[k] * microphone.axis[k]).sum::<f64>() / length;
+            let gain: f64 = (0.55 + 0.45 * cosine) / (0.55f64.powi(2) + 0.45f64.powi(2) / 3.0).sqrt();
+            // Deep in the null a pattern says little.
+            let wanted_db = 20.0 * gain.abs().log10();
+            assert!((level_db - wanted_db).abs() < 2.5 || wanted_db < -8.0, "{seed}: {level_db} {wanted_db}");
+        }
+    }
+}
+
+#[test]
+fn channels_with_responses_of_their_own_are_found_and_rendered() {
+    for (seed, levels) in [(551, Levels::Common), (552, Levels::PerResponse)] {
+        let lab = Laboratory::new(LabConfig { seed, receivers: 8, levels, ..LabConfig::default() }).unwrap();
+        let hidden = Hidden::random("channel_response", 1.0, &lab, seed).unwrap();
+        let Hidden::ChannelResponse { ref gains_db } = hidden else { panic!("{hidden:?}") };
+        let truth = gains_db.clone();
+        let folder = tempfile::tempdir().unwrap();
+        let room = lab.write(&[hidden], &folder.path().join("room"), None).unwrap();
+        let config = DiagnoseConfig { rays: 2000, ..DiagnoseConfig::default() };
+        let found = Diagnoser::new(config).unwrap().diagnose(&room, &[], &()).unwrap();
+        let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
+        assert_eq!(found.verdict, Verdict::Explained, "{seed}: {named:?} {:?}", found.lack_of_fit);
+        assert_eq!(named, ["channel_response"], "{seed}");
+        // Rendered: the octaves of a pulse, each response against the mean of all, 250 Hz to 8 kHz against their own mean.
+        let extended = found.model.room(&room).unwrap();
+        let bank = FilterBank::new(Bands::T60, 32_000).unwrap();
+        let mut pulse = vec![0.0; 20_000];
+        pulse[10_000] = 1.0;
+        let pulse = ImpulseResponse::new(pulse, 32_000).unwrap();
+        let octaves_db = |samples: &[f32]| -> Vec<f64> {
+            let energy = |band: &Vec<f32>| band.iter().map(|s| f64::from(*s).powi(2)).sum::<f64>();
+            bank.analyse(samples).values().iter().map(|b| 10.0 * energy(b).log10()).collect()
+        };
+        let rendered: Vec<Vec<f64>> = (room.responses().iter())
+            .map(|r| {
+                let (source, receiver) = (&room.sources()[r.source].id, &room.receivers()[r.receiver].id);
+                octaves_db(extended.finish(source, receiver, pulse.clone(), 0).unwrap().samples())
+            })
+            .collect();
+        let [rendered, truth] = [rendered, truth].map(|table| deviations(&table));
+        for (response, (rendered, truth)) in rendered.iter().zip(&truth).enumerate() {
+            for (band, (found, truth)) in rendered.iter().zip(truth).enumerate() {
+                assert!((found - truth).abs() < 1.5, "{seed} {response} {band}: {found} for {truth} dB");
+            }
+        }
+    }
+}
+
+/// Of each row from the mean of all, and of each value from the mean of its row, the lowest octave left out.
+fn deviations(table: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let mean = |values: &mut dyn Iterator<Item = f64>| {
+        let all: Vec<f64> = values.collect();
+        all.iter().sum::<f64>() / all.len() as f64
+    };
+    let columns: Vec<f64> = (1..table[0].len()).map(|b| mean(&mut table.iter().map(|row| row[b]))).collect();
+    let one = |row: &Vec<f64>| {
+        let own: Vec<f64> = row[1..].iter().zip(&columns).map(|(x, m)| x - m).collect();
+        let level = mean(&mut own.iter().copied());
+        own.iter().map(|x| x - level).collect()
+    };
+    table.iter().map(one).collect()
+}

@@ -1,0 +1,13 @@
+//! Diagnoses of whole rooms, through the public interface. Minutes: `cargo test -p sabine-diagnose --test it MODULE` runs one topic.
+
+mod any_tracer;
+mod channel_gains;
+mod hidden_distortion;
+mod hidden_edges;
+mod hidden_effects;
+mod hidden_local_reaction;
+mod hidden_surfaces;
+mod hidden_waves;
+mod look_alikes;
+mod odd_input;
+mod rendering;

@@ -1,0 +1,369 @@
+//! Models read from files and what they do to responses, against closed forms.
+
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
+use sabine_acoustics::{Bands, FilterBank, ImpulseResponse, SampleFormat, Signal, encode_wav};
+use sabine_diagnose::{Error, ExtendedModel, ExtendedRoom};
+use sabine_paths::{Conditions, Propagator};
+use sabine_propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
+use sabine_scene::MeasuredRoom;
+use std::path::PathBuf;
+
+const RATE_HZ: u32 = 32_000;
+const CENTRES: &str = "centres_hz = [125, 250, 500, 1000, 2000, 4000, 8000]\ncauses = []\n";
+const BANDS: Bands = Bands::T60;
+
+fn fixture() -> MeasuredRoom {
+    MeasuredRoom::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/room")).unwrap()
+}
+
+fn in_file(text: &str) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("extended_model.toml");
+    std::fs::write(&path, format!("{CENTRES}{text}")).unwrap();
+    (folder, path)
+}
+
+fn extended(text: &str) -> ExtendedRoom {
+    let (_folder, path) = in_file(text);
+    ExtendedModel::read(path).unwrap().room(&fixture()).unwrap()
+}
+
+fn finished(text: &str, samples: Vec<f32>) -> Vec<f32> {
+    let response = ImpulseResponse::new(samples, RATE_HZ).unwrap();
+    extended(text).finish("talker", "microphone", response, 3).unwrap().into_samples()
+}
+
+fn pulse(at: usize, length: usize) -> Vec<f32> {
+    let mut samples = vec![0.0; length];
+    samples[at] = 1.0;
+    samples
+}
+
+/// Energy by octave, 1 for a unit pulse.
+fn energies(samples: &[f32]) -> Vec<f64> {
+    let bank = FilterBank::new(BANDS, RATE_HZ).unwrap();
+    let sums = |samples: &[f32]| -> Vec<f64> {
+        let split = bank.analyse(samples);
+        split.values().iter().map(|b| b.iter().map(|&s| f64::from(s).powi(2)).sum()).collect()
+    };
+    sums(samples).iter().zip(sums(&pulse(8000, 16_000))).map(|(e, one)| e / one).collect()
+}
+
+fn db(ratio: f64) -> f64 {
+    10.0 * ratio.log10()
+}
+
+/// Four standard deviations of the energy of noise of a band in a time, as a share.
+fn four_sd(band: usize, seconds: f64) -> f64 {
+    let (low, high) = BANDS.edges_hz(band);
+    4.0 / ((high - low) * seconds).sqrt()
+}
+
+fn room_of_fixture() -> (MeasuredRoom, ImpulseResponse) {
+    let room = fixture();
+    let tracer = PathTracer::new(TracerConfig { rays: 2000, duration_s: 0.8, ..TracerConfig::default() });
+    let paths =
+        tracer.unwrap().trace(room.scene(), &room.sources()[0], &room.receivers()[0], &room.air(), &());
+    let config = RenderConfig { sample_rate_hz: RATE_HZ, ..RenderConfig::default() };
+    let materials: Vec<_> = room.scene().materials().iter().map(|m| m.material.clone()).collect();
+    let response = PressureRenderer::new(config)
+        .unwrap()
+        .render(&paths.unwrap(), &Conditions::new(&materials, &room.air()));
+    (room, response.unwrap())
+}
+
+/// A level sheet 0.8 m below the talker and 0.6 m below the microphone: its image is 1.4 m lower.
+#[test]
+fn a_sheet_reflects_where_its_image_says() {
+    let text = "[[sheets]]\nabsorption = 0.2\ncorners_m = [[3.4, 1.2, 0.7], [5.0, 1.2, 0.7], [5.0, 3.0, 0.7], [3.4, 3.0, 0.7]]\n";
+    let stated = fixture();
+    let room = extended(text).measured_room(&stated).unwrap();
+    assert_eq!(room.scene().materials().len(), stated.scene().materials().len() + 1);
+    let config = TracerConfig { rays: 500, duration_s: 0.1, ..TracerConfig::default() };
+    let tracer = PathTracer::new(config).unwrap();
+    let away_m = (4.6f64.powi(2) + 1.1f64.powi(2) + 1.4f64.powi(2)).sqrt();
+    let found = |room: &MeasuredRoom| {
+        let (source, receiver) = (&room.sources()[0], &room.receivers()[0]);
+        let paths = tracer.trace(room.scene(), source, receiver, &room.air(), &()).unwrap();
+        let near = |i: &usize| paths.is_exact(*i) && (f64::from(paths.lengths_m()[*i]) - away_m).abs() < 1e-3;
+        (0..paths.len()).filter(near).count()
+    };
+    assert_eq!((found(&room), found(&stated)), (1, 0));
+}
+
+#[test]
+fn a_model_that_changes_nothing_changes_nothing() {
+    let (_, response) = room_of_fixture();
+    assert_eq!(finished("", response.samples().to_vec()), response.samples());
+}
+
+#[test]
+fn noise_has_the_stated_energy_in_every_octave() {
+    let seconds = 4.0;
+    let silence = vec![0.0; (seconds * f64::from(RATE_HZ)) as usize];
+    // Up to 6 dB an octave down, then up again: what neighbours leak into the quiet ones must not count twice.
+    let wanted = [1e-2, 2.5e-3, 6e-4, 3e-4, 6e-4, 2.5e-3, 1e-2];
+    let noise = finished(&format!("noise_per_s = {wanted:?}"), silence.clone());
+    for (band, (found, wanted)) in energies(&noise).iter().zip(wanted).enumerate() {
+        let ratio = found / (wanted * seconds);
+        assert!((ratio - 1.0).abs() < four_sd(band, seconds), "octave {band}: {ratio}");
+    }
+    assert_eq!(noise, finished(&format!("noise_per_s = {wanted:?}"), silence));
+}
+
+#[test]
+fn noise_alike_in_all_octaves_is_white_between_them() {
+    // Without octave filters: white noise that a unit pulse's filters see as N per second has the variance N / rate, of which
+    // the share between the outer centres is there.
+    let silence = vec![0.0; 4 * RATE_HZ as usize];
+    let noise = finished("noise_per_s = [0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5]", silence);
+    let spectrum = |hz: f64| {
+        let step = std::f64::consts::TAU * hz / f64::from(RATE_HZ);
+        let (mut re, mut im) = (0.0, 0.0);
+        for (n, &s) in noise.iter().enumerate() {
+            let (sin, cos) = (step * n as f64).sin_cos();
+            (re, im) = (re + f64::from(s) * cos, im + f64::from(s) * sin);
+        }
+        (re * re + im * im) / noise.len() as f64
+    };
+    let lines = 300;
+    let mean = (0..lines).map(|i| spectrum(300.0 + 10.0 * f64::from(i))).sum::<f64>() / f64::from(lines);
+    let expected = 0.5 / f64::from(RATE_HZ);
+    // Each line is exponentially distributed.
+    assert!((mean / expected - 1.0).abs() < 4.0 / f64::from(lines).sqrt(), "{}", mean / expected);
+}
+
+#[test]
+fn a_coupled_volume_has_its_level_slope_and_gradient() {
+    let room = fixture();
+    let seconds = 3.0;
+    let silence = vec![0.0; (seconds * f64::from(RATE_HZ)) as usize];
+    let (level, t) = (2e-3, [1.6, 1.5, 1.4, 1.2, 1.0, 0.9, 0.8]);
+    let receivers = room.receivers();
+    let [near, far] = [receivers[0].position_m, receivers[1].position_m];
+    let text = format!(
+        "[coupled]\nenergy_per_s = {:?}\ndecay_time_s = {t:?}\ngradient_db_per_m = [1.0, 0.0, 0.0]\ncentre_m = {near:?}",
+        [level; 7],
+    );
+    let extended = extended(&text);
+    let source = room.sources()[0].position_m;
+    let direct_s = |p: [f64; 3]| {
+        (0..3).map(|k| (p[k] - source[k]).powi(2)).sum::<f64>().sqrt() / room.air().speed_of_sound_m_s()
+    };
+    for (receiver, place) in [("microphone", near), ("corner", far)] {
+        let response = ImpulseResponse::new(silence.clone(), RATE_HZ).unwrap();
+        let tail = extended.finish("talker", receiver, response, 5).unwrap();
+        let at = direct_s(place);
+        let first = (at * f64::from(RATE_HZ)) as usize;
+        assert!(tail.samples()[..first - 1].iter().all(|&s| s == 0.0), "sound before the direct sound");
+        let place_gain = 10f64.powf(0.1 * (place[0] - near[0]));
+        for from_s in [0.0, 0.2, 0.4] {
+            let cut = first + (from_s * f64::from(RATE_HZ)) as usize;
+            let mut rest = vec![0.0; cut];
+            rest.extend_from_slice(&tail.samples()[cut..]);
+            for (band, found) in energies(&rest).iter().enumerate() {
+                let k = 6.0 * std::f64::consts::LN_10 / t[band];
+                let fill = 1.0 / 0.02;
+                let wanted = level
+                    * place_gain
+                    * ((-k * from_s).exp() / k - (-(k + fill) * from_s).exp() / (k + fill));
+                // A decay is as uncertain as noise of twice its time constant.
+                let tolerance = four_sd(band, 2.0 / k);
+                let ratio = found / wanted;
+                assert!(
+                    (ratio - 1.0).abs() < tolerance,
+                    "{receiver}, octave {band}, from {from_s} s: {ratio}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn gains_are_those_of_the_octaves_of_a_pulse() {
+    let wanted = [6.0, 2.0, 0.0, 4.0, -1.0, 2.0, -3.0];
+    let found = energies(&finished(&format!("gain_db = {wanted:?}"), pulse(8000, 16_000)));
+    for (found, wanted) in found.iter().zip(wanted) {
+        assert!((db(*found) - wanted).abs() < 0.05, "{found:.3}: {:.2} dB for {wanted}", db(*found));
+    }
+    // A cardioid of gain 1 on its axis radiates a third of the power; the model keeps the power.
+    let cardioid = "directed_share = [0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5]\naxis.talker = [1, 0, 0]\naxis.screen = [1, 0, 0]";
+    for found in energies(&finished(cardioid, pulse(8000, 16_000))) {
+        assert!((found / 3.0 - 1.0).abs() < 0.01, "{found}");
+    }
+    let (_, response) = room_of_fixture();
+    let before = energies(response.samples());
+    let after = energies(&finished(&format!("gain_db = {wanted:?}"), response.samples().to_vec()));
+    for ((before, after), wanted) in before.iter().zip(after).zip(wanted) {
+        // The room's own slope within an octave weighs the flanks of the filters otherwise than a pulse does.
+        assert!((db(after / before) - wanted).abs() < 1.0, "{} for {wanted}", db(after / before));
+    }
+}
+
+#[test]
+fn the_recorder_delays_stretches_cuts_and_turns() {
+    let late = finished("latency_s = 0.002", pulse(1000, 4000));
+    assert!((late[1064] - 1.0).abs() < 1e-6 && late.len() == 4064);
+    let early = finished("latency_s = -0.002", pulse(1000, 4000));
+    assert!((early[936] - 1.0).abs() < 1e-6 && early.len() == 3936);
+    let slow = finished("clock_ppm = 1000", pulse(20_000, 30_000));
+    assert!((slow[20_020] - 1.0).abs() < 1e-6 && slow.len() == 30_030);
+    // A tone between samples keeps its form.
+    let tone = |n: usize, shift: f64| (0.3 * (n as f64 - shift)).sin();
+    let shifted = finished("latency_s = 0.001015625", (0..4000).map(|n| tone(n, 0.0) as f32).collect());
+    for (n, &sample) in shifted.iter().enumerate().take(3900).skip(200) {
+        assert!((f64::from(sample) - tone(n, 32.5)).abs() < 1e-4, "sample {n}");
+    }
+    let noise = "noise_per_s = [0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1]\n";
+    let cut = finished(&format!("{noise}truncation = [0.1, 0.02]"), vec![0.0; 6400]);
+    let whole = finished(noise, vec![0.0; 6400]);
+    assert!(cut[3200..].iter().all(|&s| s == 0.0) && cut[..2560] == whole[..2560]);
+    assert!((cut[2880] - 0.5 * whole[2880]).abs() <= 1e-6 * whole[2880].abs());
+    let turned = "inverted = [\"talker-microphone\"]\nresponse_gain_db.talker-microphone = 6";
+    assert!((finished(turned, pulse(9, 99))[9] + 10f32.powf(0.3)).abs() < 1e-5);
+    let other = "inverted = [\"talker-corner\"]\nresponse_gain_db.talker-corner = 6";
+    assert_eq!(finished(other, pulse(9, 99)), pulse(9, 99));
+}
+
+#[test]
+fn the_room_is_as_the_model_says() {
+    let text = "relative_humidity_percent = 12\ntemperature_c = 30\n\
+        absorption.carpet = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]\nscattering.carpet = [0.9, 0.9, 0.9, 0.9, 0.9, 0.9, 0.9]\n\
+        position_m.corner = [1.0, 4.0, 1.5]\n[dimensions]\nscale = [1.1, 1.0, 0.9]\nshift_m = [0.0, 0.2, 0.0]\n";
+    let room = fixture();
+    let extended = extended(text);
+    assert!((extended.scene.volume_m3() / room.scene().volume_m3() - 0.99).abs() < 1e-9);
+    let middle = |scene: &sabine_scene::Scene, k: usize| {
+        let all: Vec<f64> = scene.vertices().iter().map(|v| v[k]).collect();
+        0.5 * (all.iter().copied().fold(f64::MAX, f64::min) + all.iter().copied().fold(f64::MIN, f64::max))
+    };
+    for (k, shift) in [0.0, 0.2, 0.0].into_iter().enumerate() {
+        assert!((middle(&extended.scene, k) - middle(room.scene(), k) - shift).abs() < 1e-9);
+    }
+    assert_eq!(extended.receivers[1].position_m, [1.0, 4.0, 1.5]);
+    assert_eq!(extended.receivers[0], room.receivers()[0]);
+    assert_eq!((extended.air.temperature_c(), extended.attenuation.temperature_c()), (30.0, 21.0));
+    assert_eq!(extended.attenuation.relative_humidity_percent(), 12.0);
+    for (new, old) in extended.scene.materials().iter().zip(room.scene().materials()) {
+        if new.name == "carpet" {
+            assert_eq!(new.material.absorption().values(), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]);
+            assert_eq!(new.material.scattering().values(), [0.9; 7]);
+        } else {
+            assert_eq!(new, old);
+        }
+    }
+    let materials: Vec<_> = extended.scene.materials().iter().map(|m| m.material.clone()).collect();
+    let conditions = extended.conditions(&materials, 0, 0);
+    assert!(conditions.source.is_none() && conditions.attenuation == Some(&extended.attenuation));
+}
+
+#[test]
+fn a_model_is_read_as_it_was_written() {
+    let text = "noise_per_s = [1, 2, 3, 4, 5, 6, 7]\nexchanged = [[\"talker-corner\", \"talker-microphone\"]]\n\
+        absorption.carpet = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]\n";
+    let (folder, path) = in_file(text);
+    let model = ExtendedModel::read(path).unwrap();
+    let again = folder.path().join("again.toml");
+    model.write(&again).unwrap();
+    assert_eq!(ExtendedModel::read(again).unwrap(), model);
+    assert!(model.write(folder.path().join("missing/model.toml")).is_err());
+}
+
+#[test]
+fn what_is_wrong_in_a_file_is_named() {
+    for (text, parts) in [
+        ("noise_per_s = [1, 2]", &["noise_per_s", "2 values for 7 bands"][..]),
+        ("absorption.carpet = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 1.7]", &["absorption.carpet", "1.7"]),
+        ("gain_db = [nan, 0, 0, 0, 0, 0, 0]", &["gain_db", "NaN"]),
+        ("temperature_c = 300", &["temperature_c", "300"]),
+        ("truncation = [-1, 0]", &["truncation", "-1"]),
+        ("dimensions = { scale = [1, 1, 9], shift_m = [0, 0, 0] }", &["dimensions.scale", "9"]),
+        ("wishes = 3", &["wishes"]),
+        ("clock_ppm = \"fast\"", &["clock_ppm"]),
+    ] {
+        let (_folder, path) = in_file(text);
+        let message = ExtendedModel::read(&path).unwrap_err().to_string();
+        assert!(message.contains("extended_model.toml"), "{message}");
+        assert!(parts.iter().all(|part| message.contains(part)), "{text}: {message}");
+    }
+    assert!(matches!(ExtendedModel::read("no/such.toml"), Err(Error::Acoustics(_))));
+    for (text, field, name) in [
+        ("absorption.velvet = [0, 0, 0, 0, 0, 0, 0]", "absorption", "velvet"),
+        ("position_m.nobody = [0, 0, 0]", "position_m", "nobody"),
+        ("inverted = [\"corner-talker\"]", "inverted", "corner-talker"),
+        ("directed_share = [0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5]", "axis.talker", "talker"),
+    ] {
+        let (_folder, path) = in_file(text);
+        let error = ExtendedModel::read(path).unwrap().room(&fixture()).unwrap_err();
+        let message = error.to_string();
+        assert!(matches!(error, Error::InModel { .. }), "{message}");
+        assert!(message.contains(field) && message.contains(name), "{message}");
+    }
+    let silence = ImpulseResponse::new(vec![0.0; 100], RATE_HZ).unwrap();
+    assert!(extended("").finish("nobody", "corner", silence, 0).unwrap_err().to_string().contains("nobody"));
+}
+
+#[test]
+fn octaves_above_half_the_sample_rate_are_left_alone() {
+    let noise = "noise_per_s = [0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1]";
+    let response = ImpulseResponse::new(vec![0.0; 8000], 8000).unwrap();
+    let samples = extended(noise).finish("talker", "corner", response, 0).unwrap();
+    assert!(samples.samples().iter().all(|s| s.is_finite()) && samples.peak() > 0.0);
+    assert!(encode_wav(&Signal::from(samples), SampleFormat::Float32).is_ok());
+}
+
+#[test]
+fn a_gain_over_time_acts_on_the_time_of_the_file() {
+    let mut pulses = vec![0.0; 32_000];
+    for at in [3200, 9600, 16_000, 28_800] {
+        pulses[at] = 1.0;
+    }
+    let model = "[gain_over_time]\ntime_s = [0.2, 0.4, 0.6]\ngain_db = [-6, 0, 12]\n";
+    let found = finished(model, pulses);
+    // Before the first instant, halfway, halfway, after the last.
+    for (at, gain_db) in [(3200, -6.0), (9600, -3.0), (16_000, 6.0), (28_800, 12.0)] {
+        assert!((20.0 * f64::from(found[at]).log10() - gain_db).abs() < 1e-3, "{at}: {}", found[at]);
+    }
+    for (field, wrong) in [
+        ("gain_over_time.gain_db", "time_s = [0.2, 0.4]\ngain_db = [1]"),
+        ("gain_over_time.time_s", "time_s = [0.4, 0.2]\ngain_db = [1, 2]"),
+        ("gain_over_time.gain_db", "time_s = []\ngain_db = []"),
+    ] {
+        let (_folder, path) = in_file(&format!("[gain_over_time]\n{wrong}\n"));
+        let error = ExtendedModel::read(path).unwrap_err().to_string();
+        assert!(error.contains(field), "{error}");
+    }
+}
+
+#[test]
+fn a_microphone_with_a_pattern_hears_its_direction_and_as_much_of_a_diffuse_field() {
+    let text = "receiver_directed_share.microphone = [0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5]\nreceiver_axis.microphone = [0, 0, 1]\n";
+    let room = extended(text);
+    let materials: Vec<_> = room.scene.materials().iter().map(|m| m.material.clone()).collect();
+    let conditions = room.conditions(&materials, 0, 0);
+    let (pattern, _) = conditions.receiver.unwrap();
+    assert!(pattern.bands().is_some() && room.conditions(&materials, 0, 1).receiver.is_none());
+    // A cardioid takes a third of what an omnidirectional microphone takes of a diffuse field.
+    for found in energies(&finished(text, pulse(8000, 16_000))) {
+        assert!((found / 3.0 - 1.0).abs() < 0.01, "{found}");
+    }
+    let response = ImpulseResponse::new(pulse(9, 99), RATE_HZ).unwrap();
+    let other = room.finish("talker", "corner", response, 3).unwrap();
+    assert_eq!(other.samples(), pulse(9, 99));
+}
+
+#[test]
+fn a_channel_has_its_own_octaves() {
+    let wanted = [-3.0, -1.0, 0.0, 1.0, 2.0, 1.0, -2.0];
+    let text = format!("response_band_gain_db.talker-microphone = {wanted:?}");
+    let found = energies(&finished(&text, pulse(8000, 16_000)));
+    for (found, wanted) in found.iter().zip(wanted) {
+        assert!((db(*found) - wanted).abs() < 0.05, "{} for {wanted}", db(*found));
+    }
+    let other = "response_band_gain_db.talker-corner = [9, 9, 9, 9, 9, 9, 9]";
+    assert_eq!(finished(other, pulse(9, 99)), pulse(9, 99));
+    let (_folder, path) = in_file("response_band_gain_db.nobody = [0, 0, 0, 0, 0, 0, 0]");
+    let error = ExtendedModel::read(path).unwrap().room(&fixture()).unwrap_err().to_string();
+    assert!(error.contains("response_band_gain_db") && error.contains("nobody"), "{error}");
+}

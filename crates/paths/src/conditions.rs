@@ -1,0 +1,65 @@
+//! What may change without tracing again.
+
+use sabine_acoustics::{Air, Bands, Directivity, Error, Material, Orientation};
+
+/// All that paths leave open: surfaces, air, and how source and receiver are turned and what they favour.
+///
+/// ```
+/// use sabine_acoustics::{Air, Bands, Directivity, Material, Orientation};
+/// use sabine_paths::Conditions;
+/// let walls = [Material::uniform(Bands::T60, 0.1, 0.2)?];
+/// let (air, voice) = (Air::default(), Directivity::first_order(Directivity::SUBCARDIOID)?);
+/// let facing = Orientation::towards([0.0, 1.0, 0.0])?;
+/// let conditions = Conditions::new(&walls, &air).with_source(&voice, facing);
+/// assert!(conditions.receiver.is_none()); // hears all directions alike
+/// # Ok::<(), sabine_acoustics::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct Conditions<'a> {
+    /// A material for each that the paths know, in the same order.
+    pub materials: &'a [Material],
+    /// The air: speed of sound, and attenuation unless another air is named for it.
+    pub air: &'a Air,
+    /// The air that attenuates, where what is known of it was found apart from the speed of sound; `None` is [`Conditions::air`].
+    pub attenuation: Option<&'a Air>,
+    /// How the source radiates and where it faces; `None` is omnidirectional.
+    pub source: Option<(&'a Directivity, Orientation)>,
+    /// How the receiver hears and where it faces; `None` is omnidirectional.
+    pub receiver: Option<(&'a Directivity, Orientation)>,
+}
+
+impl<'a> Conditions<'a> {
+    /// Omnidirectional source and receiver between these surfaces.
+    pub fn new(materials: &'a [Material], air: &'a Air) -> Self {
+        Self { materials, air, attenuation: None, source: None, receiver: None }
+    }
+
+    /// The same with sound attenuated as by another air; the speed of sound stays.
+    #[must_use]
+    pub fn with_attenuation(self, air: &'a Air) -> Self {
+        Self { attenuation: Some(air), ..self }
+    }
+
+    /// The same with a directional source. Energies are then relative to the direct sound on its axis at 1 m.
+    #[must_use]
+    pub fn with_source(self, directivity: &'a Directivity, orientation: Orientation) -> Self {
+        Self { source: Some((directivity, orientation)), ..self }
+    }
+
+    /// The same with a directional receiver, of gain 1 on its axis.
+    #[must_use]
+    pub fn with_receiver(self, directivity: &'a Directivity, orientation: Orientation) -> Self {
+        Self { receiver: Some((directivity, orientation)), ..self }
+    }
+
+    /// That directivities, if they have bands, have those of the materials.
+    pub(crate) fn check_bands(&self, bands: Bands) -> Result<(), Error> {
+        for (directivity, _) in [self.source, self.receiver].into_iter().flatten() {
+            if let Some(own) = directivity.bands().filter(|&own| own != bands) {
+                return Err(Error::BandMismatch { left: bands, right: own });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,80 @@
+//! The same measurement with another room model.
+
+use super::MeasuredRoom;
+use crate::error::Error;
+use crate::measured_room::MaterialPrior;
+use crate::scene::{Receiver, Scene, Source};
+use sabine_acoustics::{Air, Error as ValueError, PerBand};
+
+impl MeasuredRoom {
+    /// The same measurement with another model of the room: materials, mesh, air and places may differ, names may not.
+    /// Further materials may follow those of the room; they are trusted as far as tables are
+    /// ([`MaterialPrior::TABLE_SD`]). Other priors and the responses stay as they are.
+    ///
+    /// # Errors
+    /// [`sabine_acoustics::Error::MaterialCount`] for fewer materials; [`sabine_acoustics::Error::UnknownId`] for materials, sources or receivers of other names or in
+    /// another order.
+    pub fn with_model(
+        &self,
+        scene: Scene,
+        air: Air,
+        sources: Vec<Source>,
+        receivers: Vec<Receiver>,
+    ) -> Result<Self, Error> {
+        let (expected, found) = (self.scene.materials().len(), scene.materials().len());
+        if expected > found {
+            return Err(ValueError::MaterialCount { expected, found }.into());
+        }
+        let names = |scene: &Scene| scene.materials().iter().map(|m| m.name.clone()).collect::<Vec<_>>();
+        let of_sources = |all: &[Source]| all.iter().map(|s| s.id.clone()).collect::<Vec<_>>();
+        let of_receivers = |all: &[Receiver]| all.iter().map(|r| r.id.clone()).collect::<Vec<_>>();
+        for (own, other) in [
+            (names(&self.scene), names(&scene)[..expected].to_vec()),
+            (of_sources(&self.sources), of_sources(&sources)),
+            (of_receivers(&self.receivers), of_receivers(&receivers)),
+        ] {
+            let missing = own.iter().enumerate().find(|(i, id)| other.get(*i) != Some(id));
+            if let Some(id) = missing.map(|(_, id)| id).or(other.get(own.len())) {
+                return Err(ValueError::UnknownId { id: id.clone() }.into());
+            }
+        }
+        let mut priors = self.priors.clone();
+        priors.extend(scene.materials()[expected..].iter().map(|more| {
+            let absorption = more.material.absorption().clone();
+            let absorption_sd = PerBand::uniform(absorption.bands(), MaterialPrior::TABLE_SD);
+            MaterialPrior { absorption: Some(absorption), absorption_sd }
+        }));
+        Ok(Self { scene, air, sources, receivers, priors, ..self.clone() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_may_move_but_not_change_their_names() {
+        let fixture = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/room");
+        let room = MeasuredRoom::read(fixture).unwrap();
+        let parts = || (room.scene().clone(), room.air(), room.sources().to_vec(), room.receivers().to_vec());
+        let (scene, air, mut sources, receivers) = parts();
+        sources[0].position_m[0] += 0.1;
+        let other = room.with_model(scene, air, sources.clone(), receivers).unwrap();
+        assert_eq!(other.sources(), sources);
+        assert_eq!(other.responses(), room.responses());
+        let (scene, air, sources, receivers) = parts();
+        let mut materials = scene.materials().to_vec();
+        materials.push(crate::NamedMaterial { name: "more".into(), ..materials[0].clone() });
+        let more = Scene::new(scene.vertices().to_vec(), scene.triangles().to_vec(), materials).unwrap();
+        let wider = room.with_model(more.clone(), air, sources.clone(), receivers.clone()).unwrap();
+        assert_eq!(wider.priors().len(), room.priors().len() + 1);
+        let fewer = wider.with_model(scene, air, sources, receivers);
+        assert!(matches!(fewer, Err(Error::Acoustics(ValueError::MaterialCount { .. }))));
+        let (scene, air, sources, mut receivers) = parts();
+        receivers.swap(0, 1);
+        let wrong = room.with_model(scene, air, sources, receivers);
+        assert!(
+            matches!(wrong, Err(Error::Acoustics(ValueError::UnknownId { id })) if id == room.receivers()[0].id)
+        );
+    }
+}

@@ -1,0 +1,18 @@
+//! Tests of `sabine-scene` from outside: one binary, a module for each subject.
+
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
+#[cfg(all(unix, feature = "rooms"))]
+mod faults;
+#[cfg(all(feature = "rooms", feature = "gltf"))]
+mod gltf_files;
+#[cfg(target_os = "linux")]
+mod hostile_sizes;
+#[cfg(feature = "rooms")]
+mod measured_rooms;
+mod obj_against_tobj;
+#[cfg(unix)]
+#[path = "../../../acoustics/tests/faults/process.rs"]
+mod process;
+#[cfg(feature = "rooms")]
+mod room_reading;

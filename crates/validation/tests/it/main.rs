@@ -1,0 +1,6 @@
+//! The programs behind the tables.
+
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
+#[cfg(target_os = "linux")] // memory is read from /proc
+mod soak;

@@ -1,0 +1,154 @@
+//! What the gate has no time for.
+
+use crate::error::Error;
+use crate::job::{Job, run_all};
+use crate::workspace::{Package, Workspace};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// Seconds that each reader of untrusted files is fuzzed.
+const FUZZ_S: u32 = 60;
+
+/// Installs the command as a user does, and runs it where nothing of the repository is.
+const INSTALL: &str = "set -e; root=$PWD/target/nightly_install; \
+    cargo install --path crates/cli --root \"$root\" --locked --quiet; \
+    empty=$(mktemp -d); cd \"$empty\"; \"$root/bin/sabine\" match; test -s out/match/report.html; rm -r \"$empty\"";
+
+/// Options of the nightly run.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Only the jobs whose names contain this
+    #[arg(long)]
+    only: Option<String>,
+    /// List the jobs and run none
+    #[arg(long)]
+    list: bool,
+}
+
+/// Runs the jobs.
+///
+/// # Errors
+/// [`Error::Failed`] names the jobs that failed.
+pub fn run(root: &Path, arguments: &Arguments) -> Result<(), Error> {
+    let workspace = Workspace::read(root)?;
+    let mut jobs = jobs(&workspace.packages, &fuzz_targets(root)?);
+    jobs.retain(|job| arguments.only.as_ref().is_none_or(|only| job.name.contains(only)));
+    if arguments.list {
+        for job in &jobs {
+            println!("{}", job.name);
+        }
+        return Ok(());
+    }
+    if jobs.is_empty() {
+        return Err(Error::Argument {
+            reason: "--only: no job has a name like this; --list lists them".into(),
+        });
+    }
+    run_all(root, &jobs)
+}
+
+fn jobs(packages: &[Package], fuzz_targets: &[String]) -> Vec<Job> {
+    let mut jobs = vec![
+        Job::cargo(
+            "every test in release, those that take long too",
+            &["test", "--workspace", "--release", "--no-fail-fast", "--", "--include-ignored"],
+        ),
+        Job::cargo("main example in release", &["run", "--release", "--example", "match_room"]),
+        Job::new("install, and run in an empty folder", "bash", &["-c", INSTALL]),
+    ];
+    jobs.extend(packages.iter().flat_map(feature_jobs));
+    jobs.extend(least_rust_jobs(packages));
+    for package in packages.iter().filter(|package| package.is_published()) {
+        let arguments = ["package", "--list", "--allow-dirty", "-p", &package.name];
+        jobs.push(Job::cargo(format!("package {}", package.name), &arguments));
+    }
+    for target in fuzz_targets {
+        let seconds = format!("-max_total_time={FUZZ_S}");
+        let arguments = [
+            "run",
+            "nightly",
+            "cargo",
+            "fuzz",
+            "run",
+            "--fuzz-dir",
+            "crates/testkit/fuzz",
+            target,
+            "--",
+            &seconds,
+        ];
+        let job = Job::new(format!("fuzz {target}"), "rustup", &arguments);
+        jobs.push(job.needs(&["rustup", "run", "nightly", "cargo", "fuzz", "--version"]));
+    }
+    jobs
+}
+
+/// A package without its default features, and with each of its features alone.
+fn feature_jobs(package: &Package) -> Vec<Job> {
+    let check = |name: String, more: &[&str]| {
+        let mut arguments = vec!["clippy", "--no-deps", "-p", &package.name, "--no-default-features"];
+        arguments.extend(more);
+        arguments.extend(["--", "-D", "warnings"]);
+        Job::cargo(name, &arguments)
+    };
+    let alone = package.features.keys().filter(|feature| *feature != "default");
+    let mut jobs = vec![check(format!("{} without features", package.name), &[])];
+    jobs.extend(alone.map(|feature| {
+        check(format!("{} with {feature} alone", package.name), &["--features", feature.as_str()])
+    }));
+    jobs
+}
+
+/// Libraries under the least Rust version that each states.
+fn least_rust_jobs(packages: &[Package]) -> Vec<Job> {
+    let mut by_version: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for package in packages.iter().filter(|package| package.is_published()) {
+        if let Some(version) = &package.rust_version {
+            by_version.entry(version).or_default().insert(&package.name);
+        }
+    }
+    let job = |(version, names): (&str, BTreeSet<&str>)| {
+        let mut arguments = vec!["run", version, "cargo", "check", "--lib"];
+        arguments.extend(names.iter().flat_map(|name| ["-p", *name]));
+        Job::new(format!("least Rust {version}"), "rustup", &arguments).needs(&[
+            "rustup",
+            "run",
+            version,
+            "cargo",
+            "--version",
+        ])
+    };
+    by_version.into_iter().map(job).collect()
+}
+
+/// Names of the fuzz targets: the programs of their manifest.
+fn fuzz_targets(root: &Path) -> Result<Vec<String>, Error> {
+    let path = root.join("crates/testkit/fuzz/Cargo.toml");
+    let manifest = std::fs::read_to_string(&path).map_err(Error::io(&path))?;
+    let programs = manifest.split("[[bin]]").skip(1);
+    let name = |entry: &str| Some(entry.split_once("name = \"")?.1.split_once('"')?.0.to_owned());
+    Ok(programs.filter_map(name).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::workspace::root;
+
+    #[test]
+    fn each_feature_each_published_package_and_each_least_version_has_a_job() {
+        let workspace = Workspace::read(&root()).unwrap();
+        let targets = fuzz_targets(&root()).unwrap();
+        let names: Vec<String> = jobs(&workspace.packages, &targets).into_iter().map(|j| j.name).collect();
+        for wanted in [
+            "sabine-propagate without features",
+            "sabine-propagate with sofa alone",
+            "package sabine-cli",
+            "least Rust 1.95",
+            "fuzz wav",
+            "fuzz room_toml",
+        ] {
+            assert!(names.iter().any(|name| name == wanted), "{wanted} is not among {names:?}");
+        }
+        assert!(!names.iter().any(|name| name == "package xtask" || name.ends_with("default alone")));
+    }
+}
