@@ -5,7 +5,7 @@ use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, DecayTerm, Effect, FittedCase, Parameter, Stage};
 use crate::extend::model_change::ModelChange;
 use crate::simulate::views::BandView;
-use crate::survey::{Survey, SurveyedResponse};
+use crate::survey::Survey;
 use std::f64::consts::{LN_10, PI};
 
 /// A smooth gain over the octaves for each response, the same in every time bin: a cosine series over the bands without its constant, the
@@ -15,6 +15,9 @@ use std::f64::consts::{LN_10, PI};
 /// Mark: residuals in dB that are flat over time and differ from response to response, each smooth over the octaves. Mimicked by: the
 /// gain of a channel (`channel_fault`), which is the same in all octaves; a directional source or microphone, whose late sound does not
 /// change. A channel exchanged with its neighbour's tells: its response goes with it.
+///
+/// One case for all channels together, and one for each channel alone: a single microphone that differs need not pay for the parameters of
+/// the others.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ChannelResponse;
 
@@ -39,43 +42,67 @@ impl Effect for ChannelResponse {
         if survey.responses().len() < 2 || terms(survey) == 0 {
             return Vec::new();
         }
-        let one = |response: usize| {
-            (1..=terms(survey)).map(move |k| {
-                let (name, sd_db) = (format!("cosine_{k}"), FIRST_SD_DB / k as f64);
-                Parameter::new(name, "dB", 0.0, sd_db, (-LARGEST_DB, LARGEST_DB))
-                    .typically(sd_db)
-                    .of_response(response, survey)
-            })
-        };
-        let parameters = (0..survey.responses().len()).flat_map(one).collect();
-        vec![Case::decay(parameters, *self).at(Stage::Transducer).changing(changes)]
+        let count = survey.responses().len();
+        let mut cases = vec![case((0..count).collect(), survey)];
+        // Of two, what one has the other lacks.
+        if count > 2 {
+            let alone = |r: usize| case(vec![r], survey).about(survey.responses()[r].name.clone());
+            cases.extend((0..count).map(alone));
+        }
+        cases
     }
+}
+
+/// Some channels with a response of their own.
+fn case(channels: Vec<usize>, survey: &Survey) -> Case {
+    let one = |response: &usize| {
+        let response = *response;
+        (1..=terms(survey)).map(move |k| {
+            let (name, sd_db) = (format!("cosine_{k}"), FIRST_SD_DB / k as f64);
+            Parameter::new(name, "dB", 0.0, sd_db, (-LARGEST_DB, LARGEST_DB))
+                .typically(sd_db)
+                .of_response(response, survey)
+        })
+    };
+    let parameters = channels.iter().flat_map(one).collect();
+    let own = OwnResponses { channels };
+    Case::decay(parameters, own.clone())
+        .at(Stage::Transducer)
+        .changing(move |fitted| changes(&own.channels, fitted))
 }
 
 fn terms(survey: &Survey) -> usize {
     (survey.bands().len() - 1).min(MAX_TERMS)
 }
 
-/// Gain of a response in a band, in dB.
-fn gain_db(values: &[f64], survey: &Survey, response: usize, band: usize) -> f64 {
-    let count = terms(survey);
-    let place = PI * (band as f64 + 0.5) / survey.bands().len() as f64;
-    let own = &values[response * count..(response + 1) * count];
+/// Gain in a band of a channel with these terms, in dB.
+fn gain_db(own: &[f64], bands: usize, band: usize) -> f64 {
+    let place = PI * (band as f64 + 0.5) / bands as f64;
     own.iter().zip(1..).map(|(c, k)| c * (f64::from(k) * place).cos()).sum()
 }
 
-fn changes(fitted: &FittedCase<'_>) -> Vec<ModelChange> {
-    let (values, survey) = (fitted.values(), fitted.survey());
-    let one = |(r, response): (usize, &SurveyedResponse)| ModelChange::ResponseBandGains {
-        response: response.name.clone(),
-        gain_db: fitted.per_band(|b| gain_db(values, survey, r, b)),
+fn changes(channels: &[usize], fitted: &FittedCase<'_>) -> Vec<ModelChange> {
+    let (survey, bands) = (fitted.survey(), fitted.survey().bands().len());
+    let own = fitted.values().chunks(terms(survey));
+    let one = |(r, own): (&usize, &[f64])| ModelChange::ResponseBandGains {
+        response: survey.responses()[*r].name.clone(),
+        gain_db: fitted.per_band(|b| gain_db(own, bands, b)),
     };
-    survey.responses().iter().enumerate().map(one).collect()
+    channels.iter().zip(own).map(one).collect()
 }
 
-impl DecayTerm for ChannelResponse {
+/// The channels that a case is about, in the order of its parameters.
+#[derive(Clone, Debug)]
+struct OwnResponses {
+    channels: Vec<usize>,
+}
+
+impl DecayTerm for OwnResponses {
     fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
-        let gain = gain_db(values, view.survey(), view.response(), view.band()) * LN_10 / 10.0;
+        let Some(place) = self.channels.iter().position(|c| *c == view.response()) else { return };
+        let (count, bands) = (terms(view.survey()), view.survey().bands().len());
+        let own = &values[place * count..(place + 1) * count];
+        let gain = gain_db(own, bands, view.band()) * LN_10 / 10.0;
         ln_energy.iter_mut().for_each(|l| *l += gain);
     }
 }
@@ -87,13 +114,18 @@ mod tests {
     use sabine_scene::{Levels, TimeZero};
 
     #[test]
-    fn gains_of_a_response_have_no_constant_and_are_its_own() {
-        let survey = hand_made::survey(Levels::Common, TimeZero::Emission);
-        let (bands, count) = (survey.bands().len(), terms(&survey));
-        let mut values = vec![0.0; 3 * count];
-        values[count] = 2.0;
-        let gains: Vec<f64> = (0..bands).map(|b| gain_db(&values, &survey, 1, b)).collect();
+    fn gains_of_a_response_have_no_constant_and_fall_in_the_first_term() {
+        let gains: Vec<f64> = (0..7).map(|b| gain_db(&[2.0], 7, b)).collect();
         assert!(gains.iter().sum::<f64>().abs() < 1e-12 && gains[0] > 1.0);
-        assert!((0..bands).all(|b| gain_db(&values, &survey, 2, b) == 0.0));
+        assert!(gains.windows(2).all(|w| w[1] < w[0]));
+    }
+
+    #[test]
+    fn one_case_for_all_channels_and_one_for_each() {
+        let survey = hand_made::survey(Levels::Common, TimeZero::Emission);
+        let cases = ChannelResponse.cases(&survey);
+        let subjects: Vec<Option<&str>> = cases.iter().map(|c| c.subject.as_deref()).collect();
+        assert_eq!(subjects, [None, Some("s0-r0"), Some("s0-r1"), Some("s0-r2")]);
+        assert_eq!(cases[0].parameters.len(), 3 * cases[1].parameters.len());
     }
 }
