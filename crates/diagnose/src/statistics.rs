@@ -2,6 +2,7 @@
 
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use wide::f64x4;
 
 /// Above this logarithm of the ratio of measured to predicted energy the negative log-likelihood grows linearly (Huber), so that
 /// outliers do not dominate.
@@ -102,6 +103,15 @@ pub(crate) fn bootstrap(groups: &[(f64, f64)], seed: u64) -> [f64; 2] {
     [ratios[BOOTSTRAP / 20], ratios[BOOTSTRAP - 1 - BOOTSTRAP / 20]]
 }
 
+/// Each value's exponential, four at a time: fits spend their time on these.
+pub(crate) fn exp_all(values: &mut [f64]) {
+    let mut fours = values.chunks_exact_mut(4);
+    for four in &mut fours {
+        four.copy_from_slice(&f64x4::new([four[0], four[1], four[2], four[3]]).exp().to_array());
+    }
+    fours.into_remainder().iter_mut().for_each(|x| *x = x.exp());
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -121,6 +131,20 @@ mod tests {
                 .sum();
             assert!((sum - 1.0).abs() < 1e-3, "{variance}: {sum}");
         }
+    }
+
+    #[test]
+    fn exponentials_of_all_are_those_of_each() {
+        let values: Vec<f64> =
+            (-350..=353).map(|i| 2.0 * f64::from(i) + 0.123).chain([0.0, -800.0, -1e6]).collect();
+        let mut found = values.clone();
+        exp_all(&mut found);
+        for (x, e) in values.iter().zip(found) {
+            assert!((e - x.exp()).abs() <= 1e-14 * x.exp(), "{x}: {e}");
+        }
+        let mut infinite = [f64::NEG_INFINITY; 5];
+        exp_all(&mut infinite);
+        assert_eq!(infinite, [0.0; 5]);
     }
 
     #[test]

@@ -88,50 +88,62 @@ impl<'a> ArrivalModel<'a> {
         self.terms.iter().filter_map(delay_s).sum()
     }
 
-    /// Time of an arrival in the file, and its change with each parameter that matters.
-    fn time(&self, values: &[f64], pair: usize, arrival: &Arrival, slopes: bool) -> (f64, Vec<(usize, f64)>) {
-        let response = &self.data.survey.responses[pair];
-        let speed = self.data.speed_m_s[pair];
-        let view = ArrivalView {
+    fn view(&self, pair: usize, arrival: &Arrival) -> ArrivalView<'_> {
+        ArrivalView {
             survey: self.data.survey,
             pair,
             length_m: arrival.length_m,
-            speed_m_s: speed,
+            speed_m_s: self.data.speed_m_s[pair],
             departure: arrival.departure,
             arrival: arrival.arrival,
-        };
+        }
+    }
+
+    /// Time of an arrival in the file.
+    fn time_s(&self, values: &[f64], pair: usize, arrival: &Arrival) -> f64 {
+        let response = &self.data.survey.responses[pair];
+        let speed = self.data.speed_m_s[pair];
         let source = self.layout.source(response.source).start;
         let receiver = self.layout.receiver(response.receiver).start;
         let latency = self.layout.latency(self.assignment[pair]);
-        let mut time_s = arrival.length_m / speed + values[latency] + self.effect_delay_s(values, &view);
-        let mut found = Vec::new();
+        let effects_s = self.effect_delay_s(values, &self.view(pair, arrival));
+        let mut time_s = arrival.length_m / speed + values[latency] + effects_s;
         for k in 0..3 {
             let (s, r) = (-arrival.departure[k] / speed, -arrival.arrival[k] / speed);
             time_s += s * values[source + k] + r * values[receiver + k];
-            if slopes {
-                found.push((source + k, s));
-                found.push((receiver + k, r));
+        }
+        time_s
+    }
+
+    /// Change of that time with each parameter that matters.
+    fn time_slopes(&self, values: &[f64], pair: usize, arrival: &Arrival) -> Vec<(usize, f64)> {
+        let response = &self.data.survey.responses[pair];
+        let speed = self.data.speed_m_s[pair];
+        let source = self.layout.source(response.source).start;
+        let receiver = self.layout.receiver(response.receiver).start;
+        let mut found = Vec::with_capacity(8 + 4 * self.terms.len());
+        for k in 0..3 {
+            found.push((source + k, -arrival.departure[k] / speed));
+            found.push((receiver + k, -arrival.arrival[k] / speed));
+        }
+        found.push((self.layout.latency(self.assignment[pair]), 1.0));
+        let view = self.view(pair, arrival);
+        for placed in &self.terms {
+            let Some(term) = placed.case.arrival_term() else { continue };
+            let mut own = placed.own(values).to_vec();
+            for i in 0..own.len() {
+                let (index, value) = (placed.first + i, own[i]);
+                let step = 1e-4 * self.priors[index].sd;
+                let mut at = |moved: f64| {
+                    own[i] = moved;
+                    term.delay_s(&own, &view)
+                };
+                let (later, earlier) = (at(value + step), at(value - step));
+                own[i] = value;
+                found.push((index, (later - earlier) / (2.0 * step)));
             }
         }
-        if slopes {
-            found.push((latency, 1.0));
-            for placed in &self.terms {
-                let Some(term) = placed.case.arrival_term() else { continue };
-                let mut own = placed.own(values).to_vec();
-                for i in 0..own.len() {
-                    let (index, value) = (placed.first + i, own[i]);
-                    let step = 1e-4 * self.priors[index].sd;
-                    let mut at = |moved: f64| {
-                        own[i] = moved;
-                        term.delay_s(&own, &view)
-                    };
-                    let (later, earlier) = (at(value + step), at(value - step));
-                    own[i] = value;
-                    found.push((index, (later - earlier) / (2.0 * step)));
-                }
-            }
-        }
-        (time_s, found)
+        found
     }
 
     fn pair_likelihood(&self, values: &[f64], pair: usize, mut slopes: Option<&mut Slopes>) -> f64 {
@@ -149,8 +161,8 @@ impl<'a> ArrivalModel<'a> {
                 }
             }
         };
-        let (time_s, found) = self.time(values, pair, direct, sloping);
-        let residual = measured.direct_s - time_s;
+        let residual = measured.direct_s - self.time_s(values, pair, direct);
+        let found = if sloping { self.time_slopes(values, pair, direct) } else { Vec::new() };
         let Some(width_s) = self.width_s else {
             push(&found, residual, direct_sd_s, 1.0);
             return -0.5 * (residual / direct_sd_s).powi(2);
@@ -165,17 +177,19 @@ impl<'a> ArrivalModel<'a> {
         if amplitude <= 0.0 {
             return value;
         }
-        let times: Vec<(f64, Vec<(usize, f64)>)> =
-            later.iter().map(|a| self.time(values, pair, a, sloping)).collect();
+        let times_s: Vec<f64> = later.iter().map(|a| self.time_s(values, pair, a)).collect();
+        // Slopes of those that are some peak's partner: few are.
+        let mut own_slopes: Vec<Option<Vec<(usize, f64)>>> = vec![None; later.len()];
         let more = self.added(values, pair);
         let each = SEEN_SHARE / measured.peaks_s.len().max(1) as f64;
         let rest = 1.0 - each * more.len() as f64;
         for (peak, height_db) in measured.peaks_s.iter().zip(&measured.peaks_db) {
             let densities: Vec<f64> = later
                 .iter()
-                .zip(&times)
-                .map(|(a, (t, _))| {
-                    rest * (1.0 - STRAY_SHARE) * a.energy.sqrt() / amplitude * normal(peak - t, sd)
+                .zip(&times_s)
+                .map(|(a, t)| match normal(peak - t, sd) {
+                    0.0 => 0.0,
+                    density => rest * (1.0 - STRAY_SHARE) * a.energy.sqrt() / amplitude * density,
                 })
                 .collect();
             // Heights of other peaks say nothing: anything down to the floor is as probable.
@@ -190,10 +204,15 @@ impl<'a> ArrivalModel<'a> {
             let stray = rest * STRAY_SHARE / PEAKS_S;
             let total = densities.iter().sum::<f64>() + added.iter().sum::<f64>() + stray;
             value += total.ln();
-            for (density, (t, found)) in densities.iter().zip(&times) {
+            if !sloping {
+                continue;
+            }
+            for (i, density) in densities.iter().enumerate() {
                 let share = density / total;
                 if share > 1e-3 {
-                    push(found, peak - t, sd, share);
+                    let found =
+                        own_slopes[i].get_or_insert_with(|| self.time_slopes(values, pair, &later[i]));
+                    push(found, peak - times_s[i], sd, share);
                 }
             }
             for (density, m) in added.iter().zip(&more) {

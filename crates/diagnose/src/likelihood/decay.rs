@@ -18,7 +18,7 @@ use crate::simulate::reflection_reweighting::HitChanges;
 use crate::simulate::tables::Tables;
 use crate::simulate::traced_pair::BandState;
 use crate::simulate::views::BandView;
-use crate::statistics::{HUBER_LOG_RATIO, log_density, median};
+use crate::statistics::{HUBER_LOG_RATIO, exp_all, log_density, median};
 use crate::survey::Survey;
 use rayon::prelude::*;
 use sabine_scene::Levels;
@@ -152,12 +152,15 @@ impl<'a> EnergyModel<'a> {
             }
         };
         effects(true, view, ln_energy);
-        let mut sums: Vec<f64> = ln_energy.iter().map(|l| view.state.own_share * l.exp()).collect();
+        let mut sums = ln_energy.to_vec();
+        exp_all(&mut sums);
+        sums.iter_mut().for_each(|s| *s *= view.state.own_share);
         for (band, share, leak) in &view.state.leaks {
             let mut leak: Vec<f64> = leak[..sums.len()].iter().map(|l| l + gain_db * LN_PER_DB).collect();
             let reference = self.data.reference[*band];
             effects(true, &BandView { band: *band, reference, ..*view }, &mut leak);
-            sums.iter_mut().zip(&leak).for_each(|(s, l)| *s += share * l.exp());
+            exp_all(&mut leak);
+            sums.iter_mut().zip(&leak).for_each(|(s, l)| *s += share * l);
         }
         ln_energy.iter_mut().zip(&sums).for_each(|(l, s)| *l = s.max(1e-300).ln());
         effects(false, view, ln_energy);
@@ -188,30 +191,34 @@ impl<'a> EnergyModel<'a> {
             .collect();
         let moved = shift.iter().any(|s| *s != 0.0);
         let gain = self.gain_db(values, pair) * LN_PER_DB;
+        let mut group_energy = state.group_energy[..state.groups[count]].to_vec();
+        if moved {
+            let hits = state.group_hits.chunks_exact(m);
+            let mut changes: Vec<f64> = hits
+                .take(group_energy.len())
+                .map(|hits| hits.iter().zip(&shift).map(|(n, s)| n * s).sum())
+                .collect();
+            exp_all(&mut changes);
+            group_energy.iter_mut().zip(&changes).for_each(|(e, change)| *e *= change);
+        }
         let mut ln_energy = Vec::with_capacity(count);
         let mut slopes = Vec::with_capacity(if sloping { count * m } else { 0 });
         let mut mean_hits = vec![0.0; m];
         for bin in 0..count {
-            let mut energy = 0.0;
-            mean_hits.fill(0.0);
-            for group in state.groups[bin]..state.groups[bin + 1] {
-                let hits = &state.group_hits[group * m..(group + 1) * m];
-                let mut e = state.group_energy[group];
-                if moved {
-                    e *= hits.iter().zip(&shift).map(|(n, s)| n * s).sum::<f64>().exp();
-                }
-                energy += e;
-                if sloping {
-                    mean_hits.iter_mut().zip(hits).for_each(|(sum, n)| *sum += e * n);
-                }
-            }
+            let groups = state.groups[bin]..state.groups[bin + 1];
+            let energy: f64 = group_energy[groups.clone()].iter().sum();
             ln_energy.push(energy.ln() + gain);
-            if sloping {
-                slopes.extend(
-                    (0..m)
-                        .map(|k| -mean_hits[k] / (energy * (1.0 - values[self.layout.absorption(k, band)]))),
-                );
+            if !sloping {
+                continue;
             }
+            mean_hits.fill(0.0);
+            for group in groups {
+                let hits = &state.group_hits[group * m..(group + 1) * m];
+                mean_hits.iter_mut().zip(hits).for_each(|(sum, n)| *sum += group_energy[group] * n);
+            }
+            slopes.extend(
+                (0..m).map(|k| -mean_hits[k] / (energy * (1.0 - values[self.layout.absorption(k, band)]))),
+            );
         }
         (ln_energy, slopes)
     }

@@ -45,7 +45,8 @@ impl<'a> ArrivalModel<'a> {
                 arrival: added.arrival,
                 energy: 0.0,
             };
-            let (time_s, mut slopes) = self.time(values, pair, &arrival, true);
+            let time_s = self.time_s(values, pair, &arrival);
+            let mut slopes = self.time_slopes(values, pair, &arrival);
             let mut level_slopes = Vec::new();
             for index in range.clone() {
                 let step = 1e-4 * self.priors[index].sd;
@@ -81,8 +82,8 @@ impl<'a> ArrivalModel<'a> {
                     return Vec::new();
                 }
                 let amplitude: f64 = later.iter().map(|a| a.energy.sqrt()).sum();
-                let times: Vec<f64> = later.iter().map(|a| self.time(values, pair, a, false).0).collect();
-                let direct_s = self.time(values, pair, direct, false).0;
+                let times: Vec<f64> = later.iter().map(|a| self.time_s(values, pair, a)).collect();
+                let direct_s = self.time_s(values, pair, direct);
                 let measured = &self.data.measured[self.assignment[pair]];
                 let one = |peak: &f64| {
                     let explained: f64 = later
