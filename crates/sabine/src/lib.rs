@@ -98,6 +98,7 @@ pub use sabine_scene as scene;
 
 pub mod guide;
 
+mod clock;
 mod error;
 mod low_end;
 mod match_files;

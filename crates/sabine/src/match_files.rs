@@ -1,6 +1,7 @@
 //! The main job for files of any length: an hour of speech or of dry sound takes no more memory than a minute.
 
-use crate::matching::{Clock, DrySound, Place, match_targets, path_tracer, warn_of_mesh};
+use crate::clock::Clock;
+use crate::matching::{DrySound, Place, match_targets, path_tracer, warn_of_mesh};
 use crate::recording::{ClipCounter, judge};
 use crate::room_renderer::RoomRenderer;
 use crate::{Error, MatchConfig, RoomMatch, Warning};

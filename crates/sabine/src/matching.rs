@@ -1,5 +1,8 @@
 //! The main job: from speech and a rough room to sound that belongs there.
 
+mod warnings;
+
+use crate::clock::Clock;
 use crate::low_end::{JoinedWaves, LowEnd};
 use crate::room_renderer::RoomRenderer;
 use crate::{Error, Recording, Warning};
@@ -13,8 +16,7 @@ use sabine_optimize::{AbsorptionPrior, FitConfig, FitProblem, MaterialFit, Mater
 use sabine_paths::{Conditions, Propagator};
 use sabine_propagate::{MeshReport, PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use sabine_scene::MeasuredRoom;
-use std::collections::BTreeMap;
-use std::time::Instant;
+use warnings::{warn_of_eq, warn_of_fit, warn_of_misses, warn_of_uncertain_eq};
 
 /// What to match: a recording, the room it was made in, and the sound to place there.
 #[derive(Clone, Copy, Debug)]
@@ -114,10 +116,6 @@ pub const DECAY_STEP_S: f64 = 0.005;
 const CORRECTIONS: usize = 3;
 /// The rendered response is close enough to its target when every reachable octave is this near.
 const CLOSE: f64 = 0.02;
-/// A reachable target missed by more than this is worth a warning: one just-noticeable difference (ISO 3382-1, Annex A).
-const MISSED: f64 = 0.05;
-/// Equalisation with a larger standard error says little: rooms differ by about 4 dB in an octave.
-const UNCERTAIN_EQ_DB: f64 = 4.0;
 /// Lowest rate of the matched sound in Hz: the 8 kHz octave ends at 11.2 kHz.
 const LOWEST_RATE_HZ: u32 = 32_000;
 /// Rate that replaces lower ones, in Hz.
@@ -252,9 +250,6 @@ pub(crate) struct DrySound<'a> {
     pub render: &'a Render<'a>,
 }
 
-/// Deviation of an octave's gain from the one wanted that is said, in dB: half of what is heard.
-const EQ_MISSED_DB: f64 = 0.5;
-
 /// Everything after listening.
 #[allow(clippy::too_many_arguments)] // the state of a match, handed on once
 pub(crate) fn match_targets(
@@ -388,65 +383,6 @@ fn corrected(
     off.then_some(next)
 }
 
-/// Octaves in which little more than the average of the training rooms is known.
-fn warn_of_uncertain_eq(eq_db: &PerBand<Estimate>, warnings: &mut Vec<Warning>) {
-    let uncertain = || eq_db.iter().filter(|(_, e)| e.standard_error > UNCERTAIN_EQ_DB);
-    let bands_hz: Vec<f64> = uncertain().map(|(hz, _)| hz).collect();
-    if !bands_hz.is_empty() {
-        let least_db = uncertain().map(|(_, e)| e.standard_error).fold(f64::INFINITY, f64::min);
-        warnings.push(Warning::EqUncertain { bands_hz, least_db });
-    }
-}
-
-/// Octaves whose rendered decay is not the one asked for although nothing stands in its way, or cannot be read.
-fn warn_of_misses(
-    target: &PerBand<Estimate>,
-    reached: &PerBand<Reading>,
-    fit: &MaterialFit,
-    warnings: &mut Vec<Warning>,
-) {
-    for ((band_hz, target), reached) in target.iter().zip(reached.values()) {
-        let stuck = fit.unreachable.iter().any(|u| u.band_hz == band_hz);
-        match reached {
-            Err(reason) => warnings.push(Warning::NotRead { band_hz, reason: reason.clone() }),
-            Ok(reached) if !stuck && (reached.value / target.value - 1.0).abs() > MISSED => {
-                warnings.push(Warning::Missed { band_hz, target_s: target.value, reached_s: reached.value });
-            }
-            Ok(_) => {}
-        }
-    }
-}
-
-/// What the fit finds worth knowing, one line for each material.
-fn warn_of_fit(fit: &MaterialFit, room: &MeasuredRoom, warnings: &mut Vec<Warning>) {
-    let mut far: BTreeMap<usize, (Vec<f64>, f64)> = BTreeMap::new();
-    for warning in &fit.warnings {
-        match warning {
-            sabine_optimize::Warning::FarFromPrior { material, band_hz, deviations } => {
-                let (bands_hz, largest) = far.entry(*material).or_default();
-                bands_hz.push(*band_hz);
-                *largest = largest.max(deviations.abs());
-            }
-            other => warnings.push(Warning::Fit(other.clone())),
-        }
-    }
-    for (material, (bands_hz, deviations)) in far {
-        let material = room.scene().materials()[material].name.clone();
-        warnings.push(Warning::FarFromTable { material, bands_hz, deviations });
-    }
-}
-
-/// Gains that the filter misses, because its solver has not met them or its impulse response is too short.
-fn warn_of_eq(filter: &EqFilter, warnings: &mut Vec<Warning>) {
-    for ((band_hz, &wanted_db), realised_db) in filter.wanted_db().iter().zip(filter.realised_db().values()) {
-        let Some(realised_db) = *realised_db else { continue };
-        let off_db = (realised_db - wanted_db).abs();
-        if off_db.is_nan() || off_db > EQ_MISSED_DB {
-            warnings.push(Warning::EqMissed { band_hz, wanted_db, realised_db });
-        }
-    }
-}
-
 /// What the filter must add to the simulation, kept within what is sensible.
 fn eq_gains(
     target_db: &PerBand<Estimate>,
@@ -481,26 +417,4 @@ fn decay_curves(response: &ImpulseResponse) -> Result<PerBand<EnergyDecayCurve>,
             band.chunks(step).map(|bin| bin.iter().map(|&s| f64::from(s) * f64::from(s)).sum()).collect();
         EnergyDecayCurve::from_energy(&energy, step as f64 / f64::from(rate))
     }))
-}
-
-/// Adds up what each stage takes.
-pub(crate) struct Clock {
-    since: Instant,
-    stages: Vec<(&'static str, f64)>,
-}
-
-impl Clock {
-    pub(crate) fn start() -> Self {
-        Self { since: Instant::now(), stages: Vec::new() }
-    }
-
-    pub(crate) fn lap(&mut self, stage: &'static str) {
-        let now = Instant::now();
-        let seconds = now.duration_since(self.since).as_secs_f64();
-        self.since = now;
-        match self.stages.iter_mut().find(|(name, _)| *name == stage) {
-            Some((_, sum)) => *sum += seconds,
-            None => self.stages.push((stage, seconds)),
-        }
-    }
 }

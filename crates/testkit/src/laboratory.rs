@@ -21,7 +21,9 @@
 //! References: J. B. Allen and D. A. Berkley, JASA 65 (1979) 943 (image sources); H. Kuttruff, *Room Acoustics*, 6th ed., 4.1 and 4.2
 //! (decay in a box of mirrors, density of images), 5.1 (scattering walls); ISO 9613-1:1993 (air).
 
+mod at_work;
 mod box_decay;
+mod columns;
 mod config;
 mod coupled_tail;
 mod distortion;
@@ -40,6 +42,7 @@ mod screened_room;
 mod steep_bands;
 mod stream;
 mod truth;
+mod typical;
 mod unfolded;
 
 pub use config::LabConfig;
@@ -48,7 +51,7 @@ pub use screened_room::{ScreenedConfig, ScreenedRoom};
 pub use truth::{TrueMaterial, TrueMicrophone, TrueSession, TrueSource, Truth};
 
 use box_decay::BoxDecay;
-use image_field::Columns;
+use columns::Columns;
 use noise::{BandEnergies, Noise};
 use random_room::Declared;
 use rayon::prelude::*;

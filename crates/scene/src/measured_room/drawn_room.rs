@@ -1,8 +1,9 @@
 //! A room without a mesh: drawn from a floor plan, a height and names of the material library.
 
 use super::file::{BandsTable, MaterialTable, RoomFile, RoomTable};
+use super::tables::DEFAULT_SCATTERING;
 use super::write::{obj, place, write_folder};
-use super::{DEFAULT_SCATTERING, MaterialPrior, MeasuredRoom};
+use super::{MaterialPrior, MeasuredRoom};
 use crate::error::Error;
 use crate::floor_plan::FloorPlan;
 use crate::scene::{NamedMaterial, Receiver, Scene, Source};

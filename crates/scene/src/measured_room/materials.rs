@@ -1,6 +1,7 @@
 //! Materials from file to file: one table for each, in one form of TOML.
 
 use super::file::{BandsTable, MaterialTable as FileTable};
+use super::tables;
 use super::{MaterialPrior, MeasuredRoom};
 use crate::error::Error;
 use sabine_acoustics::{Bands, Error as ValueError, Material, OutOfRange, PerBand, write_atomically};
@@ -174,12 +175,12 @@ impl Materials {
     fn parse(text: &str, path: &Path) -> Result<Self, Error> {
         let MaterialsFile { bands, materials } =
             toml::from_str(text).map_err(|source| Error::toml(path, text, source))?;
-        let bands = super::bands(&bands.centres_hz).map_err(|e| e.in_file(path, "bands.centres_hz"))?;
+        let bands = tables::bands(&bands.centres_hz).map_err(|e| e.in_file(path, "bands.centres_hz"))?;
         let mut order: Vec<(usize, String)> =
             materials.keys().map(|name| (name.span().start, name.get_ref().clone())).collect();
         order.sort();
         let by_name = materials.into_iter().map(|(name, table)| (name.into_inner(), table)).collect();
-        let (surfaces, mut priors) = super::materials(path, bands, &by_name)?;
+        let (surfaces, mut priors) = tables::materials(path, bands, &by_name)?;
         let table = |(_, name): (usize, String)| {
             let MaterialPrior { absorption, absorption_sd } = priors.remove(&name)?;
             let scattering = surfaces.get(&name)?.scattering().clone();

@@ -1,7 +1,7 @@
 //! The late decay of a second room, heard through an aperture.
 
+use super::columns::Columns;
 use super::hidden::Hidden;
-use super::image_field::Columns;
 use super::stream::{Purpose, stream};
 use super::truth::{Medium, Truth};
 use rand::Rng;

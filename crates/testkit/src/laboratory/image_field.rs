@@ -1,12 +1,13 @@
 //! What mirrors send: image sources, each with a sign of its own.
 
 use super::box_decay::BoxDecay;
+use super::columns::Columns;
 use super::local_reaction::LocalReaction;
 use super::panel::{self, Panel};
 use super::patch::{self, Patch};
 use super::stream::{Purpose, key, mix, unit};
 use super::truth::{Medium, Truth};
-use crate::filter::pulse;
+use super::unfolded::times_met;
 use std::f64::consts::PI;
 
 /// At least this many pulses stand for the images of one sample's duration, where there are more.
@@ -15,42 +16,6 @@ const PULSES_PER_SAMPLE: f64 = 4.0;
 const EXACT_PER_SAMPLE: f64 = 2.0;
 /// Images whose octaves have all fallen by this much are left out, in dB.
 const LEAST_DB: f64 = 85.0;
-
-/// Where the pulses of one response go: a column of samples for each band.
-pub(crate) struct Columns {
-    pub samples: Vec<Vec<f64>>,
-    /// Samples in a second of true time.
-    pub rate_hz: f64,
-    /// True time at the first sample.
-    pub start_s: f64,
-}
-
-impl Columns {
-    pub(crate) fn position(&self, time_s: f64) -> f64 {
-        (time_s - self.start_s) * self.rate_hz
-    }
-
-    pub(crate) fn add_exactly(&mut self, time_s: f64, amplitudes: &[f64]) {
-        let (first, values) = pulse(self.position(time_s));
-        for (column, amplitude) in self.samples.iter_mut().zip(amplitudes) {
-            for (i, value) in (first..).zip(values) {
-                if let Some(sample) = usize::try_from(i).ok().and_then(|i| column.get_mut(i)) {
-                    *sample += amplitude * value;
-                }
-            }
-        }
-    }
-
-    fn add_nearby(&mut self, time_s: f64, amplitudes: &[f64]) {
-        let at = self.position(time_s).round();
-        if at < 0.0 || at >= self.samples[0].len() as f64 {
-            return;
-        }
-        for (column, amplitude) in self.samples.iter_mut().zip(amplitudes) {
-            column[at as usize] += amplitude;
-        }
-    }
-}
 
 /// Adds all image sources of a pair.
 ///
@@ -159,22 +124,6 @@ fn add_images_of<const LANES: usize>(
             }
         }
     }
-}
-
-/// Energy that the walls leave to an image, from the logarithms of what each face mirrors.
-pub(crate) fn wall_energy(log_mirrored: &[f64; 6], index: [i64; 3]) -> f64 {
-    let one = |axis: usize| {
-        let [low, high] = times_met(index[axis]);
-        low * log_mirrored[2 * axis] + high * log_mirrored[2 * axis + 1]
-    };
-    (0..3).map(one).sum::<f64>().exp()
-}
-
-/// How often an image along one axis has met the lower wall and the upper one.
-fn times_met(index: i64) -> [f64; 2] {
-    // Beyond the upper wall an odd image has met that wall once more, and beyond the lower wall the lower.
-    let (more, fewer) = (index.unsigned_abs().div_ceil(2) as f64, (index.unsigned_abs() / 2) as f64);
-    if index > 0 { [fewer, more] } else { [more, fewer] }
 }
 
 /// The images of a source along one axis.

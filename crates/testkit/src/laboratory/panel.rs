@@ -4,11 +4,11 @@
 //! reflection at the panel and up to two at walls; and the images of up to two walls (and the direct sound) lose what the panel takes where they cross it.
 //! Later images stay as they are: what the panel takes from them it sends elsewhere in the room, the mean being the same.
 
-use super::image_field::Columns;
+use super::columns::Columns;
+use super::hidden::Hidden;
 use super::stream::{Purpose, key, mix};
 use super::truth::{Medium, Truth};
-use super::unfolded::{meetings, point};
-use super::{hidden::Hidden, image_field::wall_energy};
+use super::unfolded::{meetings, point, wall_energy};
 use sabine_acoustics::{Error, OutOfRange};
 
 /// Walls on the way to the panel and from it, at most.

@@ -1,6 +1,6 @@
 //! What rough walls send: particles in a box, and noise under the energy that they bring.
 
-use super::image_field::Columns;
+use super::columns::Columns;
 use super::stream::{Purpose, stream};
 use super::truth::{Medium, Truth};
 use rand::Rng;

@@ -1,10 +1,8 @@
 //! The room as it really is.
 
-use super::hidden::{End, Fault, Hidden};
-use super::panel::{self, Panel};
-use super::patch::Patch;
+use super::hidden::Hidden;
 use crate::own_air::{energy_exponent_per_m, speed_of_sound_m_s};
-use sabine_acoustics::{Air, Bands, Error, OutOfRange, write_atomically};
+use sabine_acoustics::{Air, Bands, Error, write_atomically};
 use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::path::Path;
@@ -190,154 +188,6 @@ impl Truth {
         (0..self.bands_hz.len()).map(|b| std::array::from_fn(|f| face(b, f))).collect()
     }
 
-    /// Refuses an effect that does not fit the room; those that are not here say so themselves ([`Hidden::apply`]).
-    pub(crate) fn check(&self, effect: &Hidden) -> Result<(), Error> {
-        let bands = self.bands_hz.len();
-        let each =
-            |field, values: &[f64], low, high, range| check_octaves(bands, field, values, (low, high), range);
-        let exists = |what, index: usize, count: usize| {
-            if index < count { Ok(()) } else { Err(Error::Index { what, index, count }) }
-        };
-        let responses = self.responses();
-        match effect {
-            Hidden::AirAbsorption { relative_humidity_percent } => Ok(OutOfRange::check(
-                "relative humidity (%)",
-                *relative_humidity_percent,
-                0.0,
-                100.0,
-                "between 0 and 100 %",
-            )?),
-            Hidden::SourceDirectivity { omni_share, axis } => {
-                each("omnidirectional share", omni_share, 0.0, 1.0, "between 0 and 1")?;
-                let square = axis.map_or(1.0, |a| a.iter().map(|c| c * c).sum());
-                Ok(OutOfRange::check("squared length of the axis", square, 0.999_999, 1.000_001, "1")?)
-            }
-            Hidden::Scattering { scattering } => each("scattering", scattering, 0.0, 1.0, "between 0 and 1"),
-            Hidden::SurfaceAbsorption { material, absorption } => {
-                exists("material", *material, self.materials.len())?;
-                each("absorption", absorption, 0.0, 0.99, "between 0 and 0.99")
-            }
-            Hidden::BackgroundNoise { levels_db } => {
-                each("noise level (dB)", levels_db, -300.0, 0.0, "between -300 and 0 dB")
-            }
-            Hidden::CoupledVolume { level_db, decay_s, critical_distance_m, rise_s, aperture_m } => {
-                OutOfRange::check(
-                    "level of the coupled volume (dB)",
-                    *level_db,
-                    -300.0,
-                    0.0,
-                    "between -300 and 0 dB",
-                )?;
-                each("decay time of the coupled volume (s)", decay_s, 0.05, 10.0, "between 0.05 and 10 s")?;
-                OutOfRange::check(
-                    "critical distance (m)",
-                    *critical_distance_m,
-                    0.0,
-                    100.0,
-                    "between 0 and 100 m",
-                )?;
-                OutOfRange::check("build-up (s)", *rise_s, 1e-4, 1.0, "between 0.0001 and 1 s")?;
-                Ok(aperture_m.iter().try_for_each(|&c| {
-                    OutOfRange::check("position of the aperture (m)", c, -1.0, 100.0, "near the room")
-                })?)
-            }
-            Hidden::Truncation { end_s, fade_s } => {
-                OutOfRange::check("end (s)", *end_s, 0.0, 100.0, "between 0 and 100 s")?;
-                Ok(OutOfRange::check("fade (s)", *fade_s, 0.0, *end_s, "between 0 and the end")?)
-            }
-            // The air says for itself what temperatures it takes.
-            Hidden::SoundSpeed { temperature_offset_k } => Air::new(
-                self.temperature_c + temperature_offset_k,
-                self.relative_humidity_percent,
-                self.pressure_kpa,
-            )
-            .map(|_| ()),
-            Hidden::SamplingClock { ppm } => {
-                Ok(OutOfRange::check("clock error (ppm)", *ppm, -2e4, 2e4, "between -20000 and 20000 ppm")?)
-            }
-            Hidden::RoomDimensions { scale } => Ok(scale.iter().try_for_each(|&s| {
-                OutOfRange::check("scale of the room", s, 0.8, 1.25, "between 0.8 and 1.25")
-            })?),
-            Hidden::PositionError { end, index, offset_m } => {
-                match end {
-                    End::Source => exists("source", *index, self.sources.len()),
-                    End::Receiver => exists("receiver", *index, self.receivers_m.len()),
-                }?;
-                Ok(offset_m
-                    .iter()
-                    .try_for_each(|&o| OutOfRange::check("offset (m)", o, -10.0, 10.0, "within 10 m"))?)
-            }
-            Hidden::TimeZero { latency_s } => {
-                Ok(OutOfRange::check("latency (s)", *latency_s, -0.1, 1.0, "between -0.1 and 1 s")?)
-            }
-            Hidden::ChannelFault { fault } => match *fault {
-                Fault::Polarity { response } => exists("response", response, responses),
-                Fault::Gain { response, gain_db } => {
-                    exists("response", response, responses)?;
-                    Ok(OutOfRange::check("gain (dB)", gain_db, -60.0, 60.0, "between -60 and 60 dB")?)
-                }
-                Fault::Swap { a, b } => {
-                    exists("response", a, responses).and_then(|()| exists("response", b, responses))
-                }
-            },
-            Hidden::ExtraReflector { centre_m, normal, size_m, reflectance } => {
-                each("reflectance", reflectance, 0.0, 1.0, "between 0 and 1")?;
-                panel::check(self, &Panel::new(*centre_m, *normal, *size_m, reflectance.clone()))
-            }
-            Hidden::OpenPatch { face, centre_m, size_m } => Patch::new(*face, *centre_m, *size_m).check(self),
-            Hidden::AngleDependentAbsorption { share } => {
-                Ok(OutOfRange::check("share of local reaction", *share, 0.0, 1.0, "between 0 and 1")?)
-            }
-            Hidden::NonlinearDistortion { sweep_s, from_hz, to_hz, quadratic, cubic, lead_in_s } => {
-                OutOfRange::check("length of the sweep (s)", *sweep_s, 0.1, 60.0, "between 0.1 and 60 s")?;
-                OutOfRange::check("first frequency (Hz)", *from_hz, 1.0, 20e3, "between 1 Hz and 20 kHz")?;
-                OutOfRange::check(
-                    "last frequency (Hz)",
-                    *to_hz,
-                    2.0 * from_hz,
-                    96e3,
-                    "an octave above the first",
-                )?;
-                for factor in [quadratic, cubic] {
-                    OutOfRange::check("factor of a power", *factor, -1.0, 1.0, "between -1 and 1")?;
-                }
-                Ok(OutOfRange::check("lead-in (s)", *lead_in_s, 0.0, 5.0, "between 0 and 5 s")?)
-            }
-            Hidden::RoomModes { below_hz } => Ok(OutOfRange::check(
-                "crossover of the modes (Hz)",
-                *below_hz,
-                0.0,
-                1000.0,
-                "between 0 and 1000 Hz",
-            )?),
-            Hidden::GainDrift { depth_db, period_s, phase_rad } => {
-                OutOfRange::check("depth (dB)", *depth_db, -40.0, 40.0, "between -40 and 40 dB")?;
-                OutOfRange::check("period (s)", *period_s, 1e-3, 100.0, "between 0.001 and 100 s")?;
-                Ok(OutOfRange::check("phase (rad)", *phase_rad, -100.0, 100.0, "between -100 and 100")?)
-            }
-            Hidden::Dropouts { gaps } => gaps.iter().try_for_each(|gap| {
-                exists("response", gap.response, responses)?;
-                OutOfRange::check("beginning of a gap (s)", gap.start_s, 0.0, 100.0, "between 0 and 100 s")?;
-                Ok(OutOfRange::check("length of a gap (s)", gap.length_s, 0.0, 10.0, "between 0 and 10 s")?)
-            }),
-            Hidden::ForeignChirp { start_s, length_s, from_hz, to_hz, level_db } => {
-                OutOfRange::check("beginning (s)", *start_s, 0.0, 100.0, "between 0 and 100 s")?;
-                OutOfRange::check("length (s)", *length_s, 1e-3, 10.0, "between 0.001 and 10 s")?;
-                for frequency_hz in [from_hz, to_hz] {
-                    OutOfRange::check(
-                        "frequency (Hz)",
-                        *frequency_hz,
-                        10.0,
-                        96e3,
-                        "between 10 Hz and 96 kHz",
-                    )?;
-                }
-                Ok(OutOfRange::check("level (dB)", *level_db, -300.0, 60.0, "between -300 and 60 dB")?)
-            }
-            _ => Ok(()),
-        }
-    }
-
     /// Whatever effects moved, places stay within the room: a position is worth little inside a wall.
     pub(crate) fn keep_inside(&mut self) {
         const MARGIN_M: f64 = 0.05;
@@ -348,21 +198,6 @@ impl Truth {
             }
         }
     }
-}
-
-/// Refuses a list that does not have a value within limits for each octave.
-pub(crate) fn check_octaves(
-    octaves: usize,
-    field: &'static str,
-    values: &[f64],
-    (low, high): (f64, f64),
-    range: &'static str,
-) -> Result<(), Error> {
-    let (expected, found) = (octaves, values.len());
-    if expected != found {
-        return Err(Error::BandCount { expected, found });
-    }
-    Ok(values.iter().try_for_each(|&v| OutOfRange::check(field, v, low, high, range))?)
 }
 
 /// What the air does.

@@ -41,6 +41,22 @@ pub(crate) fn meetings(truth: &Truth, receiver: [f64; 3], offset: [f64; 3]) -> V
     found
 }
 
+/// Energy that the walls leave to an image, from the logarithms of what each face mirrors.
+pub(crate) fn wall_energy(log_mirrored: &[f64; 6], index: [i64; 3]) -> f64 {
+    let one = |axis: usize| {
+        let [low, high] = times_met(index[axis]);
+        low * log_mirrored[2 * axis] + high * log_mirrored[2 * axis + 1]
+    };
+    (0..3).map(one).sum::<f64>().exp()
+}
+
+/// How often an image along one axis has met the lower wall and the upper one.
+pub(crate) fn times_met(index: i64) -> [f64; 2] {
+    // Beyond the upper wall an odd image has met that wall once more, and beyond the lower wall the lower.
+    let (more, fewer) = (index.unsigned_abs().div_ceil(2) as f64, (index.unsigned_abs() / 2) as f64);
+    if index > 0 { [fewer, more] } else { [more, fewer] }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -102,7 +102,7 @@ fn ID_is_found() {
 const LEFT: &str = r#"What is left:
 1. crates/diagnose/src/effects/ID.rs: the physics in place of a level, and every TODO.
 2. crates/testkit/src/laboratory/hidden.rs: a variant `Hidden::TYPE` that hides it by other physics, written without a look at the
-   fit; its name in `name` and `CATALOGUE`, its size in typical.rs.
+   fit; its name in `name` and `CATALOGUE`, its size in typical.rs, its range and what it changes of the truth in at_work.rs.
 3. The test in hidden_effects.rs: the `ignore` goes, the parameter must hold the truth; a room without it must not name it.
 4. docs/glossary.md: the row; CHANGELOG.md: a line.
 docs/how-to/own-effect.md says what must hold.

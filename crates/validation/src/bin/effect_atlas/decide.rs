@@ -1,7 +1,7 @@
 //! Whether the measurement that a set of causes asks for does decide between them.
 
 use crate::AnyError;
-use crate::trial::{Task, named};
+use crate::task::{Task, named};
 use rand::seq::IndexedRandom;
 use rand::{SeedableRng, rngs::SmallRng};
 use sabine::diagnose::{

@@ -6,6 +6,7 @@
 mod decide;
 mod sham;
 mod tables;
+mod task;
 mod trial;
 
 use clap::Parser;
@@ -13,7 +14,8 @@ use sabine::diagnose::DiagnoseConfig;
 use sabine_testkit::Hidden;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use trial::{Task, Trial};
+use task::Task;
+use trial::Trial;
 
 type AnyError = Box<dyn std::error::Error + Send + Sync>;
 

@@ -2,36 +2,11 @@
 
 use crate::AnyError;
 use crate::decide;
-use crate::sham::{IDS, Sham};
-use sabine::acoustics::Bands;
-use sabine::diagnose::{Cause, DiagnoseConfig, Diagnoser, Diagnosis, Verdict, catalogue};
-use sabine::scene::TimeZero;
+use crate::task::{Task, named};
+use sabine::diagnose::{Cause, Diagnosis, Verdict};
 use sabine_testkit::{Fault, Hidden, LabConfig, Laboratory};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-
-/// What is to be diagnosed.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Task {
-    /// Effects to hide; none in a null room.
-    pub hidden: Vec<String>,
-    pub strength: f64,
-    pub seed: u64,
-    pub receivers: usize,
-    pub sources: usize,
-    pub sample_rate_hz: u32,
-    /// Sessions in air of their own.
-    pub sessions: usize,
-    /// Bands in an octave: 1 or 3.
-    pub bands_per_octave: usize,
-    pub rays: usize,
-    pub range_db: f64,
-    pub position_sd_m: f64,
-    /// Effects without meaning that stand beside the catalogue.
-    pub shams: usize,
-    /// Whether a set is followed up by the measurement that it asks for, and by another.
-    pub decide: bool,
-}
 
 /// How the answer stands to the truth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -106,11 +81,6 @@ fn usual_rate() -> u32 {
 }
 
 impl Task {
-    /// Name of what is hidden, as the record has it.
-    pub fn name(&self) -> String {
-        if self.hidden.is_empty() { "none".to_owned() } else { self.hidden.join("+") }
-    }
-
     /// Whether a record holds this task.
     pub fn is_done(&self, trials: &[Trial]) -> bool {
         trials.iter().any(|t| {
@@ -120,48 +90,6 @@ impl Task {
                 && (t.sources, t.sample_rate_hz, t.sessions, t.bands_per_octave)
                     == (self.sources, self.sample_rate_hz, self.sessions, self.bands_per_octave)
         })
-    }
-
-    fn lab(&self) -> Result<LabConfig, AnyError> {
-        // A recording that begins before the emission must say so.
-        let early = self.hidden.iter().any(|id| id == "nonlinear_distortion");
-        let time_zero = if early { TimeZero::Common } else { TimeZero::Emission };
-        let all =
-            if self.bands_per_octave == 1 { Bands::T60 } else { Bands::third_octaves(100.0, 10_000.0)? };
-        let highest = (0..all.len()).rfind(|&b| 2.0 * all.edges_hz(b).1 <= f64::from(self.sample_rate_hz));
-        let highest = highest.ok_or("the sample rate leaves no band")?;
-        Ok(LabConfig {
-            seed: self.seed,
-            sources: self.sources,
-            receivers: self.receivers,
-            sessions: self.sessions,
-            sample_rate_hz: self.sample_rate_hz,
-            bands: all.part(0..highest + 1),
-            time_zero,
-            ..LabConfig::default()
-        })
-    }
-
-    /// Hides the effects in a room and diagnoses it. The folder is used for the room and cleared afterwards.
-    pub fn diagnose(
-        &self,
-        lab: &Laboratory,
-        hidden: &[Hidden],
-        folder: &Path,
-    ) -> Result<Diagnosis, AnyError> {
-        let room = lab.write(hidden, folder, None)?;
-        let config = DiagnoseConfig {
-            rays: self.rays,
-            range_db: self.range_db,
-            position_sd_m: self.position_sd_m,
-            seed: self.seed,
-            ..DiagnoseConfig::default()
-        };
-        let mut effects = catalogue();
-        effects.extend((0..self.shams.min(IDS.len())).map(|n| Box::new(Sham::new(n)) as _));
-        let found = Diagnoser::new(config)?.with_effects(effects).diagnose(&room, &[], &())?;
-        std::fs::remove_dir_all(folder)?;
-        Ok(found)
     }
 
     /// Hides, diagnoses and compares.
@@ -229,13 +157,6 @@ impl Task {
             other_decides: follow_up.as_ref().map(|f| f.other.1),
         })
     }
-}
-
-pub fn named(found: &Diagnosis) -> Vec<&str> {
-    let mut named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
-    named.sort_unstable();
-    named.dedup();
-    named
 }
 
 fn answer(found: &Diagnosis) -> String {

@@ -1,26 +1,55 @@
 //! Effects as they occur, by strength.
 
-use super::{End, Fault, Gap, Hidden};
-use crate::laboratory::Laboratory;
-use crate::laboratory::box_decay::BoxDecay;
-use crate::laboratory::missing_surfaces;
-use crate::laboratory::modal_field;
-use crate::laboratory::random_room::face_areas_m2;
-use crate::laboratory::truth::Truth;
+use super::Laboratory;
+use super::box_decay::BoxDecay;
+use super::hidden::{End, Fault, Gap, Hidden};
+use super::missing_surfaces;
+use super::modal_field;
+use super::random_room::face_areas_m2;
+use super::stream::{Purpose, stream};
+use super::truth::Truth;
 use rand::Rng;
 use rand::seq::SliceRandom;
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
-use sabine_acoustics::Error;
+use sabine_acoustics::{Error, OutOfRange};
+
+impl Hidden {
+    /// An effect of a strength: 1 is a strong, plain case, 0 leaves the effect out, and what lies between is proportionate (levels:
+    /// proportionate in amplitude; faults of polarity and order: there or not there). Signs and details follow from the seed.
+    ///
+    /// The id is one of [`Hidden::CATALOGUE`] or [`Hidden::OUTSIDE`]; `channel_fault.polarity`, `channel_fault.gain` and
+    /// `channel_fault.swap` ask for one kind.
+    ///
+    /// # Errors
+    /// [`Error::UnknownId`]; [`Error::OutOfRange`] for a strength outside 0 to 3; [`Error::Length`] for a swap where there is one
+    /// response only.
+    pub fn random(id: &str, strength: f64, lab: &Laboratory, seed: u64) -> Result<Self, Error> {
+        OutOfRange::check("strength", strength, 0.0, 3.0, "between 0 and 3")?;
+        let mut random = stream(seed, Purpose::Effect, 0);
+        match id {
+            "receiver_directivity" => {
+                let share = strength * random.random_range(0.35..0.5);
+                let drawn: [f64; 3] = std::array::from_fn(|_| random.sample(StandardNormal));
+                let length = drawn.iter().map(|c| c * c).sum::<f64>().sqrt().max(1e-9);
+                let in_line = random.random::<bool>() && !lab.config().microphone_axes;
+                Ok(Self::ReceiverDirectivity {
+                    omni_share: vec![(1.0 - share).max(0.0); lab.null().bands_hz.len()],
+                    axis: in_line.then(|| drawn.map(|c| c / length)),
+                })
+            }
+            "channel_response" => {
+                let truth = lab.null();
+                let one = |_| smooth(&mut random, truth.bands_hz.len(), 4.0 * strength);
+                Ok(Self::ChannelResponse { gains_db: (0..truth.responses()).map(one).collect() })
+            }
+            _ => draw(id, strength, lab, seed, &mut random),
+        }
+    }
+}
 
 /// An effect of the catalogue, or one outside it, of a strength.
-pub(super) fn draw(
-    id: &str,
-    strength: f64,
-    lab: &Laboratory,
-    seed: u64,
-    r: &mut Pcg64Mcg,
-) -> Result<Hidden, Error> {
+fn draw(id: &str, strength: f64, lab: &Laboratory, seed: u64, r: &mut Pcg64Mcg) -> Result<Hidden, Error> {
     let truth = lab.null();
     let decay_s = decay_s(truth)?;
     Ok(match id {
@@ -254,7 +283,7 @@ fn tilted(truth: &Truth, value: impl Fn(f64) -> f64) -> Vec<f64> {
 }
 
 /// A smooth curve over bands between about plus and minus a depth.
-pub(super) fn smooth(r: &mut Pcg64Mcg, bands: usize, depth: f64) -> Vec<f64> {
+fn smooth(r: &mut Pcg64Mcg, bands: usize, depth: f64) -> Vec<f64> {
     let (phase, waves) = (std::f64::consts::TAU * unit(r), 0.6 + 0.7 * unit(r));
     let last = (bands.max(2) - 1) as f64;
     (0..bands).map(|b| depth * (phase + std::f64::consts::TAU * waves * b as f64 / last).sin()).collect()

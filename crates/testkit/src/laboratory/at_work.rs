@@ -1,0 +1,254 @@
+//! What an effect changes of the truth, if it fits the room.
+
+use super::hidden::{End, Fault, Hidden};
+use super::panel::{self, Panel};
+use super::patch::Patch;
+use super::truth::Truth;
+use sabine_acoustics::{Air, Error, OutOfRange};
+
+impl Hidden {
+    /// Changes the truth. What acts on samples only is looked up there by the stages that follow.
+    ///
+    /// # Errors
+    /// For an effect that does not fit the room.
+    pub(crate) fn apply(&self, truth: &mut Truth) -> Result<(), Error> {
+        check(truth, self)?;
+        match self {
+            Self::TransducerResponse { gains_db } => {
+                let octaves = truth.bands_hz.len();
+                check_octaves(octaves, "gain (dB)", gains_db, (-40.0, 40.0), "between -40 and 40 dB")?;
+                truth.source_gains_db.iter_mut().zip(gains_db).for_each(|(g, more)| *g += more);
+            }
+            Self::AirAbsorption { relative_humidity_percent } => {
+                truth.relative_humidity_percent = *relative_humidity_percent;
+            }
+            Self::SourceDirectivity { omni_share, axis } => {
+                for source in &mut truth.sources {
+                    source.omni_share.clone_from(omni_share);
+                    source.axis = axis.unwrap_or(source.axis);
+                }
+            }
+            Self::ReceiverDirectivity { omni_share, axis } => {
+                let octaves = truth.bands_hz.len();
+                check_octaves(octaves, "omnidirectional share", omni_share, (0.0, 1.0), "between 0 and 1")?;
+                let square = axis.map_or(1.0, |a| a.iter().map(|c| c * c).sum());
+                OutOfRange::check("squared length of the axis", square, 0.999_999, 1.000_001, "1")?;
+                for microphone in &mut truth.microphones {
+                    microphone.omni_share.clone_from(omni_share);
+                    microphone.axis = axis.unwrap_or(microphone.axis);
+                }
+            }
+            Self::ChannelResponse { gains_db } => {
+                let (expected, found) = (truth.responses(), gains_db.len());
+                if expected != found {
+                    return Err(Error::Length { expected, found });
+                }
+                for (own, more) in truth.channel_gains_db.iter_mut().zip(gains_db) {
+                    let range = "between -40 and 40 dB";
+                    check_octaves(own.len(), "gain of a channel (dB)", more, (-40.0, 40.0), range)?;
+                    own.iter_mut().zip(more).for_each(|(g, more)| *g += more);
+                }
+            }
+            Self::Scattering { scattering } => {
+                truth.materials.iter_mut().for_each(|m| m.scattering.clone_from(scattering));
+            }
+            Self::SurfaceAbsorption { material, absorption } => {
+                truth.materials[*material].absorption.clone_from(absorption);
+            }
+            Self::SoundSpeed { temperature_offset_k } => truth.temperature_c += temperature_offset_k,
+            Self::SamplingClock { ppm } => truth.clock_ppm += ppm,
+            Self::RoomDimensions { scale } => {
+                truth.size_m.iter_mut().zip(scale).for_each(|(l, s)| *l *= s);
+            }
+            Self::PositionError { end, index, offset_m } => {
+                let position = match end {
+                    End::Source => &mut truth.sources[*index].position_m,
+                    End::Receiver => &mut truth.receivers_m[*index],
+                };
+                position.iter_mut().zip(offset_m).for_each(|(c, o)| *c += o);
+            }
+            Self::TimeZero { latency_s } => {
+                truth.latencies_s.iter_mut().for_each(|l| *l += latency_s);
+            }
+            Self::NonlinearDistortion { lead_in_s, .. } => {
+                truth.latencies_s.iter_mut().for_each(|l| *l += lead_in_s);
+            }
+            Self::ChannelFault { fault: Fault::Polarity { response } } => {
+                truth.inverted[*response] = !truth.inverted[*response];
+            }
+            Self::ChannelFault { fault: Fault::Gain { response, gain_db } } => {
+                truth.gains_db[*response] += gain_db;
+            }
+            Self::ChannelFault { fault: Fault::Swap { .. } }
+            | Self::BackgroundNoise { .. }
+            | Self::CoupledVolume { .. }
+            | Self::Truncation { .. }
+            | Self::ExtraReflector { .. }
+            | Self::OpenPatch { .. }
+            | Self::AngleDependentAbsorption { .. }
+            | Self::RoomModes { .. }
+            | Self::GainDrift { .. }
+            | Self::Dropouts { .. }
+            | Self::ForeignChirp { .. } => {}
+        }
+        truth.effects.push(self.clone());
+        Ok(())
+    }
+}
+
+/// Refuses an effect that does not fit the room; those that are not here say so themselves ([`Hidden::apply`]).
+fn check(truth: &Truth, effect: &Hidden) -> Result<(), Error> {
+    let bands = truth.bands_hz.len();
+    let each =
+        |field, values: &[f64], low, high, range| check_octaves(bands, field, values, (low, high), range);
+    let exists = |what, index: usize, count: usize| {
+        if index < count { Ok(()) } else { Err(Error::Index { what, index, count }) }
+    };
+    let responses = truth.responses();
+    match effect {
+        Hidden::AirAbsorption { relative_humidity_percent } => Ok(OutOfRange::check(
+            "relative humidity (%)",
+            *relative_humidity_percent,
+            0.0,
+            100.0,
+            "between 0 and 100 %",
+        )?),
+        Hidden::SourceDirectivity { omni_share, axis } => {
+            each("omnidirectional share", omni_share, 0.0, 1.0, "between 0 and 1")?;
+            let square = axis.map_or(1.0, |a| a.iter().map(|c| c * c).sum());
+            Ok(OutOfRange::check("squared length of the axis", square, 0.999_999, 1.000_001, "1")?)
+        }
+        Hidden::Scattering { scattering } => each("scattering", scattering, 0.0, 1.0, "between 0 and 1"),
+        Hidden::SurfaceAbsorption { material, absorption } => {
+            exists("material", *material, truth.materials.len())?;
+            each("absorption", absorption, 0.0, 0.99, "between 0 and 0.99")
+        }
+        Hidden::BackgroundNoise { levels_db } => {
+            each("noise level (dB)", levels_db, -300.0, 0.0, "between -300 and 0 dB")
+        }
+        Hidden::CoupledVolume { level_db, decay_s, critical_distance_m, rise_s, aperture_m } => {
+            OutOfRange::check(
+                "level of the coupled volume (dB)",
+                *level_db,
+                -300.0,
+                0.0,
+                "between -300 and 0 dB",
+            )?;
+            each("decay time of the coupled volume (s)", decay_s, 0.05, 10.0, "between 0.05 and 10 s")?;
+            OutOfRange::check(
+                "critical distance (m)",
+                *critical_distance_m,
+                0.0,
+                100.0,
+                "between 0 and 100 m",
+            )?;
+            OutOfRange::check("build-up (s)", *rise_s, 1e-4, 1.0, "between 0.0001 and 1 s")?;
+            Ok(aperture_m.iter().try_for_each(|&c| {
+                OutOfRange::check("position of the aperture (m)", c, -1.0, 100.0, "near the room")
+            })?)
+        }
+        Hidden::Truncation { end_s, fade_s } => {
+            OutOfRange::check("end (s)", *end_s, 0.0, 100.0, "between 0 and 100 s")?;
+            Ok(OutOfRange::check("fade (s)", *fade_s, 0.0, *end_s, "between 0 and the end")?)
+        }
+        // The air says for itself what temperatures it takes.
+        Hidden::SoundSpeed { temperature_offset_k } => Air::new(
+            truth.temperature_c + temperature_offset_k,
+            truth.relative_humidity_percent,
+            truth.pressure_kpa,
+        )
+        .map(|_| ()),
+        Hidden::SamplingClock { ppm } => {
+            Ok(OutOfRange::check("clock error (ppm)", *ppm, -2e4, 2e4, "between -20000 and 20000 ppm")?)
+        }
+        Hidden::RoomDimensions { scale } => Ok(scale.iter().try_for_each(|&s| {
+            OutOfRange::check("scale of the room", s, 0.8, 1.25, "between 0.8 and 1.25")
+        })?),
+        Hidden::PositionError { end, index, offset_m } => {
+            match end {
+                End::Source => exists("source", *index, truth.sources.len()),
+                End::Receiver => exists("receiver", *index, truth.receivers_m.len()),
+            }?;
+            Ok(offset_m
+                .iter()
+                .try_for_each(|&o| OutOfRange::check("offset (m)", o, -10.0, 10.0, "within 10 m"))?)
+        }
+        Hidden::TimeZero { latency_s } => {
+            Ok(OutOfRange::check("latency (s)", *latency_s, -0.1, 1.0, "between -0.1 and 1 s")?)
+        }
+        Hidden::ChannelFault { fault } => match *fault {
+            Fault::Polarity { response } => exists("response", response, responses),
+            Fault::Gain { response, gain_db } => {
+                exists("response", response, responses)?;
+                Ok(OutOfRange::check("gain (dB)", gain_db, -60.0, 60.0, "between -60 and 60 dB")?)
+            }
+            Fault::Swap { a, b } => {
+                exists("response", a, responses).and_then(|()| exists("response", b, responses))
+            }
+        },
+        Hidden::ExtraReflector { centre_m, normal, size_m, reflectance } => {
+            each("reflectance", reflectance, 0.0, 1.0, "between 0 and 1")?;
+            panel::check(truth, &Panel::new(*centre_m, *normal, *size_m, reflectance.clone()))
+        }
+        Hidden::OpenPatch { face, centre_m, size_m } => Patch::new(*face, *centre_m, *size_m).check(truth),
+        Hidden::AngleDependentAbsorption { share } => {
+            Ok(OutOfRange::check("share of local reaction", *share, 0.0, 1.0, "between 0 and 1")?)
+        }
+        Hidden::NonlinearDistortion { sweep_s, from_hz, to_hz, quadratic, cubic, lead_in_s } => {
+            OutOfRange::check("length of the sweep (s)", *sweep_s, 0.1, 60.0, "between 0.1 and 60 s")?;
+            OutOfRange::check("first frequency (Hz)", *from_hz, 1.0, 20e3, "between 1 Hz and 20 kHz")?;
+            OutOfRange::check(
+                "last frequency (Hz)",
+                *to_hz,
+                2.0 * from_hz,
+                96e3,
+                "an octave above the first",
+            )?;
+            for factor in [quadratic, cubic] {
+                OutOfRange::check("factor of a power", *factor, -1.0, 1.0, "between -1 and 1")?;
+            }
+            Ok(OutOfRange::check("lead-in (s)", *lead_in_s, 0.0, 5.0, "between 0 and 5 s")?)
+        }
+        Hidden::RoomModes { below_hz } => Ok(OutOfRange::check(
+            "crossover of the modes (Hz)",
+            *below_hz,
+            0.0,
+            1000.0,
+            "between 0 and 1000 Hz",
+        )?),
+        Hidden::GainDrift { depth_db, period_s, phase_rad } => {
+            OutOfRange::check("depth (dB)", *depth_db, -40.0, 40.0, "between -40 and 40 dB")?;
+            OutOfRange::check("period (s)", *period_s, 1e-3, 100.0, "between 0.001 and 100 s")?;
+            Ok(OutOfRange::check("phase (rad)", *phase_rad, -100.0, 100.0, "between -100 and 100")?)
+        }
+        Hidden::Dropouts { gaps } => gaps.iter().try_for_each(|gap| {
+            exists("response", gap.response, responses)?;
+            OutOfRange::check("beginning of a gap (s)", gap.start_s, 0.0, 100.0, "between 0 and 100 s")?;
+            Ok(OutOfRange::check("length of a gap (s)", gap.length_s, 0.0, 10.0, "between 0 and 10 s")?)
+        }),
+        Hidden::ForeignChirp { start_s, length_s, from_hz, to_hz, level_db } => {
+            OutOfRange::check("beginning (s)", *start_s, 0.0, 100.0, "between 0 and 100 s")?;
+            OutOfRange::check("length (s)", *length_s, 1e-3, 10.0, "between 0.001 and 10 s")?;
+            for frequency_hz in [from_hz, to_hz] {
+                OutOfRange::check("frequency (Hz)", *frequency_hz, 10.0, 96e3, "between 10 Hz and 96 kHz")?;
+            }
+            Ok(OutOfRange::check("level (dB)", *level_db, -300.0, 60.0, "between -300 and 60 dB")?)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Refuses a list that does not have a value within limits for each octave.
+fn check_octaves(
+    octaves: usize,
+    field: &'static str,
+    values: &[f64],
+    (low, high): (f64, f64),
+    range: &'static str,
+) -> Result<(), Error> {
+    let (expected, found) = (octaves, values.len());
+    if expected != found {
+        return Err(Error::BandCount { expected, found });
+    }
+    Ok(values.iter().try_for_each(|&v| OutOfRange::check(field, v, low, high, range))?)
+}
