@@ -91,17 +91,6 @@ impl Cuboid {
         let room =
             |v: Vec3| -> Vec3 { std::array::from_fn(|i| (0..3).map(|k| v[k] * self.axes[k][i]).sum()) };
         let (from, to) = (local(source), local(receiver));
-        // What each face leaves of the specular energy, by octave; a black face leaves next to nothing.
-        let bands = materials.first().map_or(0, |m| m.material.bands().len());
-        let left: Vec<[f64; 6]> = (0..bands)
-            .map(|band| {
-                self.materials.map(|m| {
-                    let m = &materials[m as usize].material;
-                    let (a, s) = (m.absorption().values()[band], m.scattering().values()[band]);
-                    ((1.0 - a) * (1.0 - s)).max(1e-9).ln()
-                })
-            })
-            .collect();
         // Image number n along an axis: its distance from the receiver, and its reflections at the low and high faces.
         let along = |axis: usize, n: i64| {
             let side = self.high_m[axis] - self.low_m[axis];
@@ -122,6 +111,17 @@ impl Cuboid {
         };
         let reach: [i64; 3] =
             std::array::from_fn(|k| (max_length_m / (self.high_m[k] - self.low_m[k])).ceil() as i64 + 1);
+        let left = self.ln_left(materials);
+        // What the faces across an axis leave of each image along it, by octave: `[image][octave]`.
+        let left_along: [Vec<Vec<f64>>; 3] = std::array::from_fn(|axis| {
+            let of_image = |n: i64| {
+                let (low, high) = hits(n);
+                let (low, high) = (f64::from(low), f64::from(high));
+                left.iter().map(|l| low * l[2 * axis] + high * l[2 * axis + 1]).collect()
+            };
+            (-reach[axis]..=reach[axis]).map(of_image).collect()
+        });
+        let image = |axis: usize, n: i64| &left_along[axis][(n + reach[axis]) as usize];
         let mut found: Vec<(f32, [i64; 3])> = Vec::new();
         for i in -reach[0]..=reach[0] {
             let x = along(0, i);
@@ -130,35 +130,33 @@ impl Cuboid {
                 if flat > max_length_m * max_length_m {
                     continue;
                 }
+                let in_plane: Vec<f64> = image(0, i).iter().zip(image(1, j)).map(|(x, y)| x + y).collect();
                 for k in -reach[2]..=reach[2] {
                     let squared = flat + along(2, k).powi(2);
                     if squared > max_length_m * max_length_m {
                         continue;
                     }
-                    let faces = faces_of([i, j, k]);
-                    let kept = left
-                        .iter()
-                        .map(|l| l.iter().zip(faces).map(|(l, n)| l * f64::from(n)).sum::<f64>())
-                        .fold(f64::NEG_INFINITY, f64::max);
-                    found.push(((kept - squared.ln()) as f32, [i, j, k]));
+                    let kept = in_plane.iter().zip(image(2, k)).map(|(xy, z)| xy + z);
+                    found.push(((kept.fold(f64::NEG_INFINITY, f64::max) - squared.ln()) as f32, [i, j, k]));
                 }
             }
         }
         // Chances in proportion to amplitude, so that late arrivals, many and weak, keep some: one over the chance makes up for
         // those that are dropped, and sums of energy stay right in the mean.
         let chance = chance_unit(&found, most);
-        found.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let mut chains: HashMap<[u32; 6], u32> = HashMap::from([([0; 6], PathSet::DIRECT)]);
-        for (ln_energy, numbers) in found {
-            let kept = ((0.5 * f64::from(ln_energy)).exp() * chance).min(1.0);
+        let kept = |ln_energy: f32| ((0.5 * f64::from(ln_energy)).exp() * chance).min(1.0);
+        found.retain(|&(ln_energy, numbers)| {
+            let kept = kept(ln_energy);
             let place = numbers.map(|n| n as u64).iter().fold(seed, |sum, n| {
                 (sum ^ n.wrapping_mul(0x9E37_79B9_7F4A_7C15))
                     .rotate_left(23)
                     .wrapping_mul(0xD6E8_FEB8_6659_FD93)
             });
-            if kept < 1.0 && generator(seed, place).random::<f64>() >= kept {
-                continue;
-            }
+            kept >= 1.0 || generator(seed, place).random::<f64>() < kept
+        });
+        found.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut chains: HashMap<[u32; 6], u32> = HashMap::from([([0; 6], PathSet::DIRECT)]);
+        for (ln_energy, numbers) in found {
             let to_image: Vec3 = std::array::from_fn(|k| along(k, numbers[k]));
             let length_m = dot(to_image, to_image).sqrt();
             let arrival = scale(to_image, 1.0 / length_m);
@@ -168,7 +166,7 @@ impl Cuboid {
             let chain = self.chain(paths, &mut chains, faces_of(numbers));
             paths.push(Contribution {
                 length_m,
-                log_weight: -2.0 * length_m.ln() - kept.ln(),
+                log_weight: -2.0 * length_m.ln() - kept(ln_energy).ln(),
                 chain,
                 tail: PathSet::DIRECT,
                 departure: room(departure),
@@ -176,6 +174,19 @@ impl Cuboid {
                 batch: None,
             });
         }
+    }
+
+    /// Logarithm of what each face leaves of the specular energy, by octave; a black face leaves next to nothing.
+    fn ln_left(&self, materials: &[NamedMaterial]) -> Vec<[f64; 6]> {
+        let bands = materials.first().map_or(0, |m| m.material.bands().len());
+        let of_band = |band: usize| {
+            self.materials.map(|m| {
+                let m = &materials[m as usize].material;
+                let (a, s) = (m.absorption().values()[band], m.scattering().values()[band]);
+                ((1.0 - a) * (1.0 - s)).max(1e-9).ln()
+            })
+        };
+        (0..bands).map(of_band).collect()
     }
 
     /// The chain with so many reflections at each face. Their order has no bearing on energy: that with one reflection less at
