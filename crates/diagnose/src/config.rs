@@ -21,6 +21,9 @@ pub struct DiagnoseConfig {
     pub position_sd_m: f64,
     /// How well the gains of responses agree where the room file says that they are common or absolute, 0.01 to 10 dB.
     pub gain_sd_db: f64,
+    /// How well the level of one response in one octave can be predicted, all its bins alike: interference, a microphone's own response and
+    /// what stands near it, one standard deviation, 0.01 to 10 dB.
+    pub level_sd_db: f64,
     /// Logarithm of the odds (nats, after correction for the number tried) at which a cause is named, 0 to 50.
     pub naming_nats: f64,
     /// Probability of a lack of fit below which a misfit counts as real, 1e-6 to 0.5.
@@ -44,6 +47,7 @@ impl Default for DiagnoseConfig {
             range_db: 35.0,
             position_sd_m: 0.01,
             gain_sd_db: 0.4,
+            level_sd_db: 0.7,
             naming_nats: 3.0,
             significance: 0.01,
             most_causes: 3,
@@ -62,6 +66,7 @@ impl DiagnoseConfig {
             ("range_db", self.range_db, 20.0, 60.0, "between 20 and 60 dB"),
             ("position_sd_m", self.position_sd_m, 1e-4, 1.0, "between 0.1 mm and 1 m"),
             ("gain_sd_db", self.gain_sd_db, 0.01, 10.0, "between 0.01 and 10 dB"),
+            ("level_sd_db", self.level_sd_db, 0.01, 10.0, "between 0.01 and 10 dB"),
             ("naming_nats", self.naming_nats, 0.0, 50.0, "between 0 and 50"),
             ("significance", self.significance, 1e-6, 0.5, "between 0.000001 and 0.5"),
             ("most_causes", self.most_causes as f64, 1.0, 5.0, "between 1 and 5"),

@@ -47,7 +47,11 @@ pub(crate) fn confirm(
     let (baseline, config) = (search.baseline, &search.baseline.config);
     let started = Instant::now();
     let base = search.state(&[], None)?;
-    let mut state = search.state(&found.chosen, Some(&base))?;
+    // From the baseline another top may be reached than the search did: what then explains nothing is no cause.
+    let mut state = search.backward(search.state(&found.chosen, Some(&base))?)?;
+    for dropped in found.chosen.clone().into_iter().filter(|c| !state.chosen.contains(c)) {
+        found.drop(dropped);
+    }
     // Receivers that are held out have no say in what is named: causes are confirmed among the others.
     let in_turn = Folds::in_turn(&baseline.survey().responses, &search.used);
     let mut predicted = predict(search, &state, &in_turn, observer)?;

@@ -6,11 +6,12 @@ use crate::infer::baseline::Baseline;
 use crate::likelihood::decay::{BinResidual, WarmStart};
 use crate::likelihood::parameters::assignment;
 use crate::observe::observed_response::Measured;
-use crate::statistics::{median, poisson_tail, upper_tail};
+use crate::statistics::{chi_squared_tail, median, poisson_tail, upper_tail};
 use rand::SeedableRng;
-use rand_distr::{Distribution, Gamma};
+use rand_distr::{Distribution, Gamma, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
+use std::f64::consts::LN_10;
 
 /// A bin is odd if its energy is as improbable as a normal deviate beyond this.
 const ODD_SD: f64 = 4.5;
@@ -24,6 +25,19 @@ pub(crate) struct Lack {
     pub p_value: f64,
     /// Evidence for a smooth discrepancy, in nats.
     pub discrepancy_nats: f64,
+    /// The responses' own levels by octave.
+    pub levels: Levels,
+}
+
+/// How far the levels of responses by octave lie from what is predicted.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Levels {
+    /// Probability of as much by chance.
+    pub p_value: f64,
+    /// Root mean square, in dB.
+    pub rms_db: f64,
+    /// Pair and band of the largest.
+    pub largest: Option<(usize, usize)>,
 }
 
 /// Tests a fitted model: against a smooth discrepancy that all positions share, calibrated on measurements simulated from
@@ -52,7 +66,30 @@ pub(crate) fn test(
     let residuals = baseline.residuals(cases, fitted.values, &pairs);
     let odd = odd_bins(&residuals, baseline.survey().bands.len());
     let p_odd = poisson_tail(odd, ODD_BY_CHANCE);
-    Ok(Lack { p_value: (2.0 * smooth.min(p_odd)).min(1.0), discrepancy_nats })
+    let levels = levels(&residuals, &baseline.dispersion, baseline.config.level_sd_db);
+    // Three tests, corrected for their number (Bonferroni).
+    let p_value = (3.0 * smooth.min(p_odd).min(levels.p_value)).min(1.0);
+    Ok(Lack { p_value, discrepancy_nats, levels })
+}
+
+/// Whether the fitted levels of responses by octave scatter as what is known of them says (their prior's deviation in dB).
+fn levels(residuals: &[BinResidual], dispersion: &[f64], level_sd_db: f64) -> Levels {
+    let sd = level_sd_db * LN_10 / 10.0;
+    let (mut sum, mut squares, mut count, mut largest) = (0.0, 0.0, 0, (0.0, None));
+    for one in residuals.chunk_by(|a, b| (a.pair, a.band) == (b.pair, b.band)) {
+        let (level, place) = (one[0].level, (one[0].pair, one[0].band));
+        // A level is drawn towards zero by its prior: its variance is that share of the prior's.
+        let information: f64 = one.iter().map(|r| 1.0 / (r.variance * dispersion[r.band])).sum();
+        let share = information / (information + 1.0 / (sd * sd));
+        sum += level * level / (sd * sd * share);
+        squares += level * level;
+        count += 1;
+        if level.abs() > largest.0 {
+            largest = (level.abs(), Some(place));
+        }
+    }
+    let rms_db = (squares / f64::from(count.max(1))).sqrt() * 10.0 / LN_10;
+    Levels { p_value: chi_squared_tail(sum, f64::from(count)), rms_db, largest: largest.1 }
 }
 
 /// A measurement as the fitted model expects it.
@@ -62,9 +99,16 @@ fn simulate(baseline: &Baseline, cases: &[&Case], values: &[f64], number: u64) -
     let all: Vec<usize> = (0..baseline.pairs()).collect();
     let mut measured = baseline.observations.measured.clone();
     let assignment = assignment(baseline.pairs(), cases.iter().copied());
+    // Each response has a level of its own in each octave.
+    let mut level = (usize::MAX, 0, 0.0f64);
+    let level_sd = baseline.config.level_sd_db * LN_10 / 10.0;
     for r in baseline.residuals(cases, values, &all) {
+        if (level.0, level.1) != (r.pair, r.band) {
+            let deviate: f64 = StandardNormal.sample(&mut random);
+            level = (r.pair, r.band, level_sd * deviate);
+        }
         let shape = 1.0 / (r.variance * baseline.dispersion[r.band]);
-        let mean = r.ln_predicted.exp();
+        let mean = (r.ln_predicted + level.2).exp();
         let drawn = Gamma::new(shape, mean / shape).map_or(mean, |g| g.sample(&mut random));
         if let Some(energies) = &mut measured[assignment[r.pair]].energies[r.band] {
             energies[r.bin] = drawn;
@@ -78,7 +122,7 @@ pub(crate) fn odd_bins(residuals: &[BinResidual], bands: usize) -> usize {
     // Wilson and Hilferty 1931: the cube root of a Gamma variate is nearly normal.
     let deviate = |r: &BinResidual, spread: f64| {
         let ninth = r.variance * spread / 9.0;
-        ((r.ln_ratio / 3.0).exp() - 1.0 + ninth) / ninth.sqrt()
+        (((r.ln_ratio - r.level) / 3.0).exp() - 1.0 + ninth) / ninth.sqrt()
     };
     (0..bands)
         .map(|band| {
@@ -95,12 +139,34 @@ mod tests {
     use super::*;
 
     #[test]
+    fn levels_that_scatter_farther_than_is_known_of_them_are_no_chance() {
+        let found = |sd_db: f64| {
+            let one = |pair: usize| {
+                let level = sd_db * LN_10 / 10.0 * (1.9 * pair as f64).sin() * 2f64.sqrt();
+                (0..40).map(move |bin| BinResidual {
+                    pair,
+                    band: 0,
+                    bin,
+                    ln_ratio: level,
+                    level,
+                    ln_predicted: 0.0,
+                    variance: 0.1,
+                })
+            };
+            levels(&(0..30).flat_map(one).collect::<Vec<_>>(), &[1.0], 0.7)
+        };
+        assert!(found(0.6).p_value > 0.2 && (found(0.6).rms_db - 0.6).abs() < 0.05);
+        assert!(found(1.4).p_value < 1e-6);
+    }
+
+    #[test]
     fn a_bin_that_no_spread_of_its_band_explains_is_odd() {
         let bin = |bin: usize, ln_ratio: f64| BinResidual {
             pair: 0,
             band: 0,
             bin,
             ln_ratio,
+            level: 0.0,
             ln_predicted: 0.0,
             variance: 0.2,
         };

@@ -15,7 +15,7 @@ pub(crate) struct Compared {
     pub predicted: Vec<f64>,
 }
 
-/// All bands of some pairs under fitted values. Where the gain of a response means nothing, the predicted sum is that measured.
+/// All bands of some pairs under fitted values. Where the gain of a response means nothing, it is fitted to it.
 pub(crate) fn compare(
     baseline: &Baseline,
     cases: &[&Case],
@@ -26,15 +26,15 @@ pub(crate) fn compare(
     let data = baseline.energy_data();
     let model = EnergyModel::new(&data, cases, &used);
     let mut found = Vec::new();
+    let mut values = values.to_vec();
     for &pair in pairs {
+        if baseline.survey().measurement.levels == Levels::PerResponse {
+            model.fit_gain(&mut values, pair);
+        }
         for band in 0..baseline.survey().bands.len() {
             let Some(energies) = model.compared(pair, band) else { continue };
-            let mut predicted: Vec<f64> =
-                model.predicted(values, pair, band, energies.len()).iter().map(|l| l.exp()).collect();
-            if baseline.survey().measurement.levels == Levels::PerResponse {
-                let gain = energies.iter().sum::<f64>() / predicted.iter().sum::<f64>().max(1e-300);
-                predicted.iter_mut().for_each(|p| *p *= gain);
-            }
+            let predicted: Vec<f64> =
+                model.predicted(&values, pair, band, energies.len()).iter().map(|l| l.exp()).collect();
             let bins = baseline.simulation.states[pair][band].bins;
             found.push(Compared {
                 pair,

@@ -4,6 +4,7 @@
 //! the energy of band-limited noise is (Kuttruff, Room Acoustics, 6th ed., 3.5), and the prediction's own Monte-Carlo error makes it wider.
 
 mod fit;
+mod level_offset;
 #[cfg(test)]
 mod tests;
 mod variance;
@@ -18,7 +19,7 @@ use crate::simulate::reflection_reweighting::HitChanges;
 use crate::simulate::tables::Tables;
 use crate::simulate::traced_pair::BandState;
 use crate::simulate::views::BandView;
-use crate::statistics::{HUBER_LOG_RATIO, exp_all, log_density, median};
+use crate::statistics::{HUBER_LOG_RATIO, exp_all, median};
 use crate::survey::Survey;
 use rayon::prelude::*;
 use sabine_scene::Levels;
@@ -33,6 +34,10 @@ const FREE_GAIN_DB: f64 = 40.0;
 const STEP: f64 = 1e-4;
 /// Bins in which unknown gains are first read.
 const EARLY_BINS: usize = 8;
+/// A gain is looked for within so much of where early energies meet, in dB ...
+const GAIN_REACH_DB: f64 = 12.0;
+/// ... to this.
+const GAIN_STEP_DB: f64 = 0.01;
 /// Pairs whose likelihood one thread sums.
 const PAIRS_AT_ONCE: usize = 3;
 
@@ -52,6 +57,8 @@ pub(crate) struct EnergyData<'a> {
     /// What is known of it.
     pub priors: &'a [Vec<Prior>],
     pub gain_sd_db: f64,
+    /// How well the level of a response in one octave can be predicted, in dB.
+    pub level_sd_db: f64,
     /// Tables of the terms, by slot.
     pub tables: &'a [Tables],
     /// Factor by which variances exceed what is expected, by band.
@@ -77,6 +84,8 @@ pub(crate) struct BinResidual {
     pub bin: usize,
     /// Logarithm of measured over predicted energy.
     pub ln_ratio: f64,
+    /// What of it the level of the whole response in this octave makes.
+    pub level: f64,
     pub ln_predicted: f64,
     /// Expected relative variance, dispersion left out.
     pub variance: f64,
@@ -113,27 +122,49 @@ impl<'a> EnergyModel<'a> {
 
     /// Unknown gains begin where early energies meet: from tens of decibels off, steps would be many.
     fn start_gains(&self, values: &mut [f64]) {
-        let off_db = |pair: usize| {
-            let ratios: Vec<f64> = (0..self.data.survey.bands.len())
-                .filter_map(|band| {
-                    let energies = self.compared(pair, band)?;
-                    let count = energies.len().min(EARLY_BINS);
-                    let measured: f64 = energies[..count].iter().sum();
-                    let predicted: f64 =
-                        self.data.states[pair][band].ln_energy[..count].iter().map(|l| l.exp()).sum();
-                    (measured > 0.0 && predicted > 0.0).then(|| (measured / predicted).ln() / LN_PER_DB)
-                })
-                .collect();
-            median(ratios)
-        };
         let pairs: Vec<usize> = (0..self.assignment.len()).filter(|&p| self.used[p]).collect();
         if let Some(index) = self.layout.common_gain() {
-            values[index] = median(pairs.iter().map(|&p| off_db(p)).collect());
+            values[index] = median(pairs.iter().map(|&p| self.early_gain_db(p)).collect());
         } else if self.data.survey.measurement.levels == Levels::PerResponse {
             for pair in pairs {
-                values[self.layout.gain(self.assignment[pair])] = off_db(pair);
+                values[self.layout.gain(self.assignment[pair])] = self.early_gain_db(pair);
             }
         }
+    }
+
+    /// Early energy measured over that predicted of a pair, in dB: the median over the octaves.
+    fn early_gain_db(&self, pair: usize) -> f64 {
+        let ratios: Vec<f64> = (0..self.data.survey.bands.len())
+            .filter_map(|band| {
+                let energies = self.compared(pair, band)?;
+                let count = energies.len().min(EARLY_BINS);
+                let measured: f64 = energies[..count].iter().sum();
+                let predicted: f64 =
+                    self.data.states[pair][band].ln_energy[..count].iter().map(|l| l.exp()).sum();
+                (measured > 0.0 && predicted > 0.0).then(|| (measured / predicted).ln() / LN_PER_DB)
+            })
+            .collect();
+        median(ratios)
+    }
+
+    /// Fits the gain of one response, everything else staying as it is: where gains mean nothing, that of a response which was left out is
+    /// not known from the others, and what is added after the gain (noise) must be added to sound of the right level.
+    pub fn fit_gain(&self, values: &mut [f64], pair: usize) {
+        let index = self.layout.gain(self.assignment[pair]);
+        let bands = 0..self.data.survey.bands.len();
+        let mut at = |gain_db: f64| -> f64 {
+            values[index] = gain_db;
+            bands.clone().map(|band| self.band_likelihood(values, pair, band, None)).sum()
+        };
+        // Golden section (Kiefer 1953) about where early energies meet.
+        let golden = (5f64.sqrt() - 1.0) / 2.0;
+        let about = self.early_gain_db(pair);
+        let (mut low, mut high) = (about - GAIN_REACH_DB, about + GAIN_REACH_DB);
+        while high - low > GAIN_STEP_DB {
+            let (left, right) = (high - golden * (high - low), low + golden * (high - low));
+            if at(left) < at(right) { low = left } else { high = right }
+        }
+        at((low + high) / 2.0);
     }
 
     /// Where the parameters of the case with this number start.
@@ -276,17 +307,13 @@ impl<'a> EnergyModel<'a> {
             for band in 0..self.data.survey.bands.len() {
                 let Some(energies) = self.compared(pair, band) else { continue };
                 let predicted = self.predicted(values, pair, band, energies.len());
-                let silence = SILENCE * self.data.reference[band];
                 let variances = self.variances(values, pair, band, energies.len());
-                for (bin, (&e, &ln_predicted)) in energies.iter().zip(&predicted).enumerate() {
-                    found.push(BinResidual {
-                        pair,
-                        band,
-                        bin,
-                        ln_ratio: e.max(silence).ln() - ln_predicted,
-                        ln_predicted,
-                        variance: variances[bin],
-                    });
+                let ln_ratio = self.ln_ratio(band, energies, &predicted);
+                let shapes = self.shapes(band, &variances);
+                let level = level_offset::most_probable(&ln_ratio, &shapes, self.level_sd());
+                for (bin, (&ln_ratio, &ln_predicted)) in ln_ratio.iter().zip(&predicted).enumerate() {
+                    let variance = variances[bin];
+                    found.push(BinResidual { pair, band, bin, ln_ratio, level, ln_predicted, variance });
                 }
             }
         }
@@ -304,15 +331,14 @@ impl<'a> EnergyModel<'a> {
         let (paths, path_slopes) = self.paths(values, (pair, band), count, slopes.is_some());
         let mut predicted = paths.clone();
         self.apply(values, &view, gain_db, &mut predicted);
-        let silence = SILENCE * self.data.reference[band];
-        let dispersion = self.data.dispersion[band];
         let variances = self.variances(values, pair, band, count);
-        let shape = |bin: usize| 1.0 / (variances[bin] * dispersion);
-        let ln_ratio: Vec<f64> =
-            energies.iter().zip(&predicted).map(|(e, p)| e.max(silence).ln() - p).collect();
-        let one = |(bin, &z): (usize, &f64)| shape(bin) * log_density(z);
-        let likelihood: f64 = ln_ratio.iter().enumerate().map(one).sum();
+        let shapes = self.shapes(band, &variances);
+        let mut ln_ratio = self.ln_ratio(band, energies, &predicted);
+        let level_sd = self.level_sd();
+        let level = level_offset::most_probable(&ln_ratio, &shapes, level_sd);
+        let likelihood = level_offset::log_likelihood(&ln_ratio, &shapes, (level, level_sd));
         let value = likelihood + self.tops((pair, band), &variances);
+        ln_ratio.iter_mut().for_each(|z| *z -= level);
         let Some(slopes) = slopes else { return value };
 
         // Columns that matter in this band, and the change of the predicted logarithm with each.
@@ -343,7 +369,7 @@ impl<'a> EnergyModel<'a> {
             }
         }
         for bin in 0..count {
-            let weight = shape(bin);
+            let weight = shapes[bin];
             let pull = weight * (ln_ratio[bin].min(HUBER_LOG_RATIO).exp() - 1.0);
             for (i, &a) in columns.iter().enumerate() {
                 let slope = rows[i][bin];
@@ -360,8 +386,25 @@ impl<'a> EnergyModel<'a> {
                 }
             }
         }
+        level_offset::take_off(slopes, &columns, &rows, &shapes, level_sd);
         self.add_variance_slopes(values, (pair, band), &variances, &ln_ratio, slopes);
         value
+    }
+
+    /// Logarithm of measured over predicted energy in bins of a band.
+    fn ln_ratio(&self, band: usize, energies: &[f64], ln_predicted: &[f64]) -> Vec<f64> {
+        let silence = SILENCE * self.data.reference[band];
+        energies.iter().zip(ln_predicted).map(|(e, p)| e.max(silence).ln() - p).collect()
+    }
+
+    /// Shapes of the Gamma distributions of bins with these expected variances.
+    fn shapes(&self, band: usize, variances: &[f64]) -> Vec<f64> {
+        variances.iter().map(|v| 1.0 / (v * self.data.dispersion[band])).collect()
+    }
+
+    /// How well the level of a response in one octave can be predicted, as a logarithm of energy.
+    fn level_sd(&self) -> f64 {
+        self.data.level_sd_db * LN_PER_DB
     }
 
     /// How much of a change of the paths' energy comes through the effects.

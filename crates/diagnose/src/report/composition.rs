@@ -9,6 +9,7 @@ use crate::infer::candidates::EffectScore;
 use crate::infer::confirmation::Confirmation;
 use crate::infer::cross_validation::decay_curves;
 use crate::infer::isolability::isolability;
+use crate::infer::lack_of_fit::Levels;
 use crate::infer::prediction::compare;
 use crate::infer::search::{Search, State};
 use crate::infer::selection::Selection;
@@ -125,8 +126,16 @@ fn notes_on(search: &Search<'_>, confirmed: &Confirmation, first_dispersion: &[f
         scattered: first_dispersion.iter().any(|d| *d > WARN_DISPERSION),
         unseated: &confirmed.unseated,
         unconfirmed: &confirmed.unconfirmed,
+        levels: levels_in_words(search.baseline, &confirmed.lack_after.levels),
         at_bounds: &at_bounds,
     })
+}
+
+/// Levels by octave that scatter too far, and where most.
+fn levels_in_words(baseline: &Baseline, levels: &Levels) -> Option<(f64, String)> {
+    let (pair, band) = levels.largest.filter(|_| levels.p_value < baseline.config.significance)?;
+    let (name, hz) = (&baseline.survey().responses[pair].name, baseline.survey().bands.nominal_hz(band));
+    Some((levels.rms_db, format!("{name} at {hz} Hz")))
 }
 
 fn candidate_scores(

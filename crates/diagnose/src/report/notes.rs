@@ -20,6 +20,9 @@ pub(crate) struct Circumstances<'a> {
     pub unseated: &'a [&'a str],
     /// Causes that do not help at positions left out.
     pub unconfirmed: &'a [&'a str],
+    /// The responses' own levels by octave, where they scatter farther than chance lets them: root mean square in dB, and the response
+    /// and octave of the largest.
+    pub levels: Option<(f64, String)>,
     /// Selection causes, and their parameters that stand at the end of their range.
     pub at_bounds: &'a [(&'a str, Vec<String>)],
 }
@@ -54,6 +57,13 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
     }
     if about.verdict == Verdict::Explained && about.misfit_left {
         notes.push("A significant misfit is left that none of the named causes explains.".into());
+    }
+    if let Some((rms_db, largest)) = &about.levels {
+        notes.push(format!(
+            "Levels of single responses by octave lie {rms_db:.1} dB from the prediction (root mean square), farther than the {:.1} dB \
+             that are expected; most in {largest}.",
+            about.baseline.config.level_sd_db
+        ));
     }
     for (effect, parameters) in about.at_bounds {
         notes.push(format!(
