@@ -9,7 +9,7 @@
 //!
 //! # Seams
 //! - [`Effect`]: a cause of one's own, with its texts ([`EffectInfo`]). Its [`Case`]s are data; the [`Term`] of each says what it does to
-//!   a prediction, and [`Case::changing`] what it changes in the model: that is traced again and rendered, whoever wrote it.
+//!   a prediction, and [`Case::changing`] what it changes in the model: that is traced again and rendered, for effects of your own too.
 //! - [`SceneTracer`]: another tracer ([`Diagnoser::with_tracer`]); [`EachScene`] makes one of any
 //!   [`Propagator`](sabine_paths::Propagator).
 //!

@@ -49,7 +49,7 @@ pub struct SlopeEvaluation {
 
 impl SlopeEvaluation {
     /// The cost of band `band` of the materials for a target T60 in seconds; the scattering of `materials` is used, their
-    /// absorption is not. Several path sets (source-receiver pairs) count alike.
+    /// absorption is not. Several path sets (source-receiver pairs) have equal weight.
     ///
     /// # Errors
     /// For settings out of range, a target that is not positive, no paths, or materials that do not match the paths.

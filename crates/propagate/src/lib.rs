@@ -4,7 +4,7 @@
 //! [`PathSet`](sabine_paths::PathSet), in which absorption, air and speed of sound are still free. `sabine-optimize`
 //! fits materials to such paths; [`PressureRenderer`] turns them into a pressure response to convolve sound with,
 //! [`AmbisonicRenderer`] into one with directions, and [`HeadResponses`] that into what two ears hear. [`MovingTracer`] follows
-//! whoever moves. Directivity of source and receiver enters with the [`Conditions`](sabine_paths::Conditions) under which
+//! sources and listeners that move. Directivity of source and receiver enters with the [`Conditions`](sabine_paths::Conditions) under which
 //! paths are weighed or rendered. Plain arrays go in and out.
 //!
 //! Below about 2000 sqrt(T60 / V) Hz a room is a wave field, not rays (Schroeder 1962): there [`wave::WaveSolver`] solves the wave
@@ -64,8 +64,8 @@
 //! | image sources up to third order | equal to the formula for boxes | `tests/it/box_room.rs` |
 //! | decay curve of a mirror-like box to -40 dB | 0.2 dB with 40,000 rays | `tests/it/box_room.rs` |
 //! | T30 at scattering 0.1, 0.3, 0.5, 1 | within four standard errors of 1.493, 1.373, 1.359, 1.360 s | `tests/it/box_room.rs` |
-//! | rays from both ends against rays from one | equal in the mean, half the variance, also through a doorway | `tests/it/agreement.rs` |
-//! | octaves of different scattering in one trace | equal in the mean to a trace for each | `tests/it/agreement.rs` |
+//! | rays from both ends against rays from one | the same mean, half the variance, also through a doorway | `tests/it/agreement.rs` |
+//! | octaves of different scattering in one trace | the same mean as a trace for each | `tests/it/agreement.rs` |
 //! | T20, T30 measured on the rendered response | 3 % of the paths' own, 125 Hz to 4 kHz | `tests/it/rendering.rs` |
 //! | reverberation of a directional source | 1 / directivity factor, within three standard errors | `tests/it/directivity.rs` |
 //! | ambisonics: an exact path | its spherical harmonics in all channels | `tests/it/ambisonics.rs` |

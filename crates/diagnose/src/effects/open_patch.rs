@@ -11,7 +11,7 @@ use crate::simulate::views::BandView;
 use crate::survey::Survey;
 use crate::survey::planes::Plane;
 
-/// A rectangle of one surface swallows all sound: an open door or window, a duct, a curtain before a recess. One case for each flat
+/// A rectangle of one surface absorbs all sound: an open door or window, a duct, a curtain before a recess. One case for each flat
 /// surface of the mesh.
 ///
 /// Decays give the area (each meeting with the material survives with one less the share of its area); single first-order reflections

@@ -1,4 +1,4 @@
-//! `receiver_directivity`: the microphones do not hear alike in all directions.
+//! `receiver_directivity`: the microphones are more sensitive in some directions than in others.
 
 use crate::effect::EffectInfo;
 use crate::effect::next_measurement::NextMeasurement;

@@ -77,7 +77,7 @@ fn a_hole_in_a_wall_is_found_and_located() {
     let (low, high) = interval(&cause, "area");
     let truth = size_m[0] * size_m[1];
     assert!(low <= truth && truth <= high, "area: {truth} is not within {low} to {high}");
-    // It renders as a sheet that swallows all.
+    // It renders as a sheet that absorbs everything.
     assert_eq!(found.model.sheets.len(), 1);
     assert!((found.model.sheets[0].absorption - 1.0).abs() < 1e-12);
 }

@@ -108,7 +108,7 @@ impl PathSet {
     /// Appends the sampled paths of another set between the same surfaces as they would be had the source and the receiver moved
     /// by these displacements (m): to first order, a path grows by what its ends move against the directions in which it
     /// leaves and comes. None gets shorter than `least_length_m`, the distance of the new places. Each brings `share` of
-    /// its energy; exact paths stay behind, for they can be found anew.
+    /// its energy; exact paths stay behind, for they can be found again.
     ///
     /// # Panics
     /// If the sets have different numbers of materials.

@@ -1,6 +1,6 @@
-//! Tracers of the workspace against the checks that strangers' tracers are given, in one table.
+//! Tracers of the workspace under the conformance checks that are open to every tracer, in one table.
 //!
-//! `cargo test -p sabine-propagate --test conformance -- --nocapture` prints it.
+//! `cargo test -p sabine-propagate --test it conformance:: -- --nocapture` prints it.
 
 use sabine_acoustics::Error;
 use sabine_paths::conformance::check;

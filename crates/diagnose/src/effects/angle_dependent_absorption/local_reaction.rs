@@ -13,7 +13,7 @@ const HALVES: [i32; 5] = [-1, 0, 1, 2, 3];
 const OCTAVES: usize = 4;
 /// Place of none in the grid.
 const NO_SHARE: usize = 1;
-/// A wall of impedance cos(theta) swallows all; nothing real does (energy).
+/// A wall of impedance cos(theta) absorbs everything; no real one does (energy).
 const MIN_REFLECTED: f64 = 1e-3;
 /// Energy of a bin without paths, as a share of the strongest: it counts as nothing.
 const NOTHING: f64 = 1e-12;

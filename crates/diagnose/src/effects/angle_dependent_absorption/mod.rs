@@ -12,7 +12,7 @@ use crate::survey::Survey;
 use local_reaction::LocalReactionTable;
 
 /// All walls react locally by a share: the logarithm of what a wall reflects lies so far between that of its random-incidence absorption,
-/// the same at all angles, and that of the real impedance which has this absorption in the mean over all angles.
+/// the same at all angles, and that of the real impedance which has this absorption averaged over all angles.
 ///
 /// Mark: paths that graze the walls live longer, and those that meet them at some 50 to 70 degrees from the normal die sooner (a hard wall
 /// absorbs most near grazing and nothing at it), so that decays bend and differ between positions. Mimicked by: absorption, which is refitted beside it; an open patch or
