@@ -9,7 +9,7 @@ use crate::survey::Survey;
 use std::f64::consts::{LN_10, PI};
 
 /// A smooth gain over the octaves for each response, the same in every time bin: a cosine series over the bands without its constant, the
-/// k-th term cos(pi k (b + 1/2) / n) in band b of n with a prior that falls as 1 / k. The constant is the gain of the response, which every
+/// k-th term cos(pi k (b + 1/2) / n) in band b of n with a prior that falls as 1 / sqrt(k). The constant is the gain of the response, which every
 /// fit leaves open; what all responses share is `transducer_response`.
 ///
 /// Mark: residuals in dB that are flat over time and differ from response to response, each smooth over the octaves. Mimicked by: the
@@ -58,7 +58,7 @@ fn case(channels: Vec<usize>, survey: &Survey) -> Case {
     let one = |response: &usize| {
         let response = *response;
         (1..=terms(survey)).map(move |k| {
-            let (name, sd_db) = (format!("cosine_{k}"), FIRST_SD_DB / k as f64);
+            let (name, sd_db) = (format!("cosine_{k}"), FIRST_SD_DB / (k as f64).sqrt());
             Parameter::new(name, "dB", 0.0, sd_db, (-LARGEST_DB, LARGEST_DB))
                 .typically(sd_db)
                 .of_response(response, survey)
