@@ -11,10 +11,13 @@ fn lab(seed: u64, receivers: usize) -> Laboratory {
     Laboratory::new(LabConfig { seed, receivers, ..LabConfig::default() }).unwrap()
 }
 
+fn diagnoser() -> Diagnoser {
+    Diagnoser::new(DiagnoseConfig { rays: 1500, ..DiagnoseConfig::default() }).unwrap()
+}
+
 fn diagnose(room: &MeasuredRoom, hold_out: &[&str]) -> Result<Diagnosis, Error> {
-    let config = DiagnoseConfig { rays: 1500, ..DiagnoseConfig::default() };
     let hold_out: Vec<String> = hold_out.iter().map(ToString::to_string).collect();
-    Diagnoser::new(config).unwrap().diagnose(room, &hold_out, &())
+    diagnoser().diagnose(room, &hold_out, &())
 }
 
 fn notes_hold(found: &Diagnosis, words: &str) {
@@ -111,6 +114,19 @@ fn where_everything_is_wrong_nothing_is_called_adequate() {
     if found.verdict == Verdict::Explained {
         notes_hold(&found, "misfit is left");
     }
+}
+
+/// Microphones that each have a response of their own, and no effect at hand that says so.
+#[test]
+fn levels_that_no_effect_explains_are_not_put_down_to_chance() {
+    let folder = tempfile::tempdir().unwrap();
+    let lab = lab(547, 6);
+    let hidden = Hidden::random("channel_response", 1.0, &lab, 547).unwrap();
+    let room = lab.write(&[hidden], &folder.path().join("room"), None).unwrap();
+    let few = diagnoser().with_only(&["time_zero".to_owned()]).unwrap();
+    let found = few.diagnose(&room, &[], &()).unwrap();
+    assert_eq!(found.verdict, Verdict::Unexplained);
+    notes_hold(&found, "Levels of single responses by octave");
 }
 
 /// Tables and diagnosis in third octaves: a loudspeaker with a hollow that one octave would smear.
