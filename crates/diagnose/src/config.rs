@@ -47,7 +47,7 @@ impl Default for DiagnoseConfig {
             range_db: 35.0,
             position_sd_m: 0.01,
             gain_sd_db: 0.4,
-            level_sd_db: 0.5,
+            level_sd_db: 0.7,
             naming_nats: 3.0,
             significance: 0.01,
             most_causes: 3,

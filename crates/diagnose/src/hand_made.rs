@@ -129,7 +129,7 @@ impl Tables {
             absorption: &self.absorption,
             priors: &self.priors,
             gain_sd_db: 0.4,
-            level_sd_db: 0.5,
+            level_sd_db: 0.7,
             tables: &[],
             dispersion: &self.dispersion,
         }
