@@ -15,6 +15,7 @@ pub struct FittedCase<'a> {
     pub(crate) level_per_s: Vec<f64>,
     pub(crate) materials: &'a [Material],
     pub(crate) confirmed: Vec<usize>,
+    pub(crate) levels_db: Vec<Vec<f64>>,
 }
 
 impl<'a> FittedCase<'a> {
@@ -28,6 +29,7 @@ impl<'a> FittedCase<'a> {
             level_per_s: Vec::new(),
             materials: &[],
             confirmed: Vec::new(),
+            levels_db: Vec::new(),
         }
     }
 
@@ -65,6 +67,12 @@ impl<'a> FittedCase<'a> {
     /// Responses (indices) in which a peak was measured where the case adds a reflection.
     pub fn confirmed_responses(&self) -> &[usize] {
         &self.confirmed
+    }
+
+    /// Level of a response (index) in a band that every fit leaves open and this one found, in dB beside the prediction; zero where it was
+    /// not fitted.
+    pub fn level_db(&self, response: usize, band: usize) -> f64 {
+        self.levels_db.get(response).and_then(|bands| bands.get(band)).copied().unwrap_or(0.0)
     }
 
     /// One value for each band.

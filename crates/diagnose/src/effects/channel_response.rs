@@ -86,7 +86,8 @@ fn changes(channels: &[usize], fitted: &FittedCase<'_>) -> Vec<ModelChange> {
     let own = fitted.values().chunks(terms(survey));
     let one = |(r, own): (&usize, &[f64])| ModelChange::ResponseBandGains {
         response: survey.responses()[*r].name.clone(),
-        gain_db: fitted.per_band(|b| gain_db(own, bands, b)),
+        // What the terms leave to the level of this response in the octave is its channel's, too.
+        gain_db: fitted.per_band(|b| gain_db(own, bands, b) + fitted.level_db(*r, b)),
     };
     channels.iter().zip(own).map(one).collect()
 }

@@ -5,6 +5,7 @@ use crate::extend::extended_model::ExtendedModel;
 use crate::extend::model_change::ModelChange;
 use crate::infer::search::{Search, State};
 use crate::likelihood::arrivals;
+use crate::likelihood::parameters::assignment;
 use crate::report::found_parameters::{parameters, place_of};
 
 /// A reflection is confirmed by a peak within this of its instant, in seconds.
@@ -58,8 +59,22 @@ pub(crate) fn changes(search: &Search<'_>, state: &State, candidate: usize) -> V
         level_per_s: (0..survey.bands.len()).map(level_per_s).collect(),
         materials: &baseline.simulation.materials,
         confirmed: case.reflection_term().map_or_else(Vec::new, |_| confirmed(search, state)),
+        levels_db: levels_db(search, state),
     };
     case.model_changes(&fitted)
+}
+
+/// Levels that the fit found beside the prediction, `[response][band]`, in dB.
+fn levels_db(search: &Search<'_>, state: &State) -> Vec<Vec<f64>> {
+    let baseline = search.baseline;
+    let cases = search.cases_of(&state.chosen, Observable::Decay);
+    let pairs: Vec<usize> = (0..baseline.pairs()).filter(|&p| search.used[p]).collect();
+    let assignment = assignment(baseline.pairs(), cases.iter().copied());
+    let mut levels = vec![vec![0.0; baseline.survey().bands.len()]; baseline.pairs()];
+    for r in baseline.residuals(&cases, &state.energy.values, &pairs) {
+        levels[assignment[r.pair]][r.band] = r.level * 10.0 / std::f64::consts::LN_10;
+    }
+    levels
 }
 
 /// Responses in which a peak lies where an added reflection should come.
