@@ -3,6 +3,7 @@
 mod builder;
 mod energies;
 mod incidence;
+mod thinning;
 
 pub use incidence::Incidence;
 

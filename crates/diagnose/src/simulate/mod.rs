@@ -2,6 +2,7 @@
 
 pub(crate) mod edges;
 pub(crate) mod hit_groups;
+pub(crate) mod path_chances;
 pub(crate) mod reflection_reweighting;
 pub(crate) mod scattering_share;
 pub(crate) mod scene_tracer;

@@ -8,6 +8,7 @@ pub(crate) use isolated_reflections::IsolatedReflection;
 use crate::observe::band_pulse::{BandPulse, CELL_S};
 use crate::observe::time_bins::Bins;
 use crate::simulate::hit_groups;
+use crate::simulate::path_chances;
 use rayon::prelude::*;
 use sabine_acoustics::{Air, Error, Material};
 use sabine_paths::{Conditions, PathSet};
@@ -122,7 +123,7 @@ impl TracedPair {
 
     /// `stated` are the materials as far as they are known: they say which paths matter.
     pub fn new(
-        paths: PathSet,
+        mut paths: PathSet,
         diffracted: Option<PathSet>,
         air: Air,
         stated: &[Material],
@@ -132,6 +133,8 @@ impl TracedPair {
         let shortest = paths.lengths_m().iter().chain(around).copied().fold(f32::INFINITY, f32::min);
         let direct = (0..paths.len()).find(|&i| paths.is_direct(i)).map(|i| paths.lengths_m()[i]);
         let direct_s = f64::from(direct.unwrap_or(shortest)) / speed_m_s;
+        let chances = path_chances::of(&paths, stated, &air, direct_s * speed_m_s)?;
+        paths.thin(&chances, paths.len() as u64)?;
         let materials = paths.materials();
         let counts = paths.hit_counts();
         let mut hits = Vec::with_capacity(paths.len() * materials);

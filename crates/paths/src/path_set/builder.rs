@@ -127,7 +127,8 @@ impl PathSet {
             sampled.lengths_m[i] = length_m.max(least_length_m) as f32;
             sampled.log_weights[i] += share.ln() as f32;
         }
-        sampled.retain(|batch| batch != EXACT);
+        let kept: Vec<bool> = sampled.batches.iter().map(|&batch| batch != EXACT).collect();
+        sampled.retain(&kept);
         self.append(&sampled);
     }
 
@@ -137,64 +138,8 @@ impl PathSet {
     /// If the sets have different numbers of materials.
     pub fn append_exact(&mut self, other: &PathSet) {
         let mut exact = other.clone();
-        exact.retain(|batch| batch == EXACT);
+        let kept: Vec<bool> = exact.batches.iter().map(|&batch| batch == EXACT).collect();
+        exact.retain(&kept);
         self.append(&exact);
-    }
-
-    /// Keeps the contributions of some batches, and the chains that they need.
-    fn retain(&mut self, keep: impl Fn(u8) -> bool) {
-        fn of<T>(column: &mut Vec<T>, kept: &[bool]) {
-            let mut marks = kept.iter();
-            column.retain(|_| marks.next() == Some(&true));
-        }
-        let kept: Vec<bool> = self.batches.iter().map(|&batch| keep(batch)).collect();
-        of(&mut self.lengths_m, &kept);
-        of(&mut self.log_weights, &kept);
-        of(&mut self.chains, &kept);
-        of(&mut self.tails, &kept);
-        of(&mut self.departures, &kept);
-        of(&mut self.arrivals, &kept);
-        of(&mut self.batches, &kept);
-        let places: Vec<usize> = kept
-            .iter()
-            .scan(0, |next, &kept| Some(std::mem::replace(next, *next + usize::from(kept))))
-            .collect();
-        self.diffractions.retain_mut(|(contribution, _)| {
-            let stays = kept[*contribution];
-            *contribution = places[*contribution];
-            stays
-        });
-        self.prune_chains();
-    }
-
-    /// Drops the chains that no contribution passes through.
-    fn prune_chains(&mut self) {
-        let mut needed = vec![false; self.parents.len()];
-        needed[Self::DIRECT as usize] = true;
-        for &chain in self.chains.iter().chain(&self.tails) {
-            needed[chain as usize] = true;
-        }
-        for chain in (1..needed.len()).rev() {
-            if needed[chain] {
-                needed[self.parents[chain] as usize] = true;
-            }
-        }
-        let mut renamed = vec![Self::DIRECT; needed.len()];
-        let mut count = 0;
-        for chain in 0..needed.len() {
-            if needed[chain] {
-                renamed[chain] = count as u32;
-                self.parents[count] = renamed[self.parents[chain] as usize];
-                self.events[count] = self.events[chain];
-                self.incidences[count] = self.incidences[chain];
-                count += 1;
-            }
-        }
-        self.parents.truncate(count);
-        self.events.truncate(count);
-        self.incidences.truncate(count);
-        for chain in self.chains.iter_mut().chain(&mut self.tails) {
-            *chain = renamed[*chain as usize];
-        }
     }
 }

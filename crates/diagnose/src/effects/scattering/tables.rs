@@ -1,13 +1,12 @@
 //! Energies and the tracer's own variance at other scattering.
 
 use crate::error::Error;
+use crate::simulate::path_chances::EXTRA_SCATTERING as GRID;
 use crate::simulate::scattering_share::scattering_more;
 use crate::simulate::tables::{Tables, between};
 use crate::simulate::traced_views::{TracedPairView, TracedRoomView};
 use sabine_acoustics::Material;
 
-/// Extra scattering at which energies are tabulated.
-const GRID: [f64; 8] = [-1.0, -0.5, 0.0, 0.1, 0.25, 0.45, 0.7, 0.95];
 /// Place of none in the grid.
 const NO_EXTRA: usize = 2;
 /// Energy of a bin without paths, as a share of the strongest: it counts as nothing.
