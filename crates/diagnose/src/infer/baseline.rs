@@ -264,7 +264,7 @@ pub(crate) fn dispersion(residuals: &[BinResidual], bands: usize) -> Vec<f64> {
             let own: Vec<f64> = residuals
                 .iter()
                 .filter(|r| r.band == band)
-                .map(|r| ((r.ln_ratio - r.level).min(5.0).exp() - 1.0).powi(2) / r.variance)
+                .map(|r| ((r.ln_ratio - r.offset).min(5.0).exp() - 1.0).powi(2) / r.variance)
                 .collect();
             if own.is_empty() { 1.0 } else { own.iter().sum::<f64>() / own.len() as f64 }
         })

@@ -99,16 +99,22 @@ fn simulate(baseline: &Baseline, cases: &[&Case], values: &[f64], number: u64) -
     let all: Vec<usize> = (0..baseline.pairs()).collect();
     let mut measured = baseline.observations.measured.clone();
     let assignment = assignment(baseline.pairs(), cases.iter().copied());
-    // Each response has a level of its own in each octave.
+    // Each response has a level of its own in each octave, and the tracer's chance was another.
     let mut level = (usize::MAX, 0, 0.0f64);
+    let mut chance: (usize, Vec<f64>) = (usize::MAX, Vec::new());
     let level_sd = baseline.config.level_sd_db * LN_10 / 10.0;
     for r in baseline.residuals(cases, values, &all) {
+        let modes = &baseline.simulation.states[r.pair][r.band].modes;
+        if chance.0 != r.pair {
+            chance = (r.pair, (0..modes.count()).map(|_| StandardNormal.sample(&mut random)).collect());
+        }
         if (level.0, level.1) != (r.pair, r.band) {
             let deviate: f64 = StandardNormal.sample(&mut random);
             level = (r.pair, r.band, level_sd * deviate);
         }
+        let offset: f64 = modes.of(r.bin).iter().zip(&chance.1).map(|(m, z)| m * z).sum();
         let shape = 1.0 / (r.variance * baseline.dispersion[r.band]);
-        let mean = (r.ln_predicted + level.2).exp();
+        let mean = (r.ln_predicted + level.2 + offset).exp();
         let drawn = Gamma::new(shape, mean / shape).map_or(mean, |g| g.sample(&mut random));
         if let Some(energies) = &mut measured[assignment[r.pair]].energies[r.band] {
             energies[r.bin] = drawn;
@@ -122,7 +128,7 @@ pub(crate) fn odd_bins(residuals: &[BinResidual], bands: usize) -> usize {
     // Wilson and Hilferty 1931: the cube root of a Gamma variate is nearly normal.
     let deviate = |r: &BinResidual, spread: f64| {
         let ninth = r.variance * spread / 9.0;
-        (((r.ln_ratio - r.level) / 3.0).exp() - 1.0 + ninth) / ninth.sqrt()
+        (((r.ln_ratio - r.offset) / 3.0).exp() - 1.0 + ninth) / ninth.sqrt()
     };
     (0..bands)
         .map(|band| {
@@ -149,6 +155,7 @@ mod tests {
                     bin,
                     ln_ratio: level,
                     level,
+                    offset: level,
                     ln_predicted: 0.0,
                     variance: 0.1,
                 })
@@ -167,6 +174,7 @@ mod tests {
             bin,
             ln_ratio,
             level: 0.0,
+            offset: 0.0,
             ln_predicted: 0.0,
             variance: 0.2,
         };

@@ -4,14 +4,17 @@
 //! the energy of band-limited noise is (Kuttruff, Room Acoustics, 6th ed., 3.5), and the prediction's own Monte-Carlo error makes it wider.
 
 mod fit;
-mod level_offset;
+mod offsets;
+mod pair_likelihood;
 #[cfg(test)]
 mod tests;
 mod variance;
 
 pub(crate) use fit::{WarmStart, fit};
+use offsets::{BandBins, Offsets};
+use pair_likelihood::ComparedBand;
 
-use crate::effect::{Case, DecayTerm, Parameter, Stage};
+use crate::effect::{Case, Parameter, Stage};
 use crate::likelihood::laplace::{Model, Prior, Slopes};
 use crate::likelihood::parameters::{DecayLayout, ModelTerm, ModelTerms};
 use crate::observe::observed_response::Measured;
@@ -19,7 +22,7 @@ use crate::simulate::reflection_reweighting::HitChanges;
 use crate::simulate::tables::Tables;
 use crate::simulate::traced_pair::BandState;
 use crate::simulate::views::BandView;
-use crate::statistics::{HUBER_LOG_RATIO, exp_all, median};
+use crate::statistics::{exp_all, median};
 use crate::survey::Survey;
 use rayon::prelude::*;
 use sabine_scene::Levels;
@@ -86,6 +89,8 @@ pub(crate) struct BinResidual {
     pub ln_ratio: f64,
     /// What of it the level of the whole response in this octave makes.
     pub level: f64,
+    /// The same and what the tracer's chance makes in many bins together.
+    pub offset: f64,
     pub ln_predicted: f64,
     /// Expected relative variance, dispersion left out.
     pub variance: f64,
@@ -151,10 +156,9 @@ impl<'a> EnergyModel<'a> {
     /// not known from the others, and what is added after the gain (noise) must be added to sound of the right level.
     pub fn fit_gain(&self, values: &mut [f64], pair: usize) {
         let index = self.layout.gain(self.assignment[pair]);
-        let bands = 0..self.data.survey.bands.len();
         let mut at = |gain_db: f64| -> f64 {
             values[index] = gain_db;
-            bands.clone().map(|band| self.band_likelihood(values, pair, band, None)).sum()
+            self.pair_likelihood(values, pair, None)
         };
         // Golden section (Kiefer 1953) about where early energies meet.
         let golden = (5f64.sqrt() - 1.0) / 2.0;
@@ -238,7 +242,7 @@ impl<'a> EnergyModel<'a> {
         for bin in 0..count {
             let groups = state.groups[bin]..state.groups[bin + 1];
             let energy: f64 = group_energy[groups.clone()].iter().sum();
-            ln_energy.push(energy.ln() + gain);
+            ln_energy.push(energy.ln() + state.correction[bin] + gain);
             if !sloping {
                 continue;
             }
@@ -304,91 +308,27 @@ impl<'a> EnergyModel<'a> {
     pub fn residuals(&self, values: &[f64], pairs: impl Iterator<Item = usize>) -> Vec<BinResidual> {
         let mut found = Vec::new();
         for pair in pairs {
-            for band in 0..self.data.survey.bands.len() {
-                let Some(energies) = self.compared(pair, band) else { continue };
-                let predicted = self.predicted(values, pair, band, energies.len());
-                let variances = self.variances(values, pair, band, energies.len());
-                let ln_ratio = self.ln_ratio(band, energies, &predicted);
-                let shapes = self.shapes(band, &variances);
-                let level = level_offset::most_probable(&ln_ratio, &shapes, self.level_sd());
-                for (bin, (&ln_ratio, &ln_predicted)) in ln_ratio.iter().zip(&predicted).enumerate() {
-                    let variance = variances[bin];
-                    found.push(BinResidual { pair, band, bin, ln_ratio, level, ln_predicted, variance });
+            let compared = self.compared_bands(values, pair);
+            let bins: Vec<BandBins<'_>> = compared.iter().map(ComparedBand::bins).collect();
+            let offsets = Offsets::most_probable(&bins, self.level_sd());
+            for (place, one) in compared.iter().enumerate() {
+                let (level, offset) = (offsets.levels[place], offsets.of(place, &bins[place]));
+                for (bin, (&ln_ratio, &offset)) in one.ln_ratio.iter().zip(&offset).enumerate() {
+                    let (band, ln_predicted, variance) = (one.band, one.predicted[bin], one.variances[bin]);
+                    found.push(BinResidual {
+                        pair,
+                        band,
+                        bin,
+                        ln_ratio,
+                        level,
+                        offset,
+                        ln_predicted,
+                        variance,
+                    });
                 }
             }
         }
         found
-    }
-
-    /// Log-likelihood of one pair and band.
-    fn band_likelihood(&self, values: &[f64], pair: usize, band: usize, slopes: Option<&mut Slopes>) -> f64 {
-        let Some(energies) = self.compared(pair, band) else { return 0.0 };
-        let count = energies.len();
-        let m = self.data.absorption.len();
-        let gain_db = self.gain_db(values, pair);
-        let changes = HitChanges::default();
-        let view = self.view((pair, band), gain_db, &changes);
-        let (paths, path_slopes) = self.paths(values, (pair, band), count, slopes.is_some());
-        let mut predicted = paths.clone();
-        self.apply(values, &view, gain_db, &mut predicted);
-        let variances = self.variances(values, pair, band, count);
-        let shapes = self.shapes(band, &variances);
-        let mut ln_ratio = self.ln_ratio(band, energies, &predicted);
-        let level_sd = self.level_sd();
-        let level = level_offset::most_probable(&ln_ratio, &shapes, level_sd);
-        let likelihood = level_offset::log_likelihood(&ln_ratio, &shapes, (level, level_sd));
-        let value = likelihood + self.tops((pair, band), &variances);
-        ln_ratio.iter_mut().for_each(|z| *z -= level);
-        let Some(slopes) = slopes else { return value };
-
-        // Columns that matter in this band, and the change of the predicted logarithm with each.
-        let mut columns: Vec<usize> = (0..m).map(|k| self.layout.absorption(k, band)).collect();
-        let through = self.through(values, &view, gain_db, &paths);
-        let mut rows: Vec<Vec<f64>> =
-            (0..m).map(|k| (0..count).map(|bin| path_slopes[bin * m + k] * through[bin]).collect()).collect();
-        // What is added beside the paths has the same gain.
-        let adds = |p: &ModelTerm<'_>| p.case.decay_term().is_some_and(DecayTerm::adds_sound_of_source);
-        let gained = if self.terms.iter().any(adds) {
-            self.with_gain(values, &view, gain_db, &paths)
-        } else {
-            through
-        };
-        let gain: Vec<f64> = gained.iter().map(|t| t * LN_PER_DB).collect();
-        if let Some(index) = self.layout.common_gain() {
-            columns.push(index);
-            rows.push(gain.clone());
-        }
-        columns.push(self.layout.gain(self.assignment[pair]));
-        rows.push(gain);
-        for placed in &self.terms {
-            for (i, p) in placed.case.parameters.iter().enumerate() {
-                if self.bears_on(p, pair, band) {
-                    columns.push(placed.first + i);
-                    rows.push(self.difference(values, placed.first + i, &view, gain_db, &paths));
-                }
-            }
-        }
-        for bin in 0..count {
-            let weight = shapes[bin];
-            let pull = weight * (ln_ratio[bin].min(HUBER_LOG_RATIO).exp() - 1.0);
-            for (i, &a) in columns.iter().enumerate() {
-                let slope = rows[i][bin];
-                if slope == 0.0 {
-                    continue;
-                }
-                slopes.gradient[a] += pull * slope;
-                for (j, &b) in columns[..=i].iter().enumerate() {
-                    let product = weight * slope * rows[j][bin];
-                    slopes.information[(a, b)] += product;
-                    if a != b {
-                        slopes.information[(b, a)] += product;
-                    }
-                }
-            }
-        }
-        level_offset::take_off(slopes, &columns, &rows, &shapes, level_sd);
-        self.add_variance_slopes(values, (pair, band), &variances, &ln_ratio, slopes);
-        value
     }
 
     /// Logarithm of measured over predicted energy in bins of a band.
@@ -406,52 +346,6 @@ impl<'a> EnergyModel<'a> {
     fn level_sd(&self) -> f64 {
         self.data.level_sd_db * LN_PER_DB
     }
-
-    /// How much of a change of the paths' energy comes through the effects.
-    fn through(&self, values: &[f64], view: &BandView<'_>, gain_db: f64, paths: &[f64]) -> Vec<f64> {
-        let at = |offset: f64| {
-            let mut moved: Vec<f64> = paths.iter().map(|p| p + offset).collect();
-            self.apply(values, view, gain_db, &mut moved);
-            moved
-        };
-        at(STEP).iter().zip(at(-STEP)).map(|(up, down)| (up - down) / (2.0 * STEP)).collect()
-    }
-
-    /// The same of a change of the gain, with which goes what does not come along the paths.
-    fn with_gain(&self, values: &[f64], view: &BandView<'_>, gain_db: f64, paths: &[f64]) -> Vec<f64> {
-        let at = |offset: f64| {
-            let mut moved: Vec<f64> = paths.iter().map(|p| p + offset).collect();
-            let view = BandView { gain: view.gain * offset.exp(), ..*view };
-            self.apply(values, &view, gain_db + offset / LN_PER_DB, &mut moved);
-            moved
-        };
-        at(STEP).iter().zip(at(-STEP)).map(|(up, down)| (up - down) / (2.0 * STEP)).collect()
-    }
-
-    /// Change of the predicted logarithm with a parameter of an effect.
-    fn difference(
-        &self,
-        values: &[f64],
-        index: usize,
-        view: &BandView<'_>,
-        gain_db: f64,
-        paths: &[f64],
-    ) -> Vec<f64> {
-        let prior = self.priors[index];
-        let step = STEP * prior.sd;
-        let at = |offset: f64| {
-            let mut moved = values.to_vec();
-            moved[index] = (moved[index] + offset).clamp(prior.low, prior.high);
-            let mut ln_energy = paths.to_vec();
-            self.apply(&moved, view, gain_db, &mut ln_energy);
-            (moved[index], ln_energy)
-        };
-        let ((high, up), (low, down)) = (at(step), at(-step));
-        if high <= low {
-            return vec![0.0; paths.len()];
-        }
-        up.iter().zip(down).map(|(u, d)| (u - d) / (high - low)).collect()
-    }
 }
 
 impl Model for EnergyModel<'_> {
@@ -461,7 +355,6 @@ impl Model for EnergyModel<'_> {
 
     fn log_likelihood(&self, values: &[f64], slopes: Option<&mut Slopes>) -> f64 {
         let pairs: Vec<usize> = (0..self.assignment.len()).filter(|&p| self.used[p]).collect();
-        let bands = 0..self.data.survey.bands.len();
         let (sloping, n) = (slopes.is_some(), self.priors.len());
         // Parts of a fixed size, added up in order: the sum is the same on any number of threads.
         let parts: Vec<(f64, Option<Slopes>)> = pairs
@@ -469,8 +362,8 @@ impl Model for EnergyModel<'_> {
             .map(|pairs| {
                 let mut own = sloping.then(|| Slopes::zero(n));
                 let mut sum = 0.0;
-                for (&pair, band) in pairs.iter().flat_map(|p| bands.clone().map(move |b| (p, b))) {
-                    sum += self.band_likelihood(values, pair, band, own.as_mut());
+                for &pair in pairs {
+                    sum += self.pair_likelihood(values, pair, own.as_mut());
                 }
                 (sum, own)
             })

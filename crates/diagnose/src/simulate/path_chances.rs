@@ -1,5 +1,6 @@
 //! Which paths a prediction can do without: most carry nothing until something scatters, or far less than others that come with them.
 
+use crate::simulate::local_reaction::LocalReaction;
 use crate::simulate::scattering_share::scattering_more;
 use sabine_acoustics::{Air, Bands, Error, Material, PerBand};
 use sabine_paths::{Conditions, PathSet};
@@ -24,25 +25,31 @@ pub(crate) fn of(paths: &PathSet, stated: &[Material], air: &Air, direct_m: f64)
     let count = cells.iter().max().map_or(0, |&last| last as usize + 1);
     let stated = &typical_bands(stated)?[..];
     let mut chances = vec![0.0f32; paths.len()];
-    let mut largest = vec![0.0f32; paths.len()];
+    let mut add = |all: &[Vec<f32>], wanted: f32| {
+        let mut largest = vec![0.0f32; paths.len()];
+        for energies in all {
+            let mut sums = vec![0.0f64; count];
+            cells.iter().zip(energies).for_each(|(&cell, &e)| sums[cell as usize] += f64::from(e));
+            let per_energy: Vec<f32> =
+                sums.iter().map(|&sum| if sum > 0.0 { (1.0 / sum) as f32 } else { 0.0 }).collect();
+            for ((largest, &cell), &e) in largest.iter_mut().zip(&cells).zip(energies) {
+                *largest = largest.max(e * per_energy[cell as usize]);
+            }
+        }
+        chances.iter_mut().zip(&largest).for_each(|(chance, share)| *chance += wanted * share);
+    };
     for extra in EXTRA_SCATTERING {
         let materials: Vec<Material> =
             stated.iter().map(|m| scattering_more(m, extra)).collect::<Result<_, _>>()?;
         if extra != 0.0 && materials.as_slice() == stated {
             continue;
         }
-        largest.fill(0.0);
-        for energies in paths.energies(&Conditions::new(&materials, air))? {
-            let mut sums = vec![0.0f64; count];
-            cells.iter().zip(&energies).for_each(|(&cell, &e)| sums[cell as usize] += f64::from(e));
-            let per_energy: Vec<f32> =
-                sums.iter().map(|&sum| if sum > 0.0 { (1.0 / sum) as f32 } else { 0.0 }).collect();
-            for ((largest, &cell), &e) in largest.iter_mut().zip(&cells).zip(&energies) {
-                *largest = largest.max(e * per_energy[cell as usize]);
-            }
+        let mut energies = paths.energies(&Conditions::new(&materials, air))?;
+        add(&energies, if extra == 0.0 { WANTED.0 } else { WANTED.1 });
+        if extra == 0.0 {
+            react_locally(&mut energies, paths, &materials);
+            add(&energies, WANTED.0);
         }
-        let wanted = if extra == 0.0 { WANTED.0 } else { WANTED.1 };
-        chances.iter_mut().zip(&largest).for_each(|(chance, share)| *chance += wanted * share);
     }
     let early_m = direct_m + EXACT_S * speed_m_s;
     for (i, chance) in chances.iter_mut().enumerate() {
@@ -51,6 +58,23 @@ pub(crate) fn of(paths: &PathSet, stated: &[Material], air: &Air, direct_m: f64)
         }
     }
     Ok(chances)
+}
+
+/// Energies in up to [`TYPICAL_BANDS`] bands as they would be between walls that react locally: these leave most to paths that meet them at
+/// angles of which other walls make nothing.
+fn react_locally(energies: &mut [Vec<f32>], paths: &PathSet, materials: &[Material]) {
+    let walls: Vec<[LocalReaction; TYPICAL_BANDS]> = materials
+        .iter()
+        .map(|m| {
+            let absorption = m.absorption().values();
+            std::array::from_fn(|i| LocalReaction::new(absorption[i.min(absorption.len() - 1)]))
+        })
+        .collect();
+    let log_changes =
+        paths.sums_by_angle(|material, cosine| walls[material].map(|wall| wall.log_change(cosine)));
+    for (band, energies) in energies.iter_mut().enumerate() {
+        energies.iter_mut().zip(&log_changes).for_each(|(e, change)| *e *= change[band].exp());
+    }
 }
 
 /// The materials in so many of their bands as are worked on together, from the lowest to the highest. Within a cell all paths are as

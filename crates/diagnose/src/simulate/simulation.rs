@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::observe::observations::Observations;
 use crate::observe::observed_response::PEAKS_S;
 use crate::simulate::edges::Edges;
+use crate::simulate::monte_carlo_modes;
 #[cfg(test)]
 use crate::simulate::scene_tracer::Rays;
 use crate::simulate::scene_tracer::{PreparedTracer, SceneTracer};
@@ -135,6 +136,7 @@ impl Simulation {
         }
         self.ends =
             self.states.iter().map(|s| s.iter().map(|b| range_end(b, self.range_db)).collect()).collect();
+        self.states.par_iter_mut().zip(&self.ends).for_each(|(s, ends)| monte_carlo_modes::find(s, ends));
         self.reference = (0..observations.survey.bands.len())
             .map(|band| {
                 let early: Vec<f64> = self

@@ -8,6 +8,7 @@ pub(crate) use isolated_reflections::IsolatedReflection;
 use crate::observe::band_pulse::{BandPulse, CELL_S};
 use crate::observe::time_bins::Bins;
 use crate::simulate::hit_groups;
+use crate::simulate::monte_carlo_modes::Modes;
 use crate::simulate::path_chances;
 use rayon::prelude::*;
 use sabine_acoustics::{Air, Error, Material};
@@ -83,10 +84,18 @@ pub(crate) struct BandState {
     pub departure_products: Vec<[f64; 6]>,
     pub arrival: Vec<[f64; 3]>,
     pub arrival_products: Vec<[f64; 6]>,
-    /// Expected variance of a measured bin about the prediction, as a share of its energy squared.
+    /// Expected variance of a measured bin about the prediction, as a share of its energy squared: what each bin scatters for itself.
+    /// Without the tracer's part until modes are found.
     pub variance: Vec<f64>,
     /// The tracer's own part of it.
     pub monte_carlo: Vec<f64>,
+    /// What the tracer's chance moves together.
+    pub modes: Modes,
+    /// By how much the logarithm of the energy that is to be expected lies above that of what the rays have found in the bin: these are
+    /// smoothed, and corrected for what chance does to logarithms.
+    pub correction: Vec<f64>,
+    /// What modes are made of, `[bin * batches + batch]`; none once they are.
+    pub batch_deviations: Vec<f32>,
 }
 
 #[cfg(test)]
@@ -113,6 +122,12 @@ impl BandState {
             arrival_products: vec![[0.3, 0.4, 0.3, -0.04, 0.03, 0.0]; count],
             variance: (0..count).map(|bin| 0.15 + 0.02 * bin as f64).collect(),
             monte_carlo: vec![0.0; count],
+            modes: Modes::new(
+                2,
+                (0..count).flat_map(|bin| [0.1 * (0.7 * bin as f64).sin(), 0.004 * bin as f64]).collect(),
+            ),
+            correction: (0..count).map(|bin| 0.002 * bin as f64).collect(),
+            batch_deviations: Vec::new(),
         }
     }
 }

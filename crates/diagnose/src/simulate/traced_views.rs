@@ -145,10 +145,11 @@ impl<'a> TracedPairView<'a> {
         self.pair.sums(energies, bins, pulse, self.room.simulation.traced_s)
     }
 
-    /// The same with the variance by chance, from the scatter between batches of rays.
-    pub fn bin_energies_and_variance(&self, band: usize, energies: &[f32]) -> (Vec<f64>, Vec<f64>) {
+    /// The energies that are to be expected, sampled ones being smoothed over time as far as chance explains their scatter, with their
+    /// variance by chance, from the scatter between batches of rays.
+    pub fn expected_energies_and_variance(&self, band: usize, energies: &[f32]) -> (Vec<f64>, Vec<f64>) {
         let (bins, pulse) = (self.state(band).bins, &self.room.pulses[band]);
-        self.pair.sums_and_variance(energies, bins, pulse, self.room.simulation.traced_s)
+        self.pair.expected_and_variance(energies, bins, pulse, self.room.simulation.traced_s)
     }
 
     /// Spreads a pulse of energy 1 that arrives so long after the first path over the bins of a band, as the band's filter does; returns one

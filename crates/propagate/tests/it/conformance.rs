@@ -5,7 +5,7 @@
 use sabine_acoustics::Error;
 use sabine_paths::conformance::check;
 use sabine_paths::{Contribution, PathSet, Propagator};
-use sabine_propagate::{PathTracer, TracerConfig};
+use sabine_propagate::{PathTracer, ReferenceTracer, TracerConfig};
 use sabine_scene::{Receiver, Scene, Source};
 use sabine_testkit::ShoeboxImages;
 
@@ -15,8 +15,10 @@ fn config(rays: usize) -> TracerConfig {
 
 #[test]
 fn tracers_conform() {
-    let tracers: [(&str, Box<dyn Propagator>, bool); 2] = [
+    let tracers: [(&str, Box<dyn Propagator>, bool); 3] = [
         ("PathTracer", Box::new(PathTracer::new(config(4000)).unwrap()), true),
+        // Its Monte-Carlo error falls slowly: a sphere catches what the path tracer joins.
+        ("ReferenceTracer", Box::new(ReferenceTracer::new(config(200_000)).unwrap()), true),
         ("ShoeboxImages", Box::new(ShoeboxImages::new(0.3).unwrap()), false),
     ];
     for (name, tracer, scatters) in tracers {

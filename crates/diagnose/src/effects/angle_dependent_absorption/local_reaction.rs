@@ -1,9 +1,9 @@
 //! What it changes if walls react locally: they then absorb by the angle at which sound meets them.
 
 use crate::error::Error;
+use crate::simulate::local_reaction::LocalReaction;
 use crate::simulate::tables::{Tables, between};
 use crate::simulate::traced_views::{TracedPairView, TracedRoomView};
-use sabine_propagate::wave::admittance_of_absorption;
 
 /// Shares of local reaction at which energies are tabulated: multiples of a half, so that one exponential serves all.
 const GRID: [f64; 5] = [-0.5, 0.0, 0.5, 1.0, 1.5];
@@ -13,8 +13,6 @@ const HALVES: [i32; 5] = [-1, 0, 1, 2, 3];
 const OCTAVES: usize = 4;
 /// Place of none in the grid.
 const NO_SHARE: usize = 1;
-/// A wall of impedance cos(theta) absorbs everything; no real one does (energy).
-const MIN_REFLECTED: f64 = 1e-3;
 /// Energy of a bin without paths, as a share of the strongest: it counts as nothing.
 const NOTHING: f64 = 1e-12;
 
@@ -35,13 +33,6 @@ impl LocalReactionTable {
     }
 }
 
-/// Logarithm of what a locally reacting wall of a real impedance reflects at an angle, over what it reflects in the mean over all
-/// (Kuttruff, Room Acoustics, 6th ed., 2.3: R = (z cos - 1) / (z cos + 1)).
-fn log_change(impedance: f64, absorption: f64, cosine: f64) -> f64 {
-    let x = impedance * cosine;
-    ((x - 1.0) / (x + 1.0)).powi(2).max(MIN_REFLECTED).ln() - (1.0 - absorption).ln()
-}
-
 /// Tables for all bins. Single reflections stay as they are.
 pub(super) fn prepare(room: &TracedRoomView<'_>) -> Result<Tables, Error> {
     Ok(Tables::of_bins(room.by_pair(of_bins)?))
@@ -52,19 +43,17 @@ fn of_bins(pair: &TracedPairView<'_>) -> Result<Vec<LocalReactionTable>, Error> 
     let energies = pair.energies(materials)?;
     let mut found = Vec::with_capacity(energies.len());
     for first in (0..energies.len()).step_by(OCTAVES) {
-        let walls: Vec<[(f64, f64); OCTAVES]> = materials
+        let walls: Vec<[LocalReaction; OCTAVES]> = materials
             .iter()
             .map(|m| {
                 std::array::from_fn(|i| {
-                    let band = (first + i).min(energies.len() - 1);
-                    let a = m.absorption().values()[band].clamp(1e-4, 0.99);
-                    (1.0 / admittance_of_absorption(a), a)
+                    LocalReaction::new(m.absorption().values()[(first + i).min(energies.len() - 1)])
                 })
             })
             .collect();
-        let log_changes = pair.paths().sums_by_angle(|material, cosine| {
-            walls[material].map(|(impedance, absorption)| log_change(impedance, absorption, cosine))
-        });
+        let log_changes = pair
+            .paths()
+            .sums_by_angle(|material, cosine| walls[material].map(|wall| wall.log_change(cosine)));
         for band in first..energies.len().min(first + OCTAVES) {
             let halves: Vec<f32> = log_changes.iter().map(|c| (0.5 * c[band - first]).exp()).collect();
             let one = |(place, &power): (usize, &i32)| {
@@ -81,24 +70,4 @@ fn of_bins(pair: &TracedPairView<'_>) -> Result<Vec<LocalReactionTable>, Error> 
         }
     }
     Ok(found)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_mean_over_all_angles_is_the_absorption() {
-        for absorption in [0.05, 0.3, 0.8] {
-            let impedance = 1.0 / admittance_of_absorption(absorption);
-            let steps = 20_000;
-            let absorbed = |i: usize| {
-                let cosine = (i as f64 + 0.5) / steps as f64;
-                let reflected = (1.0 - absorption) * log_change(impedance, absorption, cosine).exp();
-                2.0 * cosine * (1.0 - reflected) / steps as f64
-            };
-            let mean: f64 = (0..steps).map(absorbed).sum();
-            assert!((mean - absorption).abs() < 2e-3, "{mean} {absorption}");
-        }
-    }
 }

@@ -44,32 +44,43 @@ fn of_bins(pair: &TracedPairView<'_>) -> Result<Vec<ScatteringTable>, Error> {
     let materials = pair.room().materials();
     let mut found =
         vec![ScatteringTable { change: Vec::new(), variance: Some(Vec::new()) }; materials[0].bands().len()];
-    for (place, &extra) in GRID.iter().enumerate() {
+    let expected = |extra: f64| -> Result<Vec<Expected>, Error> {
         let changed: Vec<Material> =
             materials.iter().map(|m| scattering_more(m, extra)).collect::<Result<_, _>>()?;
-        let energies = if place == NO_EXTRA { Vec::new() } else { pair.energies(&changed)? };
-        for (band, table) in found.iter_mut().enumerate() {
-            let ln_energy = pair.ln_energy(band);
-            let (change, variance) = match energies.get(band) {
-                Some(energies) => changes(pair, band, energies),
-                None => (vec![0.0; ln_energy.len()], vec![0.0; ln_energy.len()]),
-            };
-            table.change.push(change);
-            table.variance.get_or_insert_default().push(variance);
+        let energies = pair.energies(&changed)?;
+        Ok(energies.iter().enumerate().map(|(band, e)| Expected::new(pair, band, e)).collect())
+    };
+    let stated = expected(GRID[NO_EXTRA])?;
+    for (place, &extra) in GRID.iter().enumerate() {
+        let changed = if place == NO_EXTRA { stated.clone() } else { expected(extra)? };
+        for ((table, now), before) in found.iter_mut().zip(&changed).zip(&stated) {
+            let change = now.ln_energy.iter().zip(&before.ln_energy).map(|(now, before)| now - before);
+            table.change.push(change.collect());
+            let more = now.variance.iter().zip(&before.variance).map(|(now, own)| (now - own).max(0.0));
+            table.variance.get_or_insert_default().push(more.collect());
         }
     }
     Ok(found)
 }
 
-/// Logarithm of the change of each bin's energy, and of the tracer's own variance what is more.
-fn changes(pair: &TracedPairView<'_>, band: usize, energies: &[f32]) -> (Vec<f64>, Vec<f64>) {
-    let (sums, monte_carlo) = pair.bin_energies_and_variance(band, energies);
-    let floor = NOTHING * sums.iter().copied().fold(0.0, f64::max).max(1e-30);
-    let bins = || sums.iter().map(|s| s.max(floor)).zip(pair.ln_energy(band));
-    let change = bins().map(|(e, l)| e.ln() - l).collect();
-    let more = |((e, _), (now, own)): ((f64, _), (&f64, &f64))| (now / (e * e) - own).max(0.0);
-    let variance = bins().zip(monte_carlo.iter().zip(pair.monte_carlo(band))).map(more).collect();
-    (change, variance)
+/// What is to be expected in the bins of one band.
+#[derive(Clone)]
+struct Expected {
+    ln_energy: Vec<f64>,
+    /// The tracer's own relative variance.
+    variance: Vec<f64>,
+}
+
+impl Expected {
+    fn new(pair: &TracedPairView<'_>, band: usize, energies: &[f32]) -> Self {
+        let (sums, monte_carlo) = pair.expected_energies_and_variance(band, energies);
+        let floor = NOTHING * sums.iter().copied().fold(0.0, f64::max).max(1e-30);
+        let bins = || sums.iter().map(|s| s.max(floor));
+        Self {
+            ln_energy: bins().map(f64::ln).collect(),
+            variance: bins().zip(&monte_carlo).map(|(e, variance)| variance / (e * e)).collect(),
+        }
+    }
 }
 
 /// A share more of each reflection is scattered, and lost to the mirror; what was scattered never comes back as one.

@@ -7,6 +7,8 @@ use super::{
 use crate::observe::band_pulse::BandPulse;
 use crate::observe::time_bins::Bins;
 use crate::simulate::hit_groups;
+use crate::simulate::monte_carlo_modes::{Modes, deviations};
+use crate::simulate::smoothing::smoothed;
 use sabine_paths::PathSet;
 use std::collections::BTreeMap;
 
@@ -29,6 +31,13 @@ struct Gathered {
     squares: Vec<f64>,
 }
 
+/// Energy that is to be expected in each bin: that of exact paths, and that of each batch of rays, smoothed over time.
+struct Expected {
+    exact: Vec<f64>,
+    /// `[bin * batches + batch]`.
+    sampled: Vec<f64>,
+}
+
 /// Sums over the paths that keep no time of their own, by cell.
 struct Cells {
     gathered: Vec<f64>,
@@ -48,12 +57,30 @@ impl TracedPair {
         duration_s: f64,
     ) -> BandState {
         let gathered = self.gather(energies, bins, pulse, duration_s);
-        let (_, monte_carlo) = self.sums_and_variance(energies, bins, pulse, duration_s);
-        gathered.finish(bins, pulse, pulse.shares[band], self.paths.materials(), &monte_carlo)
+        let (exact, sampled) = self.sums_by_batch(energies, bins, pulse, duration_s);
+        let expected = Expected { exact, sampled: smoothed(&sampled) };
+        gathered.finish(bins, pulse, pulse.shares[band], self.paths.materials(), &expected)
     }
 
-    /// Energy of each bin, and its variance by chance, from the scatter between batches of rays.
-    pub fn sums_and_variance(
+    /// Energy that is to be expected in each bin, and its variance by chance, from the scatter between batches of rays.
+    pub fn expected_and_variance(
+        &self,
+        energies: &[f32],
+        bins: Bins,
+        kernel: &BandPulse,
+        duration_s: f64,
+    ) -> (Vec<f64>, Vec<f64>) {
+        let (mut sums, sampled) = self.sums_by_batch(energies, bins, kernel, duration_s);
+        let sampled = smoothed(&sampled);
+        let batches = usize::from(PathSet::BATCHES);
+        let variance =
+            sampled.chunks(batches).map(|parts| deviations(parts, 1.0).map(|d| d * d).sum()).collect();
+        sums.iter_mut().zip(sampled.chunks(batches)).for_each(|(s, parts)| *s += parts.iter().sum::<f64>());
+        (sums, variance)
+    }
+
+    /// Energy of the exact paths in each bin, and of each batch of rays, `[bin * batches + batch]`.
+    fn sums_by_batch(
         &self,
         energies: &[f32],
         bins: Bins,
@@ -92,9 +119,7 @@ impl TracedPair {
                 });
             }
         }
-        let monte_carlo_variance = sampled.chunks(batches).map(variance_of_sum).collect();
-        sums.iter_mut().zip(sampled.chunks(batches)).for_each(|(s, parts)| *s += parts.iter().sum::<f64>());
-        (sums, monte_carlo_variance)
+        (sums, sampled)
     }
 
     fn gather(&self, energies: &[f32], bins: Bins, pulse: &BandPulse, duration_s: f64) -> Gathered {
@@ -213,14 +238,14 @@ impl Gathered {
         }
     }
 
-    /// The state of the band: means instead of sums, and the variance of each bin. `monte_carlo` is the tracer's own variance.
+    /// The state of the band: means instead of sums, and the variance of each bin.
     fn finish(
         &self,
         bins: Bins,
         pulse: &BandPulse,
         own_share: f64,
         materials: usize,
-        monte_carlo: &[f64],
+        expected: &Expected,
     ) -> BandState {
         let count = self.count;
         let floor = NOTHING * (0..count).map(|k| self.sums[k * COLUMNS]).fold(0.0, f64::max).max(1e-30);
@@ -247,13 +272,17 @@ impl Gathered {
                 - 2.0 * pulse.cell_correlation[0] * self.squares[bin]
                 + pairwise_interference(&self.isolated[bin], pulse)
                 + self.timing_variance[bin];
-            let monte_carlo = monte_carlo[bin];
-            state.monte_carlo.push(monte_carlo / (e * e));
+            let batches = usize::from(PathSet::BATCHES);
+            let sampled = &expected.sampled[bin * batches..(bin + 1) * batches];
+            let whole = (expected.exact[bin] + sampled.iter().sum::<f64>()).max(floor);
+            state.correction.push((whole / e).ln());
+            let own = deviations(sampled, whole);
+            state.batch_deviations.extend(own.map(|d| d as f32));
+            let own = &state.batch_deviations[bin * batches..];
+            state.monte_carlo.push(own.iter().map(|d| f64::from(d * d)).sum());
             let coherent = bins.centre_s(bin) < COHERENT_BANDWIDTH_TIMES / pulse.bandwidth_hz;
             let model_sd = if coherent { COHERENT_SD } else { MODEL_SD };
-            let variance = (interference.max(0.0) + monte_carlo) / (e * e) + model_sd * model_sd;
-            // Nothing scatters more than the square of one Gaussian sample.
-            state.variance.push(variance.min(2.0));
+            state.variance.push(interference.max(0.0) / (e * e) + model_sd * model_sd);
         }
         state
     }
@@ -277,15 +306,11 @@ impl BandState {
             arrival_products: Vec::with_capacity(count),
             variance: Vec::with_capacity(count),
             monte_carlo: Vec::with_capacity(count),
+            modes: Modes::default(),
+            correction: Vec::with_capacity(count),
+            batch_deviations: Vec::with_capacity(count * usize::from(PathSet::BATCHES)),
         }
     }
-}
-
-/// Variance of the sum of independent batches, from their scatter.
-fn variance_of_sum(batches: &[f64]) -> f64 {
-    let count = batches.len() as f64;
-    let mean = batches.iter().sum::<f64>() / count;
-    batches.iter().map(|b| (b - mean).powi(2)).sum::<f64>() * count / (count - 1.0)
 }
 
 /// Variance of the energy of single pulses of random sign: four times the sum over pairs of w_i w_j r_ij^2.

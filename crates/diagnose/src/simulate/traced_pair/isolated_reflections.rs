@@ -2,6 +2,7 @@
 
 use super::{BandState, TracedPair};
 use crate::observe::time_bins::Bins;
+use crate::simulate::monte_carlo_modes::Modes;
 use sabine_acoustics::{Error, Material};
 use sabine_paths::Conditions;
 
@@ -66,6 +67,9 @@ impl TracedPair {
                 arrival_products: isolated_reflections.iter().map(|s| products(s.arrival)).collect(),
                 variance: vec![0.0; isolated_reflections.len()],
                 monte_carlo: Vec::new(),
+                modes: Modes::default(),
+                correction: Vec::new(),
+                batch_deviations: Vec::new(),
             })
             .collect();
         Ok((isolated_reflections, states))

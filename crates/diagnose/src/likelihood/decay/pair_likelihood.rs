@@ -1,0 +1,179 @@
+//! The likelihood of one response and its slopes.
+
+use super::offsets::{BandBins, Offsets, SharedInformation};
+use super::{EnergyModel, LN_PER_DB, STEP};
+use crate::effect::DecayTerm;
+use crate::likelihood::laplace::Slopes;
+use crate::likelihood::parameters::ModelTerm;
+use crate::simulate::monte_carlo_modes::Modes;
+use crate::simulate::reflection_reweighting::HitChanges;
+use crate::simulate::views::BandView;
+use crate::statistics::HUBER_LOG_RATIO;
+
+/// The compared bins of one band of a response under some values.
+pub(super) struct ComparedBand<'a> {
+    pub band: usize,
+    /// Logarithm of the predicted energy.
+    pub predicted: Vec<f64>,
+    /// Logarithm of measured over predicted energy.
+    pub ln_ratio: Vec<f64>,
+    /// Expected relative variances, dispersion left out.
+    pub variances: Vec<f64>,
+    /// Shapes of the Gamma distributions.
+    shapes: Vec<f64>,
+    modes: &'a Modes,
+}
+
+impl ComparedBand<'_> {
+    pub fn bins(&self) -> BandBins<'_> {
+        BandBins { ln_ratio: &self.ln_ratio, shapes: &self.shapes, modes: self.modes }
+    }
+}
+
+impl EnergyModel<'_> {
+    /// The bands of a pair that are compared.
+    pub(super) fn compared_bands(&self, values: &[f64], pair: usize) -> Vec<ComparedBand<'_>> {
+        (0..self.data.survey.bands.len())
+            .filter_map(|band| {
+                let energies = self.compared(pair, band)?;
+                let predicted = self.predicted(values, pair, band, energies.len());
+                let ln_ratio = self.ln_ratio(band, energies, &predicted);
+                let variances = self.variances(values, pair, band, energies.len());
+                let shapes = self.shapes(band, &variances);
+                let modes = &self.data.states[pair][band].modes;
+                Some(ComparedBand { band, predicted, ln_ratio, variances, shapes, modes })
+            })
+            .collect()
+    }
+
+    /// Log-likelihood of one pair, its slopes added where wanted.
+    pub(super) fn pair_likelihood(&self, values: &[f64], pair: usize, slopes: Option<&mut Slopes>) -> f64 {
+        let mut compared = self.compared_bands(values, pair);
+        let bins: Vec<BandBins<'_>> = compared.iter().map(ComparedBand::bins).collect();
+        let level_sd = self.level_sd();
+        let offsets = Offsets::most_probable(&bins, level_sd);
+        let tops: f64 = compared.iter().map(|one| self.tops((pair, one.band), &one.variances)).sum();
+        let value = offsets.log_likelihood(&bins, level_sd) + tops;
+        let Some(slopes) = slopes else { return value };
+        let mut shared = SharedInformation::new(&bins, level_sd);
+        let moved: Vec<Vec<f64>> =
+            bins.iter().enumerate().map(|(place, bins)| offsets.of(place, bins)).collect();
+        for (place, (one, offset)) in compared.iter_mut().zip(moved).enumerate() {
+            one.ln_ratio.iter_mut().zip(offset).for_each(|(z, offset)| *z -= offset);
+            let (columns, rows) = self.rows(values, (pair, one.band), one.ln_ratio.len());
+            add_slopes(slopes, (&columns, &rows), one);
+            shared.add(place, (&columns, &rows), &one.bins());
+            self.add_variance_slopes(values, (pair, one.band), &one.variances, &one.ln_ratio, slopes);
+        }
+        shared.take_off(slopes);
+        value
+    }
+
+    /// Columns that matter in a band, and the change of the predicted logarithm of each bin with each.
+    fn rows(
+        &self,
+        values: &[f64],
+        (pair, band): (usize, usize),
+        count: usize,
+    ) -> (Vec<usize>, Vec<Vec<f64>>) {
+        let m = self.data.absorption.len();
+        let gain_db = self.gain_db(values, pair);
+        let changes = HitChanges::default();
+        let view = self.view((pair, band), gain_db, &changes);
+        let (paths, path_slopes) = self.paths(values, (pair, band), count, true);
+        let mut columns: Vec<usize> = (0..m).map(|k| self.layout.absorption(k, band)).collect();
+        let through = self.through(values, &view, gain_db, &paths);
+        let mut rows: Vec<Vec<f64>> =
+            (0..m).map(|k| (0..count).map(|bin| path_slopes[bin * m + k] * through[bin]).collect()).collect();
+        // What is added beside the paths has the same gain.
+        let adds = |p: &ModelTerm<'_>| p.case.decay_term().is_some_and(DecayTerm::adds_sound_of_source);
+        let gained = if self.terms.iter().any(adds) {
+            self.with_gain(values, &view, gain_db, &paths)
+        } else {
+            through
+        };
+        let gain: Vec<f64> = gained.iter().map(|t| t * LN_PER_DB).collect();
+        if let Some(index) = self.layout.common_gain() {
+            columns.push(index);
+            rows.push(gain.clone());
+        }
+        columns.push(self.layout.gain(self.assignment[pair]));
+        rows.push(gain);
+        for placed in &self.terms {
+            for (i, p) in placed.case.parameters.iter().enumerate() {
+                if self.bears_on(p, pair, band) {
+                    columns.push(placed.first + i);
+                    rows.push(self.difference(values, placed.first + i, &view, gain_db, &paths));
+                }
+            }
+        }
+        (columns, rows)
+    }
+
+    /// How much of a change of the paths' energy comes through the effects.
+    fn through(&self, values: &[f64], view: &BandView<'_>, gain_db: f64, paths: &[f64]) -> Vec<f64> {
+        let at = |offset: f64| {
+            let mut moved: Vec<f64> = paths.iter().map(|p| p + offset).collect();
+            self.apply(values, view, gain_db, &mut moved);
+            moved
+        };
+        at(STEP).iter().zip(at(-STEP)).map(|(up, down)| (up - down) / (2.0 * STEP)).collect()
+    }
+
+    /// The same of a change of the gain, with which goes what does not come along the paths.
+    fn with_gain(&self, values: &[f64], view: &BandView<'_>, gain_db: f64, paths: &[f64]) -> Vec<f64> {
+        let at = |offset: f64| {
+            let mut moved: Vec<f64> = paths.iter().map(|p| p + offset).collect();
+            let view = BandView { gain: view.gain * offset.exp(), ..*view };
+            self.apply(values, &view, gain_db + offset / LN_PER_DB, &mut moved);
+            moved
+        };
+        at(STEP).iter().zip(at(-STEP)).map(|(up, down)| (up - down) / (2.0 * STEP)).collect()
+    }
+
+    /// Change of the predicted logarithm with a parameter of an effect.
+    fn difference(
+        &self,
+        values: &[f64],
+        index: usize,
+        view: &BandView<'_>,
+        gain_db: f64,
+        paths: &[f64],
+    ) -> Vec<f64> {
+        let prior = self.priors[index];
+        let step = STEP * prior.sd;
+        let at = |offset: f64| {
+            let mut moved = values.to_vec();
+            moved[index] = (moved[index] + offset).clamp(prior.low, prior.high);
+            let mut ln_energy = paths.to_vec();
+            self.apply(&moved, view, gain_db, &mut ln_energy);
+            (moved[index], ln_energy)
+        };
+        let ((high, up), (low, down)) = (at(step), at(-step));
+        if high <= low {
+            return vec![0.0; paths.len()];
+        }
+        up.iter().zip(down).map(|(u, d)| (u - d) / (high - low)).collect()
+    }
+}
+
+/// Adds what the bins of one band say.
+fn add_slopes(slopes: &mut Slopes, (columns, rows): (&[usize], &[Vec<f64>]), one: &ComparedBand<'_>) {
+    for (bin, (&weight, ln_ratio)) in one.shapes.iter().zip(&one.ln_ratio).enumerate() {
+        let pull = weight * (ln_ratio.min(HUBER_LOG_RATIO).exp() - 1.0);
+        for (i, &a) in columns.iter().enumerate() {
+            let slope = rows[i][bin];
+            if slope == 0.0 {
+                continue;
+            }
+            slopes.gradient[a] += pull * slope;
+            for (j, &b) in columns[..=i].iter().enumerate() {
+                let product = weight * slope * rows[j][bin];
+                slopes.information[(a, b)] += product;
+                if a != b {
+                    slopes.information[(b, a)] += product;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! A wall that reacts locally absorbs by the angle at which sound meets it.
+
+use sabine_propagate::wave::admittance_of_absorption;
+
+/// A wall of impedance cos(theta) absorbs everything; no real one does (energy).
+const MIN_REFLECTED: f64 = 1e-3;
+
+/// A wall of a real impedance, by its absorption at random incidence.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LocalReaction {
+    impedance: f64,
+    /// Natural logarithm of what is reflected in the mean over all angles.
+    ln_reflected: f64,
+}
+
+impl LocalReaction {
+    pub fn new(absorption: f64) -> Self {
+        let absorption = absorption.clamp(1e-4, 0.99);
+        Self { impedance: 1.0 / admittance_of_absorption(absorption), ln_reflected: (1.0 - absorption).ln() }
+    }
+
+    /// Logarithm of what it reflects at an angle over what it reflects in the mean over all (Kuttruff, Room Acoustics, 6th ed., 2.3:
+    /// R = (z cos - 1) / (z cos + 1)).
+    pub fn log_change(self, cosine: f64) -> f64 {
+        let x = self.impedance * cosine;
+        ((x - 1.0) / (x + 1.0)).powi(2).max(MIN_REFLECTED).ln() - self.ln_reflected
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mean_over_all_angles_is_the_absorption() {
+        for absorption in [0.05, 0.3, 0.8] {
+            let wall = LocalReaction::new(absorption);
+            let steps = 20_000;
+            let absorbed = |i: usize| {
+                let cosine = (i as f64 + 0.5) / steps as f64;
+                let reflected = (1.0 - absorption) * wall.log_change(cosine).exp();
+                2.0 * cosine * (1.0 - reflected) / steps as f64
+            };
+            let mean: f64 = (0..steps).map(absorbed).sum();
+            assert!((mean - absorption).abs() < 2e-3, "{mean} {absorption}");
+        }
+    }
+}
