@@ -110,7 +110,7 @@ mod tests {
                 for bin in 0..40 {
                     // One batch in four has found more than the others, the more the later, and all bins have a little of their own.
                     let energy = |batch: usize| {
-                        let common = if batch % 4 == 0 { 1.0 } else { -1.0 / 3.0 };
+                        let common = if batch.is_multiple_of(4) { 1.0 } else { -1.0 / 3.0 };
                         let own = 0.02 * ((batch * 7 + bin * 13 + band * 5) as f64).sin();
                         0.01 * bin as f64 * common + own
                     };

@@ -109,7 +109,7 @@ mod tests {
         let (before, after) = (error(&noisy, plain), error(&smoothed(&noisy), plain));
         assert!(after < 0.5 * before, "{before} {after}");
         // A flutter of every sixth bin that far exceeds chance.
-        let flutter = |bin: usize| plain(bin) * if bin % 6 == 0 { 2.0 } else { 1.0 };
+        let flutter = |bin: usize| plain(bin) * if bin.is_multiple_of(6) { 2.0 } else { 1.0 };
         let clear = decay(0.1, flutter);
         let (before, after) = (error(&clear, flutter), error(&smoothed(&clear), flutter));
         assert!(after < 1.1 * before && after < 0.03, "{before} {after}");

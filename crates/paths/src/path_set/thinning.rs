@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn certain_ones_stay_as_they_are_and_others_go() {
         let all = many();
-        let chances: Vec<f32> = (0..all.len()).map(|i| if i % 2 == 0 { 1.0 } else { 0.0 }).collect();
+        let chances: Vec<f32> = (0..all.len()).map(|i| if i.is_multiple_of(2) { 1.0 } else { 0.0 }).collect();
         let mut thinned = all.clone();
         thinned.thin(&chances, 3).unwrap();
         assert_eq!(thinned.len(), all.len() / 2);
