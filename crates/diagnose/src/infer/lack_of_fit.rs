@@ -99,7 +99,7 @@ fn simulate(baseline: &Baseline, cases: &[&Case], values: &[f64], number: u64) -
     let all: Vec<usize> = (0..baseline.pairs()).collect();
     let mut measured = baseline.observations.measured.clone();
     let assignment = assignment(baseline.pairs(), cases.iter().copied());
-    // Each response has a level of its own in each octave, and the tracer's chance was another.
+    // Each response has a level of its own in each octave, and its prediction the errors of other rays.
     let mut level = (usize::MAX, 0, 0.0f64);
     let mut chance: (usize, Vec<f64>) = (usize::MAX, Vec::new());
     let level_sd = baseline.config.level_sd_db * LN_10 / 10.0;

@@ -297,7 +297,11 @@ impl<'a> EnergyModel<'a> {
 
     /// Logarithm of the predicted energy in the bins of a pair and band, as many as are compared.
     pub fn predicted(&self, values: &[f64], pair: usize, band: usize, count: usize) -> Vec<f64> {
-        let (mut ln_energy, _) = self.paths(values, (pair, band), count, false);
+        self.affected(values, (pair, band), self.paths(values, (pair, band), count, false).0)
+    }
+
+    /// What the effects make of the logarithm of the energy of the paths.
+    fn affected(&self, values: &[f64], (pair, band): (usize, usize), mut ln_energy: Vec<f64>) -> Vec<f64> {
         let gain_db = self.gain_db(values, pair);
         let changes = HitChanges::default();
         self.apply(values, &self.view((pair, band), gain_db, &changes), gain_db, &mut ln_energy);
@@ -308,7 +312,7 @@ impl<'a> EnergyModel<'a> {
     pub fn residuals(&self, values: &[f64], pairs: impl Iterator<Item = usize>) -> Vec<BinResidual> {
         let mut found = Vec::new();
         for pair in pairs {
-            let compared = self.compared_bands(values, pair);
+            let compared = self.compared_bands(values, pair, false);
             let bins: Vec<BandBins<'_>> = compared.iter().map(ComparedBand::bins).collect();
             let offsets = Offsets::most_probable(&bins, self.level_sd());
             for (place, one) in compared.iter().enumerate() {

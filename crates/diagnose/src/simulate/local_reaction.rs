@@ -9,7 +9,7 @@ const MIN_REFLECTED: f64 = 1e-3;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LocalReaction {
     impedance: f64,
-    /// Natural logarithm of what is reflected in the mean over all angles.
+    /// Natural logarithm of what is reflected on average over all angles.
     ln_reflected: f64,
 }
 
@@ -19,7 +19,7 @@ impl LocalReaction {
         Self { impedance: 1.0 / admittance_of_absorption(absorption), ln_reflected: (1.0 - absorption).ln() }
     }
 
-    /// Logarithm of what it reflects at an angle over what it reflects in the mean over all (Kuttruff, Room Acoustics, 6th ed., 2.3:
+    /// Logarithm of what it reflects at an angle over its average over all (Kuttruff, Room Acoustics, 6th ed., 2.3:
     /// R = (z cos - 1) / (z cos + 1)).
     pub fn log_change(self, cosine: f64) -> f64 {
         let x = self.impedance * cosine;

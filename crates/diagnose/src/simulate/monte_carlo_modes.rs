@@ -53,7 +53,7 @@ pub(crate) fn deviations(batches: &[f64], energy: f64) -> impl Iterator<Item = f
     batches.iter().map(move |b| (b - mean) * unbiased / energy)
 }
 
-/// Energies that rays find are right in the mean, their logarithms are not: by half their relative variance they lie below, and where
+/// Energies that rays find are right on average, their logarithms are not: by half their relative variance they lie below, and where
 /// the bin's own scatter counts as the measurement's, whose mean is that of energies, by half of it once more. Rays that come to the
 /// same late bins by rare ways would make a second decay of it.
 ///

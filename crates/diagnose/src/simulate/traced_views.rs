@@ -134,22 +134,17 @@ impl<'a> TracedPairView<'a> {
         state.own_share * state.ln_energy[bin].exp() + leaks.sum::<f64>()
     }
 
-    /// The tracer's own variance of the bins of a band, as a share of their energy squared.
-    pub fn monte_carlo(&self, band: usize) -> &'a [f64] {
-        &self.state(band).monte_carlo
-    }
-
     /// Gathers energies of the paths, one each, in the bins of a band.
     pub fn bin_energies(&self, band: usize, energies: &[f32]) -> Vec<f64> {
         let (bins, pulse) = (self.state(band).bins, &self.room.pulses[band]);
         self.pair.sums(energies, bins, pulse, self.room.simulation.traced_s)
     }
 
-    /// The energies that are to be expected, sampled ones being smoothed over time as far as chance explains their scatter, with their
+    /// The same that are to be expected, sampled ones being smoothed over time as far as chance explains their scatter, with their
     /// variance by chance, from the scatter between batches of rays.
     pub fn expected_energies_and_variance(&self, band: usize, energies: &[f32]) -> (Vec<f64>, Vec<f64>) {
         let (bins, pulse) = (self.state(band).bins, &self.room.pulses[band]);
-        self.pair.expected_and_variance(energies, bins, pulse, self.room.simulation.traced_s)
+        self.pair.expected(energies, bins, pulse, self.room.simulation.traced_s).sums_and_variances()
     }
 
     /// Spreads a pulse of energy 1 that arrives so long after the first path over the bins of a band, as the band's filter does; returns one

@@ -4,8 +4,8 @@ use super::PathSet;
 use sabine_acoustics::Error;
 
 impl PathSet {
-    /// Keeps each contribution with a chance of its own and lets it carry one over that chance: energies stay right in the mean, whatever
-    /// the materials (Russian roulette: Arvo and Kirk 1990). Give high chances to what carries much. Contributions of like length are
+    /// Keeps each contribution with a chance of its own and lets it carry one over that chance: on average energies stay as they are,
+    /// whatever the materials (Russian roulette: Arvo and Kirk 1990). Give high chances to what carries much. Contributions of like length are
     /// drawn together, one from each full unit of chance (systematic sampling), so that sums over time scatter little. Chances
     /// outside 0 to 1 count as the nearest of these; what has none goes.
     ///

@@ -250,7 +250,7 @@ mod tests {
 
     #[test]
     fn chance_that_moves_two_bands_alike_is_told_from_their_levels() {
-        // A mode that grows with time in both bands, one and a half deviations of it at work, and a level in one band.
+        // A mode that grows with time in both bands, one and a half deviations of it, and a level in one band.
         let mode = |bin: usize| 0.005 * bin as f64;
         let modes = Modes::new(1, (0..60).map(mode).collect());
         let scatter = |bin: usize| 0.05 * (2.3 * bin as f64).sin();

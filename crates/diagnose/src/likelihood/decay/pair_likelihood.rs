@@ -13,6 +13,8 @@ use crate::statistics::HUBER_LOG_RATIO;
 /// The compared bins of one band of a response under some values.
 pub(super) struct ComparedBand<'a> {
     pub band: usize,
+    /// Logarithm of the energy of the paths before any effect, and, where slopes are wanted, its change with each absorption.
+    paths: (Vec<f64>, Vec<f64>),
     /// Logarithm of the predicted energy.
     pub predicted: Vec<f64>,
     /// Logarithm of measured over predicted energy.
@@ -31,24 +33,25 @@ impl ComparedBand<'_> {
 }
 
 impl EnergyModel<'_> {
-    /// The bands of a pair that are compared.
-    pub(super) fn compared_bands(&self, values: &[f64], pair: usize) -> Vec<ComparedBand<'_>> {
+    /// The bands of a pair that are compared; `sloping` if slopes are wanted of them.
+    pub(super) fn compared_bands(&self, values: &[f64], pair: usize, sloping: bool) -> Vec<ComparedBand<'_>> {
         (0..self.data.survey.bands.len())
             .filter_map(|band| {
                 let energies = self.compared(pair, band)?;
-                let predicted = self.predicted(values, pair, band, energies.len());
+                let paths = self.paths(values, (pair, band), energies.len(), sloping);
+                let predicted = self.affected(values, (pair, band), paths.0.clone());
                 let ln_ratio = self.ln_ratio(band, energies, &predicted);
                 let variances = self.variances(values, pair, band, energies.len());
                 let shapes = self.shapes(band, &variances);
                 let modes = &self.data.states[pair][band].modes;
-                Some(ComparedBand { band, predicted, ln_ratio, variances, shapes, modes })
+                Some(ComparedBand { band, paths, predicted, ln_ratio, variances, shapes, modes })
             })
             .collect()
     }
 
     /// Log-likelihood of one pair, its slopes added where wanted.
     pub(super) fn pair_likelihood(&self, values: &[f64], pair: usize, slopes: Option<&mut Slopes>) -> f64 {
-        let mut compared = self.compared_bands(values, pair);
+        let mut compared = self.compared_bands(values, pair, slopes.is_some());
         let bins: Vec<BandBins<'_>> = compared.iter().map(ComparedBand::bins).collect();
         let level_sd = self.level_sd();
         let offsets = Offsets::most_probable(&bins, level_sd);
@@ -60,7 +63,7 @@ impl EnergyModel<'_> {
             bins.iter().enumerate().map(|(place, bins)| offsets.of(place, bins)).collect();
         for (place, (one, offset)) in compared.iter_mut().zip(moved).enumerate() {
             one.ln_ratio.iter_mut().zip(offset).for_each(|(z, offset)| *z -= offset);
-            let (columns, rows) = self.rows(values, (pair, one.band), one.ln_ratio.len());
+            let (columns, rows) = self.rows(values, pair, one);
             add_slopes(slopes, (&columns, &rows), one);
             shared.add(place, (&columns, &rows), &one.bins());
             self.add_variance_slopes(values, (pair, one.band), &one.variances, &one.ln_ratio, slopes);
@@ -70,28 +73,21 @@ impl EnergyModel<'_> {
     }
 
     /// Columns that matter in a band, and the change of the predicted logarithm of each bin with each.
-    fn rows(
-        &self,
-        values: &[f64],
-        (pair, band): (usize, usize),
-        count: usize,
-    ) -> (Vec<usize>, Vec<Vec<f64>>) {
+    fn rows(&self, values: &[f64], pair: usize, one: &ComparedBand<'_>) -> (Vec<usize>, Vec<Vec<f64>>) {
+        let (band, (paths, path_slopes)) = (one.band, &one.paths);
         let m = self.data.absorption.len();
         let gain_db = self.gain_db(values, pair);
         let changes = HitChanges::default();
         let view = self.view((pair, band), gain_db, &changes);
-        let (paths, path_slopes) = self.paths(values, (pair, band), count, true);
         let mut columns: Vec<usize> = (0..m).map(|k| self.layout.absorption(k, band)).collect();
-        let through = self.through(values, &view, gain_db, &paths);
-        let mut rows: Vec<Vec<f64>> =
-            (0..m).map(|k| (0..count).map(|bin| path_slopes[bin * m + k] * through[bin]).collect()).collect();
+        let through = self.through(values, &view, gain_db, paths);
+        let mut rows: Vec<Vec<f64>> = (0..m)
+            .map(|k| (0..paths.len()).map(|bin| path_slopes[bin * m + k] * through[bin]).collect())
+            .collect();
         // What is added beside the paths has the same gain.
         let adds = |p: &ModelTerm<'_>| p.case.decay_term().is_some_and(DecayTerm::adds_sound_of_source);
-        let gained = if self.terms.iter().any(adds) {
-            self.with_gain(values, &view, gain_db, &paths)
-        } else {
-            through
-        };
+        let gained =
+            if self.terms.iter().any(adds) { self.with_gain(values, &view, gain_db, paths) } else { through };
         let gain: Vec<f64> = gained.iter().map(|t| t * LN_PER_DB).collect();
         if let Some(index) = self.layout.common_gain() {
             columns.push(index);
@@ -103,7 +99,7 @@ impl EnergyModel<'_> {
             for (i, p) in placed.case.parameters.iter().enumerate() {
                 if self.bears_on(p, pair, band) {
                     columns.push(placed.first + i);
-                    rows.push(self.difference(values, placed.first + i, &view, gain_db, &paths));
+                    rows.push(self.difference(values, placed.first + i, &view, gain_db, paths));
                 }
             }
         }

@@ -32,10 +32,28 @@ struct Gathered {
 }
 
 /// Energy that is to be expected in each bin: that of exact paths, and that of each batch of rays, smoothed over time.
-struct Expected {
+pub(crate) struct ExpectedEnergy {
     exact: Vec<f64>,
     /// `[bin * batches + batch]`.
     sampled: Vec<f64>,
+}
+
+impl ExpectedEnergy {
+    fn batches(&self, bin: usize) -> &[f64] {
+        let batches = usize::from(PathSet::BATCHES);
+        &self.sampled[bin * batches..(bin + 1) * batches]
+    }
+
+    fn sum(&self, bin: usize) -> f64 {
+        self.exact[bin] + self.batches(bin).iter().sum::<f64>()
+    }
+
+    /// Energy of each bin, and its variance by chance, from the scatter between batches of rays.
+    pub fn sums_and_variances(&self) -> (Vec<f64>, Vec<f64>) {
+        let variance = |bin: usize| deviations(self.batches(bin), 1.0).map(|d| d * d).sum();
+        let bins = 0..self.exact.len();
+        (bins.clone().map(|bin| self.sum(bin)).collect(), bins.map(variance).collect())
+    }
 }
 
 /// Sums over the paths that keep no time of their own, by cell.
@@ -57,36 +75,18 @@ impl TracedPair {
         duration_s: f64,
     ) -> BandState {
         let gathered = self.gather(energies, bins, pulse, duration_s);
-        let (exact, sampled) = self.sums_by_batch(energies, bins, pulse, duration_s);
-        let expected = Expected { exact, sampled: smoothed(&sampled) };
+        let expected = self.expected(energies, bins, pulse, duration_s);
         gathered.finish(bins, pulse, pulse.shares[band], self.paths.materials(), &expected)
     }
 
-    /// Energy that is to be expected in each bin, and its variance by chance, from the scatter between batches of rays.
-    pub fn expected_and_variance(
+    /// What is to be expected in each bin.
+    pub fn expected(
         &self,
         energies: &[f32],
         bins: Bins,
         kernel: &BandPulse,
         duration_s: f64,
-    ) -> (Vec<f64>, Vec<f64>) {
-        let (mut sums, sampled) = self.sums_by_batch(energies, bins, kernel, duration_s);
-        let sampled = smoothed(&sampled);
-        let batches = usize::from(PathSet::BATCHES);
-        let variance =
-            sampled.chunks(batches).map(|parts| deviations(parts, 1.0).map(|d| d * d).sum()).collect();
-        sums.iter_mut().zip(sampled.chunks(batches)).for_each(|(s, parts)| *s += parts.iter().sum::<f64>());
-        (sums, variance)
-    }
-
-    /// Energy of the exact paths in each bin, and of each batch of rays, `[bin * batches + batch]`.
-    fn sums_by_batch(
-        &self,
-        energies: &[f32],
-        bins: Bins,
-        kernel: &BandPulse,
-        duration_s: f64,
-    ) -> (Vec<f64>, Vec<f64>) {
+    ) -> ExpectedEnergy {
         let count = bins.count(duration_s);
         let cells = (duration_s / CELL_S).ceil() as usize + 1;
         let batches = usize::from(PathSet::BATCHES);
@@ -119,7 +119,7 @@ impl TracedPair {
                 });
             }
         }
-        (sums, sampled)
+        ExpectedEnergy { exact: sums, sampled: smoothed(&sampled) }
     }
 
     fn gather(&self, energies: &[f32], bins: Bins, pulse: &BandPulse, duration_s: f64) -> Gathered {
@@ -245,7 +245,7 @@ impl Gathered {
         pulse: &BandPulse,
         own_share: f64,
         materials: usize,
-        expected: &Expected,
+        expected: &ExpectedEnergy,
     ) -> BandState {
         let count = self.count;
         let floor = NOTHING * (0..count).map(|k| self.sums[k * COLUMNS]).fold(0.0, f64::max).max(1e-30);
@@ -272,13 +272,11 @@ impl Gathered {
                 - 2.0 * pulse.cell_correlation[0] * self.squares[bin]
                 + pairwise_interference(&self.isolated[bin], pulse)
                 + self.timing_variance[bin];
-            let batches = usize::from(PathSet::BATCHES);
-            let sampled = &expected.sampled[bin * batches..(bin + 1) * batches];
-            let whole = (expected.exact[bin] + sampled.iter().sum::<f64>()).max(floor);
+            let whole = expected.sum(bin).max(floor);
             state.correction.push((whole / e).ln());
-            let own = deviations(sampled, whole);
+            let own = deviations(expected.batches(bin), whole);
             state.batch_deviations.extend(own.map(|d| d as f32));
-            let own = &state.batch_deviations[bin * batches..];
+            let own = &state.batch_deviations[bin * usize::from(PathSet::BATCHES)..];
             state.monte_carlo.push(own.iter().map(|d| f64::from(d * d)).sum());
             let coherent = bins.centre_s(bin) < COHERENT_BANDWIDTH_TIMES / pulse.bandwidth_hz;
             let model_sd = if coherent { COHERENT_SD } else { MODEL_SD };
