@@ -100,7 +100,7 @@ impl Diagnoser {
         *baseline.seconds.entry("baseline").or_default() += started.elapsed().as_secs_f64();
 
         let started = Instant::now();
-        baseline.calibrate_dispersion(&[], &used)?;
+        baseline.calibrate_scatter(&[], &used)?;
         let first_dispersion = baseline.dispersion.clone();
         let mut found = select(&mut baseline, &cases, self.effects.len(), &used, observer)?;
         baseline.seconds.insert("search", started.elapsed().as_secs_f64());

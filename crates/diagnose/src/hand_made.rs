@@ -75,6 +75,8 @@ pub(crate) struct Tables {
     pub absorption: Vec<Vec<f64>>,
     priors: Vec<Vec<Prior>>,
     dispersion: Vec<f64>,
+    level_sd: Vec<f64>,
+    drift_sd: Vec<f64>,
 }
 
 impl Tables {
@@ -111,6 +113,8 @@ impl Tables {
             absorption: vec![vec![0.3, 0.4], vec![0.1, 0.12]],
             priors: vec![vec![prior(0.3), prior(0.4)], vec![prior(0.1), prior(0.12)]],
             dispersion: vec![1.0, 1.3],
+            level_sd: vec![0.16, 0.2],
+            drift_sd: vec![0.0, 0.2],
             survey,
             measured,
             states,
@@ -129,9 +133,10 @@ impl Tables {
             absorption: &self.absorption,
             priors: &self.priors,
             gain_sd_db: 0.4,
-            level_sd_db: 0.7,
+            level_sd: &self.level_sd,
             tables: &[],
             dispersion: &self.dispersion,
+            drift_sd: &self.drift_sd,
         }
     }
 
@@ -168,6 +173,8 @@ impl Tables {
             config,
             priors: self.priors,
             dispersion: self.dispersion,
+            level_sd: self.level_sd,
+            drift_sd: self.drift_sd,
             seconds: BTreeMap::new(),
         }
     }

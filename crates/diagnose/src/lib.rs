@@ -102,8 +102,8 @@ pub use extend::model_change::ModelChange;
 pub use likelihood::multilateration::{UnassignedPeak, UnassignedPeaks};
 pub use observe::pre_arrival::PreArrival;
 pub use report::diagnosis::{
-    CandidateScore, Cause, DecayCurves, Diagnosis, FittedMaterial, FoundParameter, HeldOut, HeldOutGain,
-    Isolability, LackOfFit, ResidualCell, Verdict,
+    CandidateScore, Cause, DecayCurves, Diagnosis, FitTest, FittedMaterial, FoundParameter, HeldOut,
+    HeldOutGain, Isolability, LackOfFit, ResidualCell, Verdict,
 };
 pub use simulate::scene_tracer::{EachScene, PreparedTracer, SceneTracer};
 pub use simulate::tables::{Tables, Unprepared};

@@ -2,7 +2,8 @@
 //!
 //! Physics: image sources of a box as pressure pulses with an amplitude for each octave, octaves joined by filters of zero phase
 //! whose crossovers are an eighth of an octave wide; air per octave at its exact centre (ISO 9613-1); a random sign for every image
-//! of every pair but for the direct sound, the same in all octaves, so that energies add up and no standing waves arise. Where surfaces scatter, images
+//! of every pair but for the direct sound, the same in all octaves, so that energies add up and no standing waves arise
+//! (unless [`LabConfig::positive_reflections`]). Where surfaces scatter, images
 //! keep (1 - scattering) of each reflection, and particles (Lambert) carry the rest: their energy at the receivers is filled with Gaussian
 //! noise. It shares no code with the tracer, nor with what fits or diagnoses.
 //!

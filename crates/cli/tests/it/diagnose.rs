@@ -32,6 +32,10 @@ fn is_between(value: &Value, low: f64, high: f64) -> bool {
     value.as_f64().is_some_and(|v| (low..=high).contains(&v))
 }
 
+fn is_base64(letter: char) -> bool {
+    letter.is_ascii_alphanumeric() || "+/=".contains(letter)
+}
+
 /// The contract of `diagnosis.json`, which holds for any verdict.
 fn checked(out: &Path) -> Value {
     let mut names: Vec<String> =
@@ -90,8 +94,10 @@ fn checked(out: &Path) -> Value {
     ] {
         assert!(page.contains(part), "{part}");
     }
+    // Letters of sounds and pictures are not text.
+    let text: String = page.split("base64,").map(|part| part.trim_start_matches(is_base64)).collect();
     for outside in ["src=\"http", "href=\"http", "<script", "<link", "url(", "NaN", "inf dB"] {
-        assert!(!page.contains(outside), "the page must not hold {outside}");
+        assert!(!text.contains(outside), "the page must not hold {outside}");
     }
     ExtendedModel::read(out.join("extended_model.toml")).unwrap();
     json

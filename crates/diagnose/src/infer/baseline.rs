@@ -13,7 +13,7 @@ use crate::likelihood::parameters::{ArrivalLayout, DecayLayout};
 use crate::observe::observations::Observations;
 use crate::observe::observed_response::Measured;
 use crate::simulate::scene_tracer::SceneTracer;
-use crate::simulate::schroeder::bands_of_modes;
+use crate::simulate::schroeder::{bands_of_modes, modal_variance};
 use crate::simulate::simulation::{ABSORPTION, Simulation};
 use crate::simulate::tables::{Tables, Unprepared};
 use crate::simulate::traced_pair::TracedPair;
@@ -22,6 +22,7 @@ use crate::survey::Survey;
 use sabine_acoustics::{Observer, report};
 use sabine_scene::{MaterialPrior, MeasuredRoom};
 use std::collections::BTreeMap;
+use std::f64::consts::LN_10;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -29,6 +30,8 @@ use std::time::Instant;
 const ROUNDS: usize = 4;
 /// Change of absorption (share of its prior's standard deviation) below which no further round is needed.
 const TOLERANCE: f64 = 0.1;
+/// Rounds of drift and dispersion.
+const SCATTER_ROUNDS: usize = 4;
 
 /// Observations and simulation with what the fit of the baseline needs: absorption, gains, latencies and places within what is known of
 /// them, and no cause.
@@ -40,6 +43,12 @@ pub(crate) struct Baseline {
     pub priors: Vec<Vec<Prior>>,
     /// Factor by which variances exceed what is expected, by band.
     pub dispersion: Vec<f64>,
+    /// How far the level of a response in each band may lie from the prediction (standard deviation, as a logarithm of energy): what
+    /// microphones and their places do, and what few modes leave to chance.
+    pub level_sd: Vec<f64>,
+    /// How far single responses drift from the prediction along the decay (standard deviation of the first cosine, as a logarithm of
+    /// energy), by band.
+    pub drift_sd: Vec<f64>,
     pub seconds: BTreeMap<&'static str, f64>,
 }
 
@@ -66,6 +75,8 @@ impl Baseline {
         let mut baseline = Self {
             priors: room.priors().iter().map(absorption_priors).collect(),
             dispersion: vec![1.0; room.bands().len()],
+            level_sd: level_sd(room, config),
+            drift_sd: vec![0.0; room.bands().len()],
             config: config.clone(),
             observations,
             simulation,
@@ -188,9 +199,10 @@ impl Baseline {
             absorption: &self.simulation.absorption,
             priors: &self.priors,
             gain_sd_db: self.config.gain_sd_db,
-            level_sd_db: self.config.level_sd_db,
+            level_sd: &self.level_sd,
             tables: &self.simulation.tables,
             dispersion: &self.dispersion,
+            drift_sd: &self.drift_sd,
         }
     }
 
@@ -218,10 +230,28 @@ impl Baseline {
         arrivals::fit(&self.arrival_data(), cases, used)
     }
 
+    /// Evidence of the decays in those octaves alone that lie above the Schroeder frequency; none where no octave does.
+    pub fn evidence_above_modes(
+        &self,
+        cases: &[&Case],
+        used: &[bool],
+        before: WarmStart<'_>,
+    ) -> Result<Option<f64>, Error> {
+        let modes = self.survey().bands_of_modes;
+        let above = |ends: &Vec<usize>| -> Vec<usize> {
+            ends.iter().enumerate().map(|(band, &end)| if band < modes { 0 } else { end }).collect()
+        };
+        let ends: Vec<Vec<usize>> = self.simulation.ends.iter().map(above).collect();
+        if ends.iter().flatten().all(|&end| end == 0) {
+            return Ok(None);
+        }
+        let data = EnergyData { ends: &ends, ..self.energy_data() };
+        Ok(Some(decay::fit(&data, cases, used, Some(before))?.0.log_evidence))
+    }
+
     /// The rival without a name.
     pub fn free_discrepancy(&self) -> Case {
-        let end_s = (0..self.survey().bands.len()).map(|b| self.simulation.compared_s(b)).collect();
-        free_discrepancy(self.survey(), end_s)
+        free_discrepancy(self.survey(), self.simulation.compared_s.clone())
     }
 
     /// Fits decays to energies other than those measured.
@@ -243,16 +273,25 @@ impl Baseline {
         EnergyModel::new(&data, cases, &used).residuals(values, pairs.iter().copied())
     }
 
-    /// Sets the dispersion of each band to what the bins still scatter once anything smooth has been taken out.
-    pub fn calibrate_dispersion(&mut self, cases: &[&Case], used: &[bool]) -> Result<(), Error> {
+    /// Sets how bins scatter once anything smooth that all responses share has been taken out: the drift of single responses along the
+    /// decay, and the dispersion of each band.
+    pub fn calibrate_scatter(&mut self, cases: &[&Case], used: &[bool]) -> Result<(), Error> {
         let free = self.free_discrepancy();
         let mut all = cases.to_vec();
         all.push(&free);
         let (found, _) = self.fit_energy(&all, used, None)?;
         let pairs: Vec<usize> = (0..used.len()).filter(|&p| used[p]).collect();
-        let residuals = self.residuals(&all, &found.values, &pairs);
-        self.dispersion =
-            dispersion(&residuals, self.survey().bands.len()).iter().map(|d| d.max(1.0)).collect();
+        self.drift_sd.fill(0.0);
+        // Scatter that has not been seen through would pass for drift: what is estimated first is all of it.
+        for round in 0..SCATTER_ROUNDS {
+            if round > 0 {
+                self.drift_sd =
+                    EnergyModel::new(&self.energy_data(), &all, used).most_probable_drift(&found.values);
+            }
+            let residuals = self.residuals(&all, &found.values, &pairs);
+            self.dispersion =
+                dispersion(&residuals, self.survey().bands.len()).iter().map(|d| d.max(1.0)).collect();
+        }
         Ok(())
     }
 }
@@ -269,6 +308,13 @@ pub(crate) fn dispersion(residuals: &[BinResidual], bands: usize) -> Vec<f64> {
             if own.is_empty() { 1.0 } else { own.iter().sum::<f64>() / own.len() as f64 }
         })
         .collect()
+}
+
+/// How far levels may lie off in each band, as a logarithm of energy: as far as is stated, and what few modes leave to chance.
+fn level_sd(room: &MeasuredRoom, config: &DiagnoseConfig) -> Vec<f64> {
+    let stated = config.level_sd_db * LN_10 / 10.0;
+    let modal = modal_variance(room.scene(), &room.air(), &room.bands());
+    modal.iter().map(|variance| (stated * stated + variance).sqrt()).collect()
 }
 
 fn absorption_priors(prior: &MaterialPrior) -> Vec<Prior> {

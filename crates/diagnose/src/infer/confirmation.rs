@@ -1,11 +1,14 @@
 //! Which of the causes found stand: those that help where they were not fitted, and that beat the discrepancy without a name.
 
-use crate::effect::{Nuisance, Observable, Parameter};
+use crate::effect::{Effect, Nuisance, Observable, Parameter};
+use crate::effects::RoomModes;
 use crate::error::Error;
+use crate::infer::candidates::Candidate;
 use crate::infer::cross_validation::{Folds, Predicted, predict};
 use crate::infer::lack_of_fit::{self, Lack};
 use crate::infer::search::{Search, State};
 use crate::infer::selection::Selection;
+use crate::likelihood::decay::WarmStart;
 use crate::report::diagnosis::{HeldOutGain, Verdict};
 use sabine_acoustics::{Observer, report};
 use std::time::Instant;
@@ -14,6 +17,8 @@ use std::time::Instant;
 const UNNAMED_MARGIN_NATS: f64 = 5.0;
 /// A cause helps if it brings the error of decay curves at positions left out below this share of what it was.
 const MAX_RMSE_RATIO: f64 = 0.97;
+/// What octaves above the Schroeder frequency must say for a cause, in nats.
+const LEAST_ABOVE_MODES_NATS: f64 = 1.0;
 /// Dispersion from which nothing is named: measured variance over that expected, causes and smooth discrepancy taken out.
 const MAX_DISPERSION: f64 = 100.0;
 
@@ -33,6 +38,8 @@ pub(crate) struct Confirmation {
     pub unseated: Vec<&'static str>,
     /// Causes that do not help at positions left out.
     pub unconfirmed: Vec<&'static str>,
+    /// Causes for which only octaves below the Schroeder frequency speak.
+    pub modal: Vec<&'static str>,
     pub predicting_s: f64,
     pub testing_s: f64,
 }
@@ -61,17 +68,22 @@ pub(crate) fn confirm(
     report(observer, "lack of fit", 0, 2)?;
     let lack_before = lack_of_fit::test(baseline, &[], base.before(), &search.used)?;
     report(observer, "lack of fit", 1, 2)?;
-    let mut lack_after = lack_of(search, &state)?;
-    // Where chance does not explain what a cause that is at work everywhere leaves, the cause must help where it was not fitted.
-    let mut unconfirmed: Vec<&'static str> = Vec::new();
-    while lack_after.is_some_and(|l| l.p_value < config.significance) {
-        let Some(worst) = least_confirmed(search, &state, &predicted.gains) else { break };
-        unconfirmed.push(search.candidates[worst].id);
+    let (mut modal, mut unconfirmed) = (Vec::new(), Vec::new());
+    loop {
+        let worst = if let Some(worst) = resting_on_modes(search, &state)? {
+            modal.push(search.candidates[worst].id);
+            worst
+        } else if let Some(worst) = least_confirmed(search, &state, &predicted.gains) {
+            unconfirmed.push(search.candidates[worst].id);
+            worst
+        } else {
+            break;
+        };
         found.drop(worst);
         state = search.state(&found.chosen, Some(&base))?;
         predicted = predict(search, &state, &in_turn, observer)?;
-        lack_after = lack_of(search, &state)?;
     }
+    let lack_after = lack_of(search, &state)?;
     // Where bins scatter a hundred times as far as they may, the baseline itself has not been met: no name can be trusted.
     let hopeless = baseline.dispersion.iter().any(|d| *d > MAX_DISPERSION);
     let verdict = if hopeless || is_beaten(search, &base, &state, &lack_before) {
@@ -107,6 +119,7 @@ pub(crate) fn confirm(
         hopeless,
         unseated,
         unconfirmed,
+        modal,
         predicting_s,
         testing_s: started.elapsed().as_secs_f64(),
     })
@@ -130,6 +143,39 @@ fn is_beaten(search: &Search<'_>, base: &State, state: &State, lack_before: &Lac
         && free_alone > state.energy.log_evidence + UNNAMED_MARGIN_NATS
 }
 
+/// A cause that bears on decays alone, and for which those above the Schroeder frequency do not speak. Below it neither paths nor waves
+/// between walls of uncertain impedance predict a decay as closely as hundreds of bins can measure it.
+fn resting_on_modes(search: &Search<'_>, state: &State) -> Result<Option<usize>, Error> {
+    if search.baseline.survey().bands_of_modes == 0 {
+        return Ok(None);
+    }
+    let of = |chosen: &[usize]| {
+        let cases = search.cases_of(chosen, Observable::Decay);
+        let firsts: &[usize] = if *chosen == *state.chosen { &state.energy_firsts } else { &[] };
+        let before = WarmStart { values: &state.energy.values, firsts };
+        search.baseline.evidence_above_modes(&cases, &search.used, before)
+    };
+    let Some(all) = of(&state.chosen)? else { return Ok(None) };
+    for &candidate in &state.chosen {
+        if !is_of_decays_alone(&search.candidates[candidate]) {
+            continue;
+        }
+        let rest: Vec<usize> = state.chosen.iter().copied().filter(|&c| c != candidate).collect();
+        if of(&rest)?.is_some_and(|without| all - without < LEAST_ABOVE_MODES_NATS) {
+            return Ok(Some(candidate));
+        }
+    }
+    Ok(None)
+}
+
+/// Whether decays alone speak for a cause, and paths explain it.
+fn is_of_decays_alone(candidate: &Candidate<'_>) -> bool {
+    let case = candidate.case;
+    candidate.id != RoomModes.id()
+        && case.observable() == Observable::Decay
+        && case.channel_change().is_none()
+}
+
 /// The cause at work everywhere that gains least at positions which the fit has not seen, if chance may explain even that.
 fn least_confirmed(search: &Search<'_>, state: &State, gains: &[HeldOutGain]) -> Option<usize> {
     let everywhere = |c: &usize| {
@@ -144,9 +190,42 @@ fn least_confirmed(search: &Search<'_>, state: &State, gains: &[HeldOutGain]) ->
     let helps = |gain: &HeldOutGain| {
         let nearer = gain.db_rmse_after < MAX_RMSE_RATIO * gain.db_rmse_before;
         // Likelier bins under decays that lie farther off: the cause stands for something else.
-        let farther = gain.db_rmse_after > gain.db_rmse_before;
+        let farther = MAX_RMSE_RATIO * gain.db_rmse_after > gain.db_rmse_before;
         (gain.low > 0.0 && !farther) || (gain.nats_per_bin > 0.0 && nearer)
     };
     let doubtful = state.chosen.iter().zip(gains).filter(|(c, gain)| everywhere(c) && !helps(gain));
     doubtful.min_by(|a, b| a.1.nats_per_bin.total_cmp(&b.1.nats_per_bin)).map(|(c, _)| *c)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::DiagnoseConfig;
+    use crate::effects::TransducerResponse;
+    use crate::hand_made::Tables;
+    use crate::infer::candidates::cases;
+    use sabine_scene::{Levels, TimeZero};
+
+    #[test]
+    fn what_only_the_octave_of_few_modes_says_is_known_for_that() {
+        // The lower of the two octaves lies below the Schroeder frequency.
+        for (louder, rests) in [(0, true), (1, false)] {
+            let mut tables = Tables::new(Levels::Absolute, TimeZero::Emission);
+            for (measured, states) in tables.measured.iter_mut().zip(&tables.states) {
+                for (band, (energies, state)) in measured.energies.iter_mut().zip(states).enumerate() {
+                    let gain = if band == louder { 4.0 } else { 1.0 };
+                    *energies = Some(state.ln_energy.iter().map(|l| gain * l.exp()).collect());
+                }
+            }
+            let baseline = tables.baseline(DiagnoseConfig::default());
+            let effects: Vec<Box<dyn Effect>> = vec![Box::new(TransducerResponse)];
+            let cases = cases(&effects, baseline.survey());
+            let search = Search::new(&baseline, &cases, 1, vec![true; 3]);
+            let state = search.state(&[0], None).expect("a fit");
+            let without = search.state(&[], None).expect("a fit");
+            assert!(state.log_evidence() > without.log_evidence() + 3.0, "{louder}");
+            let found = resting_on_modes(&search, &state).expect("fits");
+            assert_eq!(found.is_some(), rests, "{louder}");
+        }
+    }
 }

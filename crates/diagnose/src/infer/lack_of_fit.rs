@@ -3,7 +3,7 @@
 use crate::effect::Case;
 use crate::error::Error;
 use crate::infer::baseline::Baseline;
-use crate::likelihood::decay::{BinResidual, WarmStart};
+use crate::likelihood::decay::{BinResidual, DRIFTS, WarmStart, unit_drift};
 use crate::likelihood::parameters::assignment;
 use crate::observe::observed_response::Measured;
 use crate::statistics::{chi_squared_tail, median, poisson_tail, upper_tail};
@@ -27,6 +27,8 @@ pub(crate) struct Lack {
     pub discrepancy_nats: f64,
     /// The responses' own levels by octave.
     pub levels: Levels,
+    /// What was tested, and the probability of each.
+    pub tests: [(&'static str, f64); 3],
 }
 
 /// How far the levels of responses by octave lie from what is predicted.
@@ -36,7 +38,7 @@ pub(crate) struct Levels {
     pub p_value: f64,
     /// Root mean square, in dB.
     pub rms_db: f64,
-    /// Pair and band of the largest.
+    /// Pair and band of the one that lies farthest from what is expected.
     pub largest: Option<(usize, usize)>,
 }
 
@@ -66,26 +68,31 @@ pub(crate) fn test(
     let residuals = baseline.residuals(cases, fitted.values, &pairs);
     let odd = odd_bins(&residuals, baseline.survey().bands.len());
     let p_odd = poisson_tail(odd, ODD_BY_CHANCE);
-    let levels = levels(&residuals, &baseline.dispersion, baseline.config.level_sd_db);
-    // Three tests, corrected for their number (Bonferroni).
-    let p_value = (3.0 * smooth.min(p_odd).min(levels.p_value)).min(1.0);
-    Ok(Lack { p_value, discrepancy_nats, levels })
+    let levels = levels(&residuals, &baseline.dispersion, &baseline.level_sd);
+    let tests = [
+        ("a smooth difference that all responses share", smooth),
+        ("single odd bins", p_odd),
+        ("levels of single responses by octave", levels.p_value),
+    ];
+    // Corrected for their number (Bonferroni).
+    let least = tests.iter().map(|t| t.1).fold(1.0, f64::min);
+    Ok(Lack { p_value: (tests.len() as f64 * least).min(1.0), discrepancy_nats, levels, tests })
 }
 
-/// Whether the fitted levels of responses by octave scatter as what is known of them says (their prior's deviation in dB).
-fn levels(residuals: &[BinResidual], dispersion: &[f64], level_sd_db: f64) -> Levels {
-    let sd = level_sd_db * LN_10 / 10.0;
+/// Whether the fitted levels of responses by octave scatter as what is known of them says (their prior's deviation, by band).
+fn levels(residuals: &[BinResidual], dispersion: &[f64], level_sd: &[f64]) -> Levels {
     let (mut sum, mut squares, mut count, mut largest) = (0.0, 0.0, 0, (0.0, None));
     for one in residuals.chunk_by(|a, b| (a.pair, a.band) == (b.pair, b.band)) {
         let (level, place) = (one[0].level, (one[0].pair, one[0].band));
+        let sd = level_sd[one[0].band];
         // A level is drawn towards zero by its prior: its variance is that share of the prior's.
         let information: f64 = one.iter().map(|r| 1.0 / (r.variance * dispersion[r.band])).sum();
         let share = information / (information + 1.0 / (sd * sd));
         sum += level * level / (sd * sd * share);
         squares += level * level;
         count += 1;
-        if level.abs() > largest.0 {
-            largest = (level.abs(), Some(place));
+        if level.abs() / sd > largest.0 {
+            largest = (level.abs() / sd, Some(place));
         }
     }
     let rms_db = (squares / f64::from(count.max(1))).sqrt() * 10.0 / LN_10;
@@ -99,10 +106,10 @@ fn simulate(baseline: &Baseline, cases: &[&Case], values: &[f64], number: u64) -
     let all: Vec<usize> = (0..baseline.pairs()).collect();
     let mut measured = baseline.observations.measured.clone();
     let assignment = assignment(baseline.pairs(), cases.iter().copied());
-    // Each response has a level of its own in each octave, and its prediction the errors of other rays.
+    // Each response has a level and a drift of its own in each octave, and its prediction the errors of other rays.
     let mut level = (usize::MAX, 0, 0.0f64);
+    let mut drift = [0.0f64; DRIFTS];
     let mut chance: (usize, Vec<f64>) = (usize::MAX, Vec::new());
-    let level_sd = baseline.config.level_sd_db * LN_10 / 10.0;
     for r in baseline.residuals(cases, values, &all) {
         let modes = &baseline.simulation.states[r.pair][r.band].modes;
         if chance.0 != r.pair {
@@ -110,9 +117,12 @@ fn simulate(baseline: &Baseline, cases: &[&Case], values: &[f64], number: u64) -
         }
         if (level.0, level.1) != (r.pair, r.band) {
             let deviate: f64 = StandardNormal.sample(&mut random);
-            level = (r.pair, r.band, level_sd * deviate);
+            level = (r.pair, r.band, baseline.level_sd[r.band] * deviate);
+            drift = std::array::from_fn(|_| StandardNormal.sample(&mut random));
         }
-        let offset: f64 = modes.of(r.bin).iter().zip(&chance.1).map(|(m, z)| m * z).sum();
+        let unit = unit_drift(r.bin, baseline.simulation.ends[r.pair][r.band]);
+        let drifted = baseline.drift_sd[r.band] * unit.iter().zip(&drift).map(|(u, z)| u * z).sum::<f64>();
+        let offset = drifted + modes.of(r.bin).iter().zip(&chance.1).map(|(m, z)| m * z).sum::<f64>();
         let shape = 1.0 / (r.variance * baseline.dispersion[r.band]);
         let mean = (r.ln_predicted + level.2 + offset).exp();
         let drawn = Gamma::new(shape, mean / shape).map_or(mean, |g| g.sample(&mut random));
@@ -160,7 +170,7 @@ mod tests {
                     variance: 0.1,
                 })
             };
-            levels(&(0..30).flat_map(one).collect::<Vec<_>>(), &[1.0], 0.7)
+            levels(&(0..30).flat_map(one).collect::<Vec<_>>(), &[1.0], &[0.7 * LN_10 / 10.0])
         };
         assert!(found(0.6).p_value > 0.2 && (found(0.6).rms_db - 0.6).abs() < 0.05);
         assert!(found(1.4).p_value < 1e-6);

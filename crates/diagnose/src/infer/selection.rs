@@ -35,7 +35,7 @@ impl Selection {
     }
 }
 
-/// Greedy naming, the dispersion estimated anew after each name, and a backward check.
+/// Greedy naming, the scatter estimated anew after each name, and a backward check.
 pub(crate) fn select(
     baseline: &mut Baseline,
     cases: &[CatalogueCase],
@@ -97,7 +97,7 @@ pub(crate) fn select(
             .map(|&c| &cases[c].case)
             .filter(|c| c.observable().concerns(Observable::Decay))
             .collect();
-        baseline.calibrate_dispersion(&chosen, used)?;
+        baseline.calibrate_scatter(&chosen, used)?;
     }
     let search = Search::new(baseline, cases, effects, used.to_vec());
     let state = search.backward(search.state(&named.chosen, None)?)?;

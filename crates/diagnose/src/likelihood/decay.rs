@@ -3,6 +3,7 @@
 //! In each time bin the measured energy E is Gamma distributed about the predicted M with shape 1 / (relative variance), as
 //! the energy of band-limited noise is (Kuttruff, Room Acoustics, 6th ed., 3.5), and the prediction's own Monte-Carlo error makes it wider.
 
+mod drift;
 mod fit;
 mod offsets;
 mod pair_likelihood;
@@ -11,7 +12,8 @@ mod tests;
 mod variance;
 
 pub(crate) use fit::{WarmStart, fit};
-use offsets::{BandBins, Offsets};
+use offsets::{BandBins, Directions};
+pub(crate) use offsets::{DRIFTS, unit_drift};
 use pair_likelihood::ComparedBand;
 
 use crate::effect::{Case, Parameter, Stage};
@@ -60,12 +62,15 @@ pub(crate) struct EnergyData<'a> {
     /// What is known of it.
     pub priors: &'a [Vec<Prior>],
     pub gain_sd_db: f64,
-    /// How well the level of a response in one octave can be predicted, in dB.
-    pub level_sd_db: f64,
+    /// How far the level of a response in each band may lie from the prediction (standard deviation, as a logarithm of energy).
+    pub level_sd: &'a [f64],
     /// Tables of the terms, by slot.
     pub tables: &'a [Tables],
     /// Factor by which variances exceed what is expected, by band.
     pub dispersion: &'a [f64],
+    /// How far single responses drift from the prediction along the decay (standard deviation of the first cosine, as a logarithm of
+    /// energy), by band.
+    pub drift_sd: &'a [f64],
 }
 
 pub(crate) struct EnergyModel<'a> {
@@ -89,7 +94,7 @@ pub(crate) struct BinResidual {
     pub ln_ratio: f64,
     /// What of it the level of the whole response in this octave makes.
     pub level: f64,
-    /// The same and what the tracer's chance makes in many bins together.
+    /// The same, its drift along the decay, and what the tracer's chance makes in many bins together.
     pub offset: f64,
     pub ln_predicted: f64,
     /// Expected relative variance, dispersion left out.
@@ -314,10 +319,10 @@ impl<'a> EnergyModel<'a> {
         for pair in pairs {
             let compared = self.compared_bands(values, pair, false);
             let bins: Vec<BandBins<'_>> = compared.iter().map(ComparedBand::bins).collect();
-            let offsets = Offsets::most_probable(&bins, self.level_sd());
+            let offsets = Directions::new(&bins).top();
             for (place, one) in compared.iter().enumerate() {
-                let (level, offset) = (offsets.levels[place], offsets.of(place, &bins[place]));
-                for (bin, (&ln_ratio, &offset)) in one.ln_ratio.iter().zip(&offset).enumerate() {
+                let (level, offset) = (offsets.levels[place], &offsets.of[place]);
+                for (bin, (&ln_ratio, &offset)) in one.ln_ratio.iter().zip(offset).enumerate() {
                     let (band, ln_predicted, variance) = (one.band, one.predicted[bin], one.variances[bin]);
                     found.push(BinResidual {
                         pair,
@@ -344,11 +349,6 @@ impl<'a> EnergyModel<'a> {
     /// Shapes of the Gamma distributions of bins with these expected variances.
     fn shapes(&self, band: usize, variances: &[f64]) -> Vec<f64> {
         variances.iter().map(|v| 1.0 / (v * self.data.dispersion[band])).collect()
-    }
-
-    /// How well the level of a response in one octave can be predicted, as a logarithm of energy.
-    fn level_sd(&self) -> f64 {
-        self.data.level_sd_db * LN_PER_DB
     }
 }
 

@@ -13,7 +13,9 @@ use crate::infer::lack_of_fit::Levels;
 use crate::infer::prediction::compare;
 use crate::infer::search::{Search, State};
 use crate::infer::selection::Selection;
-use crate::report::diagnosis::{CandidateScore, Cause, Diagnosis, FittedMaterial, LackOfFit, Verdict};
+use crate::report::diagnosis::{
+    CandidateScore, Cause, Diagnosis, FitTest, FittedMaterial, HeldOutGain, LackOfFit, Verdict,
+};
 use crate::report::found_parameters::{at_bounds, parameters};
 use crate::report::notes::{Circumstances, notes};
 use crate::report::residual_map::residual_map;
@@ -22,6 +24,14 @@ use std::time::Instant;
 
 /// Dispersion from which an unexplained misfit looks like another room.
 const WARN_DISPERSION: f64 = 3.0;
+/// Drift of single responses from which a warning is due, in dB.
+const WARN_DRIFT_DB: f64 = 1.0;
+/// A cause is slight if decays at positions left out come nearer by less than this share ...
+const SLIGHT_SHARE: f64 = 0.03;
+/// ... and this, in dB.
+const SLIGHT_DB: f64 = 1.0;
+/// Logarithm of energy in one decibel.
+const LN_PER_DB: f64 = std::f64::consts::LN_10 / 10.0;
 
 /// The whole answer. `first_dispersion` is that of the baseline before any cause was named.
 pub(crate) fn compose(
@@ -53,7 +63,7 @@ pub(crate) fn compose(
         decay_curves(baseline, &before, &after, false)
     };
     let model = extension::extended_model(search, state);
-    let notes = notes_on(search, &confirmed, first_dispersion);
+    let notes = notes_on(search, &confirmed, first_dispersion, &candidates);
     let mut seconds: Vec<(String, f64)> =
         baseline.seconds.iter().map(|(stage, s)| ((*stage).to_owned(), *s)).collect();
     seconds.push(("lack of fit".into(), confirmed.testing_s));
@@ -68,6 +78,11 @@ pub(crate) fn compose(
             discrepancy_nats: lack_before.discrepancy_nats,
             discrepancy_nats_explained: lack_after.discrepancy_nats,
             dispersion,
+            drift_sd_db: baseline.drift_sd.iter().map(|sd| sd / LN_PER_DB).collect(),
+            tests: lack_after
+                .tests
+                .map(|(name, p_value)| FitTest { name: name.to_owned(), p_value })
+                .to_vec(),
         },
         causes,
         would_decide: words_that_decide(effects, &alternatives),
@@ -95,6 +110,7 @@ fn causes(
     let state = &confirmed.state;
     let one = |(place, &candidate): (usize, &usize)| {
         let own = &search.candidates[candidate];
+        let gain = confirmed.predicted.gains.get(place);
         Ok(Cause {
             effect: own.id.to_owned(),
             subject: own.case.subject.clone(),
@@ -102,14 +118,26 @@ fn causes(
             probability: found.probability(candidate),
             nats: without(search, state, candidate)?,
             parameters: parameters(search, state, candidate),
-            held_out_gain: confirmed.predicted.gains.get(place).cloned(),
+            slight: own.case.observable() == Observable::Decay && gain.is_some_and(is_slight),
+            held_out_gain: gain.cloned(),
         })
     };
     state.chosen.iter().enumerate().map(one).collect()
 }
 
-fn notes_on(search: &Search<'_>, confirmed: &Confirmation, first_dispersion: &[f64]) -> Vec<String> {
+fn is_slight(gain: &HeldOutGain) -> bool {
+    let nearer_db = gain.db_rmse_before - gain.db_rmse_after;
+    nearer_db < SLIGHT_SHARE * gain.db_rmse_before && nearer_db < SLIGHT_DB
+}
+
+fn notes_on(
+    search: &Search<'_>,
+    confirmed: &Confirmation,
+    first_dispersion: &[f64],
+    candidates: &[CandidateScore],
+) -> Vec<String> {
     let Confirmation { base, state, .. } = confirmed;
+    let baseline = search.baseline;
     let at_bounds: Vec<(&str, Vec<String>)> = state
         .chosen
         .iter()
@@ -117,7 +145,7 @@ fn notes_on(search: &Search<'_>, confirmed: &Confirmation, first_dispersion: &[f
         .filter(|(_, parameters)| !parameters.is_empty())
         .collect();
     notes(&Circumstances {
-        baseline: search.baseline,
+        baseline,
         verdict: confirmed.verdict,
         held_out: confirmed.predicted.held_out.is_some(),
         converged: base.energy.converged && state.energy.converged && state.arrivals.converged,
@@ -126,9 +154,29 @@ fn notes_on(search: &Search<'_>, confirmed: &Confirmation, first_dispersion: &[f
         scattered: first_dispersion.iter().any(|d| *d > WARN_DISPERSION),
         unseated: &confirmed.unseated,
         unconfirmed: &confirmed.unconfirmed,
+        modal: &confirmed.modal,
+        beyond_limit: &beyond_limit(search, state, candidates),
+        drift: drift_in_words(baseline),
         levels: levels_in_words(search.baseline, &confirmed.lack_after.levels),
         at_bounds: &at_bounds,
     })
+}
+
+/// Effects that the data speak for beside as many causes as may be named.
+fn beyond_limit<'c>(search: &Search<'_>, state: &State, candidates: &'c [CandidateScore]) -> Vec<&'c str> {
+    if state.chosen.len() < search.baseline.config.most_causes {
+        return Vec::new();
+    }
+    let worth = |c: &&CandidateScore| c.nats_beside_causes.is_some_and(|nats| nats >= search.threshold());
+    candidates.iter().filter(worth).map(|c| c.effect.as_str()).collect()
+}
+
+/// How far single responses drift at most, in dB, and in which octave.
+fn drift_in_words(baseline: &Baseline) -> Option<(f64, f64)> {
+    let bands = baseline.survey().bands;
+    let largest = baseline.drift_sd.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+    let (band, db) = (largest.0, largest.1 / LN_PER_DB);
+    (db >= WARN_DRIFT_DB).then(|| (db, bands.nominal_hz(band)))
 }
 
 /// Levels by octave that scatter too far, and where most.

@@ -45,6 +45,23 @@ pub struct LackOfFit {
     pub discrepancy_nats_explained: f64,
     /// Variance of the compared bins over that expected, by octave, under the named causes (1: chance alone).
     pub dispersion: Vec<f64>,
+    /// How far single responses drift from the simulation along their decay, each in its own way, by octave: standard deviation of the
+    /// slowest change, in dB. Above 0 where sound keeps its phase (flutter between parallel walls, few modes): no cause explains it.
+    #[serde(default)]
+    pub drift_sd_db: Vec<f64>,
+    /// The tests behind the probability under the named causes, which is the smallest of theirs times their number.
+    #[serde(default)]
+    pub tests: Vec<FitTest>,
+}
+
+/// One way in which the fit may lack.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct FitTest {
+    /// What was tested, in words.
+    pub name: String,
+    /// Probability of as much by chance, not corrected for the number of tests.
+    pub p_value: f64,
 }
 
 /// A parameter of a named cause.
@@ -97,6 +114,10 @@ pub struct Cause {
     pub parameters: Vec<FoundParameter>,
     /// What it gains; `None` where no position could be held out.
     pub held_out_gain: Option<HeldOutGain>,
+    /// It bears on decays alone, and brings those at positions that were left out nearer by less than 3 % and 1 dB: what the data resolve,
+    /// and no ear.
+    #[serde(default)]
+    pub slight: bool,
 }
 
 /// How much speaks for one effect of the catalogue.

@@ -39,6 +39,7 @@ struct CauseEntry<'a> {
     nats: f64,
     parameters: ByName<'a, ParameterEntry<'a>>,
     held_out_gain: Option<&'a HeldOutGain>,
+    slight: bool,
 }
 
 impl<'a> CauseEntry<'a> {
@@ -51,6 +52,7 @@ impl<'a> CauseEntry<'a> {
             nats: cause.nats,
             parameters: ByName(cause.parameters.iter().map(ParameterEntry::of).collect()),
             held_out_gain: cause.held_out_gain.as_ref(),
+            slight: cause.slight,
         }
     }
 }
@@ -86,7 +88,7 @@ mod tests {
     #![allow(clippy::unwrap_used)] // a panic is how a test fails
     use super::*;
     use crate::extend::extended_model::ExtendedModel;
-    use crate::report::diagnosis::{LackOfFit, Verdict};
+    use crate::report::diagnosis::{FitTest, LackOfFit, Verdict};
     use sabine_acoustics::Bands;
 
     #[test]
@@ -120,6 +122,8 @@ mod tests {
                 discrepancy_nats: 1.0,
                 discrepancy_nats_explained: 2.0,
                 dispersion: vec![1.0],
+                drift_sd_db: vec![0.5],
+                tests: vec![FitTest { name: "levels".into(), p_value: 0.2 }],
             },
             causes: vec![Cause {
                 effect: "time_zero".into(),
@@ -129,6 +133,7 @@ mod tests {
                 nats: 20.0,
                 parameters: vec![parameter("latency")],
                 held_out_gain: None,
+                slight: false,
             }],
             alternatives: Vec::new(),
             would_decide: Vec::new(),

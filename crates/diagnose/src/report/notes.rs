@@ -20,6 +20,12 @@ pub(crate) struct Circumstances<'a> {
     pub unseated: &'a [&'a str],
     /// Causes that do not help at positions left out.
     pub unconfirmed: &'a [&'a str],
+    /// Causes for which only octaves below the Schroeder frequency speak.
+    pub modal: &'a [&'a str],
+    /// Effects that the data speak for beside as many causes as may be named.
+    pub beyond_limit: &'a [&'a str],
+    /// How far single responses drift along their decay where it is much, in dB, and in which octave.
+    pub drift: Option<(f64, f64)>,
     /// The responses' own levels by octave, where they scatter farther than chance lets them: root mean square in dB, and the response
     /// and octave of the largest.
     pub levels: Option<(f64, String)>,
@@ -60,9 +66,8 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
     }
     if let Some((rms_db, largest)) = &about.levels {
         notes.push(format!(
-            "Levels of single responses by octave lie {rms_db:.1} dB from the prediction (root mean square), farther than the {:.1} dB \
-             that are expected; most in {largest}.",
-            about.baseline.config.level_sd_db
+            "Levels of single responses by octave lie {rms_db:.1} dB from the prediction (root mean square), farther than chance \
+             moves them; farthest in {largest}."
         ));
     }
     for (effect, parameters) in about.at_bounds {
@@ -80,6 +85,24 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
     for id in about.unconfirmed {
         notes.push(format!(
             "{id} fits the positions that it was fitted to, but does not help to predict those left out: it is not named."
+        ));
+    }
+    for id in about.modal {
+        notes.push(format!(
+            "{id} would explain the lowest octaves alone, where few room modes decide and no simulation is that exact: it is not named."
+        ));
+    }
+    if !about.beyond_limit.is_empty() {
+        notes.push(format!(
+            "No more than {} causes are named; beside them the data speak for {}, too.",
+            about.baseline.config.most_causes,
+            about.beyond_limit.join(" and ")
+        ));
+    }
+    if let Some((db, hz)) = about.drift {
+        notes.push(format!(
+            "Single responses run above and below the simulation along their decay, each in its own way, most at {hz} Hz ({db:.1} dB, \
+             standard deviation). Reflections that keep their phase do so, between parallel walls above all: no cause is sought for it."
         ));
     }
     notes

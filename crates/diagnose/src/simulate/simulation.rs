@@ -39,6 +39,8 @@ pub(crate) struct Simulation {
     pub states: Vec<Vec<BandState>>,
     /// First bin that the compared range leaves out, `[pair][band]`.
     pub ends: Vec<Vec<usize>>,
+    /// End of the compared time of each band over all pairs, in seconds after the direct sound.
+    pub compared_s: Vec<f64>,
     /// Tables of the terms, by slot.
     pub tables: Vec<Tables>,
     /// Early exact paths of each pair, and their energies by band.
@@ -94,6 +96,7 @@ impl Simulation {
             pairs,
             states: Vec::new(),
             ends: Vec::new(),
+            compared_s: Vec::new(),
             tables: Vec::new(),
             isolated_reflections: Vec::new(),
             arrivals: Vec::new(),
@@ -136,6 +139,8 @@ impl Simulation {
         }
         self.ends =
             self.states.iter().map(|s| s.iter().map(|b| range_end(b, self.range_db)).collect()).collect();
+        self.compared_s =
+            (0..observations.survey.bands.len()).map(|b| compared_s(&self.states, &self.ends, b)).collect();
         self.states.par_iter_mut().zip(&self.ends).for_each(|(s, ends)| monte_carlo_modes::find(s, ends));
         self.reference = (0..observations.survey.bands.len())
             .map(|band| {
@@ -162,13 +167,6 @@ impl Simulation {
         }
         Ok(())
     }
-
-    /// End of the compared time of each band over all pairs, in seconds after the direct sound.
-    pub fn compared_s(&self, band: usize) -> f64 {
-        (0..self.states.len())
-            .map(|p| self.states[p][band].bins.edge_s(self.ends[p][band]))
-            .fold(0.02, f64::max)
-    }
 }
 
 #[cfg(test)]
@@ -183,11 +181,14 @@ impl Simulation {
         let faces = std::array::from_fn(|face| materials[face % materials.len()].clone());
         let scene = Scene::shoebox([5.0, 4.0, 2.5], faces)?;
         let tracer: Arc<dyn SceneTracer> = Arc::new(Rays { config: DiagnoseConfig::default().tracer() });
+        let ends: Vec<Vec<usize>> =
+            states.iter().map(|bands| bands.iter().map(|b| b.ln_energy.len()).collect()).collect();
         let source = |p: &Place| Source::omni(p.id.clone(), p.position_m);
         let receiver = |p: &Place| Receiver::omni(p.id.clone(), p.position_m);
         Ok(Self {
             absorption: materials.iter().map(|m| m.absorption().values().to_vec()).collect(),
-            ends: states.iter().map(|bands| bands.iter().map(|b| b.ln_energy.len()).collect()).collect(),
+            compared_s: (0..survey.bands.len()).map(|b| compared_s(&states, &ends, b)).collect(),
+            ends,
             tables: Vec::new(),
             isolated_reflections: Vec::new(),
             direct_s: survey.responses.iter().map(|r| r.direct_s).collect(),
@@ -210,6 +211,11 @@ impl Simulation {
             receivers: survey.receivers.iter().map(receiver).collect::<Result<_, _>>()?,
         })
     }
+}
+
+/// End of the compared time of a band over all pairs, in seconds after the direct sound.
+fn compared_s(states: &[Vec<BandState>], ends: &[Vec<usize>], band: usize) -> f64 {
+    states.iter().zip(ends).map(|(s, ends)| s[band].bins.edge_s(ends[band])).fold(0.02, f64::max)
 }
 
 /// First bin that the compared range leaves out.

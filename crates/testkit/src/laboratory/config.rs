@@ -28,6 +28,9 @@ pub struct LabConfig {
     pub orientation: bool,
     /// Whether the microphones' axes are declared.
     pub microphone_axes: bool,
+    /// Whether reflections keep the sign of the sound, as in most programs of image sources: they add in phase, and standing waves arise.
+    /// Every image is summed then, which takes longer.
+    pub positive_reflections: bool,
 }
 
 impl Default for LabConfig {
@@ -44,6 +47,7 @@ impl Default for LabConfig {
             levels: Levels::Common,
             orientation: true,
             microphone_axes: false,
+            positive_reflections: false,
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What mirrors send: image sources, each with a sign of its own.
+//! What mirrors send: image sources, each with a sign of its own or all with the same.
 
 use super::box_decay::BoxDecay;
 use super::columns::Columns;
@@ -91,7 +91,9 @@ fn add_images_of<const LANES: usize>(
                 }
                 (0..LANES).for_each(|b| worth[b] *= by_angle[b] * row[b] * z.walls[b]);
                 let strongest = worth.into_iter().fold(0.0, f64::max);
-                let kept = (share * strongest / square).min(1.0);
+                // What adds in phase cannot be thinned.
+                let kept =
+                    if truth.positive_reflections { 1.0 } else { (share * strongest / square).min(1.0) };
                 if unit(hash) >= kept {
                     continue;
                 }
@@ -100,7 +102,7 @@ fn add_images_of<const LANES: usize>(
                 }
                 let direct = x.index == 0 && y.index == 0 && z.index == 0;
                 // Bits that `unit` does not look at.
-                let sign = if direct || hash & 1 == 0 { 1.0 } else { -1.0 };
+                let sign = if direct || truth.positive_reflections || hash & 1 == 0 { 1.0 } else { -1.0 };
                 let along = x.departure * source.axis[0]
                     + y.departure * source.axis[1]
                     + z.departure * source.axis[2];

@@ -80,6 +80,7 @@ pub(crate) fn draw(config: &LabConfig) -> Result<(Declared, Truth), Error> {
         };
         let mut truth = Truth {
             seed: config.seed,
+            positive_reflections: config.positive_reflections,
             bands_hz: config.bands.iter_hz().collect(),
             size_m,
             faces,

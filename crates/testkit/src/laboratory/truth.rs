@@ -13,6 +13,9 @@ use std::path::Path;
 pub struct Truth {
     /// Seed of the laboratory.
     pub seed: u64,
+    /// Whether reflections keep the sign of the sound.
+    #[serde(default)]
+    pub positive_reflections: bool,
     /// Nominal centres of the octaves in Hz.
     pub bands_hz: Vec<f64>,
     /// Length, width and height in metres, one corner at the origin.

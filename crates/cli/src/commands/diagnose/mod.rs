@@ -102,9 +102,10 @@ fn print_findings(findings: &Findings, out: &Path) {
     }
     for cause in &findings.causes {
         println!(
-            "{} (probability {:.3})",
+            "{} (probability {:.3}{})",
             words::effect_of(&cause.effect, cause.subject.as_deref()),
-            cause.probability
+            cause.probability,
+            if cause.slight { ", slight" } else { "" }
         );
         for p in &cause.parameters {
             println!(

@@ -10,7 +10,7 @@ fn findings(verdict: &str, changes: &Value) -> Findings {
     let humidity =
         json!({ "name": "relative_humidity", "value": 17.0, "low": 15.0, "high": 19.0, "unit": "%" });
     let cause = json!({ "effect": "air_absorption", "subject": null, "explanation": "It was <dry>.",
-        "probability": 0.99, "nats": 40.0, "parameters": [humidity], "held_out_gain": gain });
+        "probability": 0.99, "nats": 40.0, "parameters": [humidity], "held_out_gain": gain, "slight": true });
     let score = |id: &str, nats: f64| json!({ "effect": id, "subject": null, "nats": nats, "d_prime": 4.0, "nats_beside_causes": -1.0 });
     let residual = json!({ "response": null, "band_hz": 4000.0, "time_s": 0.34, "before_db": -4.1,
         "after_db": 0.2, "expected_sd_db": 0.5 });
@@ -38,6 +38,7 @@ fn a_named_cause_is_told_with_its_figures() {
     for part in [
         "Found: Air drier or more humid than stated.",
         "It was &lt;dry&gt;.",
+        "Slight: Air drier or more humid than stated.",
         "17.0 %",
         "15.0 and 19.0",
         "at 4 kHz, 340 ms after the direct sound: the measurement is 4.1 dB quieter",
@@ -58,7 +59,10 @@ fn each_verdict_says_what_it_means() {
     let set = json!({ "alternatives": ["surface_absorption"], "would_decide": ["measure on a damp day"] });
     let page = html(&findings("ambiguous", &set)).unwrap();
     assert!(page.contains("which of 2 causes it is") && page.contains("<li>Measure on a damp day.</li>"));
-    let page = html(&findings("unexplained", &json!({ "causes": [] }))).unwrap();
+    let fit = json!({ "p_value": 1e-4, "p_value_explained": 1e-4, "discrepancy_nats": 30.0, "discrepancy_nats_explained": 30.0,
+        "dispersion": [1.0, 1.0], "tests": [{ "name": "odd bins", "p_value": 3e-5 }, { "name": "levels", "p_value": 0.4 }] });
+    let page = html(&findings("unexplained", &json!({ "causes": [], "lack_of_fit": fit }))).unwrap();
+    assert!(page.contains("What chance does not explain: odd bins."));
     assert!(page.contains("none of the known causes explains"));
     assert!(!page.contains("After: with what was found"));
 }

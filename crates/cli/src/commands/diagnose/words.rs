@@ -116,6 +116,18 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
             }
         }
     }
+    let slight: Vec<String> = findings.causes.iter().filter(|c| c.slight).map(named).collect();
+    if !slight.is_empty() {
+        told.push(format!(
+            "Slight: {}. Decays at positions not seen come less than 3 % and 1 dB nearer; simulations by different programs differ by more.",
+            slight.join("; ")
+        ));
+    }
+    let failed: Vec<&str> =
+        fit.tests.iter().filter(|t| t.p_value < UNLIKELY).map(|t| t.name.as_str()).collect();
+    if !failed.is_empty() && fit.p_value_explained < UNLIKELY {
+        told.push(format!("What chance does not explain: {}.", failed.join("; ")));
+    }
     if let (Verdict::Unexplained | Verdict::Ambiguous | Verdict::Explained, Some(place)) =
         (findings.verdict, worst_place(findings, findings.verdict == Verdict::Unexplained))
     {

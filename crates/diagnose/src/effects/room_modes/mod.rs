@@ -15,6 +15,9 @@ use waves::WaveTable;
 /// The frequencies of modes are known to this share: so far off is the solver (0.2 % in the middle of an octave), and so is a room
 /// that is measured to a centimetre. The beats of two modes are lost after as many periods.
 const DETUNED: f64 = 0.002;
+/// The damping of a mode is known to this share: impedances do not follow from absorption alone. The error of its energy grows with what
+/// has decayed.
+const DAMPING: f64 = 0.15;
 /// Most of a bin's energy that may be left to chance where waves predict it, and least.
 const LEFT_TO_CHANCE: (f64, f64) = (0.03, 1.0);
 
@@ -24,7 +27,8 @@ const LEFT_TO_CHANCE: (f64, f64) = (0.03, 1.0);
 ///
 /// Two parameters: the share of the waves, 0 for paths alone and 1 for waves alone (the exponent of the ratio of the two
 /// energies in each bin); and how much of the spread that chance would give is left: places, walls and the mesh are known so well
-/// and no better. It grows as 1 - exp(-(2 pi f t 0.2 %)^2), for the frequencies of modes are known to 0.2 %. Octaves below 2000 sqrt(T / V) count, and the lowest if it reaches below; in a room without any there is no case.
+/// and no better. It grows as 1 - exp(-(2 pi f t 0.2 %)^2 - (15 % ln(E(0) / E(t)))^2), for the frequencies of modes are known to 0.2 %
+/// and their damping to 15 %. Octaves below 2000 sqrt(T / V) count, and the lowest if it reaches below; in a room without any there is no case.
 /// The solution is made once at the materials of the baseline, and anew when a cause has been named. [`DiagnoseConfig::wave_solutions`](crate::DiagnoseConfig::wave_solutions)
 /// turns it off.
 ///
@@ -85,8 +89,11 @@ impl DecayTerm for RoomModes {
         if view.table::<WaveTable>().is_some_and(|table| !table.is_empty()) {
             let predicted = values[0].clamp(0.0, 1.0) * (1.0 - values[1]);
             let turn_per_s = std::f64::consts::TAU * view.survey().bands().exact_hz(view.band()) * DETUNED;
+            let loudest = view.state.ln_energy[..variance.len()].iter().copied().fold(f64::MIN, f64::max);
             for (bin, v) in variance.iter_mut().enumerate() {
-                *v *= 1.0 - predicted * (-(turn_per_s * view.time_s(bin)).powi(2)).exp();
+                let turned = turn_per_s * view.time_s(bin);
+                let decayed = DAMPING * (loudest - view.state.ln_energy[bin]);
+                *v *= 1.0 - predicted * (-turned.powi(2) - decayed.powi(2)).exp();
             }
         }
     }

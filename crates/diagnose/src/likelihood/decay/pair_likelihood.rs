@@ -1,6 +1,6 @@
 //! The likelihood of one response and its slopes.
 
-use super::offsets::{BandBins, Offsets, SharedInformation};
+use super::offsets::{BandBins, Directions, SharedInformation};
 use super::{EnergyModel, LN_PER_DB, STEP};
 use crate::effect::DecayTerm;
 use crate::likelihood::laplace::Slopes;
@@ -24,11 +24,14 @@ pub(super) struct ComparedBand<'a> {
     /// Shapes of the Gamma distributions.
     shapes: Vec<f64>,
     modes: &'a Modes,
+    level_sd: f64,
+    drift_sd: f64,
 }
 
 impl ComparedBand<'_> {
     pub fn bins(&self) -> BandBins<'_> {
-        BandBins { ln_ratio: &self.ln_ratio, shapes: &self.shapes, modes: self.modes }
+        let Self { ln_ratio, shapes, modes, level_sd, drift_sd, .. } = self;
+        BandBins { ln_ratio, shapes, modes, level_sd: *level_sd, drift_sd: *drift_sd }
     }
 }
 
@@ -44,29 +47,37 @@ impl EnergyModel<'_> {
                 let variances = self.variances(values, pair, band, energies.len());
                 let shapes = self.shapes(band, &variances);
                 let modes = &self.data.states[pair][band].modes;
-                Some(ComparedBand { band, paths, predicted, ln_ratio, variances, shapes, modes })
+                Some(ComparedBand {
+                    band,
+                    paths,
+                    predicted,
+                    ln_ratio,
+                    variances,
+                    shapes,
+                    modes,
+                    level_sd: self.data.level_sd[band],
+                    drift_sd: self.data.drift_sd[band],
+                })
             })
             .collect()
     }
 
     /// Log-likelihood of one pair, its slopes added where wanted.
     pub(super) fn pair_likelihood(&self, values: &[f64], pair: usize, slopes: Option<&mut Slopes>) -> f64 {
-        let mut compared = self.compared_bands(values, pair, slopes.is_some());
+        let compared = self.compared_bands(values, pair, slopes.is_some());
         let bins: Vec<BandBins<'_>> = compared.iter().map(ComparedBand::bins).collect();
-        let level_sd = self.level_sd();
-        let offsets = Offsets::most_probable(&bins, level_sd);
+        let directions = Directions::new(&bins);
+        let offsets = directions.top();
         let tops: f64 = compared.iter().map(|one| self.tops((pair, one.band), &one.variances)).sum();
-        let value = offsets.log_likelihood(&bins, level_sd) + tops;
+        let value = offsets.log_likelihood + tops;
         let Some(slopes) = slopes else { return value };
-        let mut shared = SharedInformation::new(&bins, level_sd);
-        let moved: Vec<Vec<f64>> =
-            bins.iter().enumerate().map(|(place, bins)| offsets.of(place, bins)).collect();
-        for (place, (one, offset)) in compared.iter_mut().zip(moved).enumerate() {
-            one.ln_ratio.iter_mut().zip(offset).for_each(|(z, offset)| *z -= offset);
+        let mut shared = SharedInformation::new(&directions);
+        for (place, (one, offset)) in compared.iter().zip(&offsets.of).enumerate() {
+            let ln_ratio: Vec<f64> = one.ln_ratio.iter().zip(offset).map(|(z, offset)| z - offset).collect();
             let (columns, rows) = self.rows(values, pair, one);
-            add_slopes(slopes, (&columns, &rows), one);
-            shared.add(place, (&columns, &rows), &one.bins());
-            self.add_variance_slopes(values, (pair, one.band), &one.variances, &one.ln_ratio, slopes);
+            add_slopes(slopes, (&columns, &rows), (&one.shapes, &ln_ratio));
+            shared.add(place, (&columns, &rows));
+            self.add_variance_slopes(values, (pair, one.band), &one.variances, &ln_ratio, slopes);
         }
         shared.take_off(slopes);
         value
@@ -154,8 +165,12 @@ impl EnergyModel<'_> {
 }
 
 /// Adds what the bins of one band say.
-fn add_slopes(slopes: &mut Slopes, (columns, rows): (&[usize], &[Vec<f64>]), one: &ComparedBand<'_>) {
-    for (bin, (&weight, ln_ratio)) in one.shapes.iter().zip(&one.ln_ratio).enumerate() {
+fn add_slopes(
+    slopes: &mut Slopes,
+    (columns, rows): (&[usize], &[Vec<f64>]),
+    (shapes, ln_ratio): (&[f64], &[f64]),
+) {
+    for (bin, (&weight, ln_ratio)) in shapes.iter().zip(ln_ratio).enumerate() {
         let pull = weight * (ln_ratio.min(HUBER_LOG_RATIO).exp() - 1.0);
         for (i, &a) in columns.iter().enumerate() {
             let slope = rows[i][bin];

@@ -72,3 +72,27 @@ fn a_response_that_does_not_count_has_no_say() {
     let [first, second] = [[true, false, false], [false, true, true]].map(likelihood);
     assert!((likelihood([true; 3]) - first - second).abs() < 1e-9);
 }
+
+#[test]
+fn a_drift_is_estimated_in_the_band_in_which_responses_drift() {
+    let mut tables = HandMade::new(Levels::Absolute, TimeZero::Emission);
+    for pair in 0..3 {
+        for band in 0..2 {
+            let predicted = &tables.states[pair][band].ln_energy;
+            let drift = |bin: usize| [0.8, -0.7, 0.6][pair] * unit_drift(bin, predicted.len())[0];
+            let off =
+                |bin: usize| 0.1 * ((3 * bin + pair) as f64).sin() + if band == 1 { drift(bin) } else { 0.0 };
+            let energies = predicted.iter().enumerate().map(|(bin, ln)| (ln + off(bin)).exp()).collect();
+            tables.measured[pair].energies[band] = Some(energies);
+        }
+    }
+    let data = EnergyData { drift_sd: &[0.0, 0.0], dispersion: &[1.0, 1.0], ..tables.energy_data() };
+    let model = EnergyModel::new(&data, &[], &[true; 3]);
+    let found = model.most_probable_drift(&model.start(None));
+    assert_eq!(found[0], 0.0);
+    // The root mean square of what was hidden is 0.7.
+    assert!((0.4..1.2).contains(&found[1]), "{found:?}");
+    // Without the response that counts for nothing there is as much.
+    let used = [true, true, false];
+    assert!(EnergyModel::new(&data, &[], &used).most_probable_drift(&model.start(None))[1] > 0.3);
+}
