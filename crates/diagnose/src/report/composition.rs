@@ -28,8 +28,10 @@ const WARN_DISPERSION: f64 = 3.0;
 const WARN_DRIFT_DB: f64 = 1.0;
 /// A cause is slight if decays at positions left out come nearer by less than this share ...
 const SLIGHT_SHARE: f64 = 0.03;
-/// ... and this, in dB.
+/// ... and this, in dB, ...
 const SLIGHT_DB: f64 = 1.0;
+/// ... and their bins become more probable by less than this: what changes the early sound leaves decays as they are.
+const SLIGHT_NATS_PER_BIN: f64 = 0.01;
 /// Logarithm of energy in one decibel.
 const LN_PER_DB: f64 = std::f64::consts::LN_10 / 10.0;
 
@@ -127,7 +129,9 @@ fn causes(
 
 fn is_slight(gain: &HeldOutGain) -> bool {
     let nearer_db = gain.db_rmse_before - gain.db_rmse_after;
-    nearer_db < SLIGHT_SHARE * gain.db_rmse_before && nearer_db < SLIGHT_DB
+    nearer_db < SLIGHT_SHARE * gain.db_rmse_before
+        && nearer_db < SLIGHT_DB
+        && gain.nats_per_bin < SLIGHT_NATS_PER_BIN
 }
 
 fn notes_on(
