@@ -268,8 +268,19 @@ impl Baseline {
 
     /// Bins of the given pairs under fitted values.
     pub fn residuals(&self, cases: &[&Case], values: &[f64], pairs: &[usize]) -> Vec<BinResidual> {
+        self.residuals_of(&self.observations.measured, cases, values, pairs)
+    }
+
+    /// The same of energies other than those measured.
+    pub fn residuals_of(
+        &self,
+        measured: &[Measured],
+        cases: &[&Case],
+        values: &[f64],
+        pairs: &[usize],
+    ) -> Vec<BinResidual> {
         let used = vec![true; self.pairs()];
-        let data = self.energy_data();
+        let data = EnergyData { measured, ..self.energy_data() };
         EnergyModel::new(&data, cases, &used).residuals(values, pairs.iter().copied())
     }
 

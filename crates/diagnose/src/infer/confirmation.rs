@@ -66,7 +66,7 @@ pub(crate) fn confirm(
 
     let started = Instant::now();
     report(observer, "lack of fit", 0, 2)?;
-    let lack_before = lack_of_fit::test(baseline, &[], base.before(), &search.used)?;
+    let lack_before = lack_of_fit::test(search, &base)?;
     report(observer, "lack of fit", 1, 2)?;
     let (mut modal, mut unconfirmed) = (Vec::new(), Vec::new());
     loop {
@@ -113,8 +113,8 @@ pub(crate) fn confirm(
         base,
         state,
         predicted,
+        lack_after: lack_after.unwrap_or_else(|| lack_before.clone()),
         lack_before,
-        lack_after: lack_after.unwrap_or(lack_before),
         verdict,
         hopeless,
         unseated,
@@ -130,8 +130,7 @@ fn lack_of(search: &Search<'_>, state: &State) -> Result<Option<Lack>, Error> {
     if state.chosen.is_empty() {
         return Ok(None);
     }
-    let cases = search.cases_of(&state.chosen, Observable::Decay);
-    lack_of_fit::test(search.baseline, &cases, state.before(), &search.used).map(Some)
+    lack_of_fit::test(search, state).map(Some)
 }
 
 /// Whether the discrepancy without a name beats all causes. Causes that do not bear on decays are beyond its reach.

@@ -1,25 +1,44 @@
-//! Whether chance explains what is left.
+//! Whether chance explains what is left: a critic of many small tests (posterior predictive checks: Gelman, Meng and Stern 1996).
 
-use crate::effect::Case;
+mod levels;
+mod scatter;
+mod simulated;
+mod stated;
+
+pub(crate) use levels::Levels;
+pub(crate) use scatter::odd_bins;
+
+use crate::effect::Observable;
 use crate::error::Error;
 use crate::infer::baseline::Baseline;
-use crate::likelihood::decay::{BinResidual, DRIFTS, WarmStart, unit_drift};
-use crate::likelihood::parameters::assignment;
+use crate::infer::search::{Search, State};
+use crate::likelihood::arrivals::ArrivalModel;
+use crate::likelihood::decay::{BinResidual, EnergyModel};
+use crate::likelihood::laplace::Model;
 use crate::observe::observed_response::Measured;
-use crate::statistics::{chi_squared_tail, median, poisson_tail, upper_tail};
-use rand::SeedableRng;
-use rand_distr::{Distribution, Gamma, StandardNormal};
-use rand_pcg::Pcg64Mcg;
+use crate::statistics::{poisson_tail, upper_tail};
 use rayon::prelude::*;
-use std::f64::consts::LN_10;
+use sabine_scene::Levels as StatedLevels;
+use std::ops::Range;
 
-/// A bin is odd if its energy is as improbable as a normal deviate beyond this.
-const ODD_SD: f64 = 4.5;
 /// Odd bins that are put down to chance, on the average: normal deviates would give 0.02 among 3000 bins, pulses that meet more.
 const ODD_BY_CHANCE: f64 = 1.5;
+/// Sound is early until this long after the direct sound (ISO 3382-1: speech), in seconds.
+const EARLY_S: f64 = 0.05;
 
-/// The two ways in which a fit can lack.
-#[derive(Clone, Copy, Debug)]
+/// One way in which a fit may lack.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Test {
+    /// What was tested.
+    pub name: &'static str,
+    /// Where it stands out most, if that can be said.
+    pub subject: Option<String>,
+    /// Probability of as much by chance, corrected for the places that were looked at.
+    pub p_value: f64,
+}
+
+/// The ways in which a fit lacks.
+#[derive(Clone, Debug)]
 pub(crate) struct Lack {
     /// Probability of as much by chance.
     pub p_value: f64,
@@ -27,174 +46,172 @@ pub(crate) struct Lack {
     pub discrepancy_nats: f64,
     /// The responses' own levels by octave.
     pub levels: Levels,
-    /// What was tested, and the probability of each.
-    pub tests: [(&'static str, f64); 3],
+    /// What was tested.
+    pub tests: Vec<Test>,
 }
 
-/// How far the levels of responses by octave lie from what is predicted.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Levels {
-    /// Probability of as much by chance.
-    pub p_value: f64,
-    /// Root mean square, in dB.
-    pub rms_db: f64,
-    /// Pair and band of the one that lies farthest from what is expected.
-    pub largest: Option<(usize, usize)>,
-}
-
-/// Tests a fitted model: against a smooth discrepancy that all positions share, calibrated on measurements simulated from
-/// the model itself; and for single odd bins.
-pub(crate) fn test(
-    baseline: &Baseline,
-    cases: &[&Case],
-    fitted: WarmStart<'_>,
-    used: &[bool],
-) -> Result<Lack, Error> {
-    let free = baseline.free_discrepancy();
-    let gain = |measured: &[Measured]| -> Result<(f64, f64), Error> {
-        let base = baseline.fit_energy_to(measured, cases, used, Some(fitted))?;
-        let mut all = cases.to_vec();
-        all.push(&free);
-        let more = baseline.fit_energy_to(measured, &all, used, Some(fitted))?;
-        Ok((more.log_likelihood - base.log_likelihood, more.log_evidence - base.log_evidence))
-    };
-    let (found, discrepancy_nats) = gain(&baseline.observations.measured)?;
-    let simulated: Vec<f64> = (0..baseline.config.simulations as u64)
-        .into_par_iter()
-        .map(|i| Ok(gain(&simulate(baseline, cases, fitted.values, i))?.0))
-        .collect::<Result<_, Error>>()?;
-    let smooth = upper_tail(found, &simulated);
-    let pairs: Vec<usize> = (0..used.len()).filter(|&p| used[p]).collect();
-    let residuals = baseline.residuals(cases, fitted.values, &pairs);
-    let odd = odd_bins(&residuals, baseline.survey().bands.len());
-    let p_odd = poisson_tail(odd, ODD_BY_CHANCE);
-    let levels = levels(&residuals, &baseline.dispersion, &baseline.level_sd);
-    let tests = [
-        ("a smooth difference that all responses share", smooth),
-        ("single odd bins", p_odd),
-        ("levels of single responses by octave", levels.p_value),
-    ];
+/// Tests a fitted model: on measurements simulated from the model itself, on what is known of levels, and on what was stated.
+pub(crate) fn test(search: &Search<'_>, state: &State) -> Result<Lack, Error> {
+    let baseline = search.baseline;
+    let bands = baseline.survey().bands.len();
+    let pairs: Vec<usize> = (0..search.used.len()).filter(|&p| search.used[p]).collect();
+    let cases = search.cases_of(&state.chosen, Observable::Decay);
+    let residuals = baseline.residuals(&cases, &state.energy.values, &pairs);
+    let (mut tests, discrepancy_nats) = against_simulated(search, state, &pairs)?;
+    let p_odd = poisson_tail(odd_bins(&residuals, bands), ODD_BY_CHANCE);
+    tests.push(Test { name: "single odd bins", subject: None, p_value: p_odd });
+    // Below the Schroeder frequency few modes decide how far bins scatter.
+    let mut diffuse = residuals.clone();
+    diffuse.retain(|r| r.band >= baseline.survey().bands_of_modes);
+    let by_band = scatter::by_group(&diffuse, bands, |r| r.band);
+    let by_pair = scatter::by_group(&diffuse, baseline.pairs(), |r| r.pair);
+    let hz = |band: usize| format!("{} Hz", baseline.survey().bands.nominal_hz(band));
+    let response = |pair: usize| baseline.survey().responses[pair].name.clone();
+    tests.push(least("scatter of bins by octave", by_band.into_iter().enumerate(), hz));
+    tests.push(least("scatter of bins by response", by_pair.into_iter().enumerate(), response));
+    let levels = levels::levels(&residuals, &baseline.dispersion, &baseline.level_sd);
+    let farthest = levels.largest.map(|(pair, band)| place(baseline, pair, band));
+    let name = "levels of single responses by octave";
+    tests.push(Test { name, subject: farthest, p_value: levels.p_value });
+    tests.extend(what_levels_go_with(baseline, &residuals));
+    tests.extend(against_statements(search, state));
     // Corrected for their number (Bonferroni).
-    let least = tests.iter().map(|t| t.1).fold(1.0, f64::min);
-    Ok(Lack { p_value: (tests.len() as f64 * least).min(1.0), discrepancy_nats, levels, tests })
+    let worst = tests.iter().map(|t| t.p_value).fold(1.0, f64::min);
+    Ok(Lack { p_value: (tests.len() as f64 * worst).min(1.0), discrepancy_nats, levels, tests })
 }
 
-/// Whether the fitted levels of responses by octave scatter as what is known of them says (their prior's deviation, by band).
-fn levels(residuals: &[BinResidual], dispersion: &[f64], level_sd: &[f64]) -> Levels {
-    let (mut sum, mut squares, mut count, mut largest) = (0.0, 0.0, 0, (0.0, None));
-    for one in residuals.chunk_by(|a, b| (a.pair, a.band) == (b.pair, b.band)) {
-        let (level, place) = (one[0].level, (one[0].pair, one[0].band));
-        let sd = level_sd[one[0].band];
-        // A level is drawn towards zero by its prior: its variance is that share of the prior's.
-        let information: f64 = one.iter().map(|r| 1.0 / (r.variance * dispersion[r.band])).sum();
-        let share = information / (information + 1.0 / (sd * sd));
-        sum += level * level / (sd * sd * share);
-        squares += level * level;
-        count += 1;
-        if level.abs() / sd > largest.0 {
-            largest = (level.abs() / sd, Some(place));
-        }
+fn place(baseline: &Baseline, pair: usize, band: usize) -> String {
+    let survey = baseline.survey();
+    format!("{} at {} Hz", survey.responses[pair].name, survey.bands.nominal_hz(band))
+}
+
+/// The smallest of several probabilities, corrected for their number, and what it is of.
+fn least(
+    name: &'static str,
+    all: impl ExactSizeIterator<Item = (usize, f64)>,
+    subject: impl Fn(usize) -> String,
+) -> Test {
+    let count = all.len() as f64;
+    let worst = all.min_by(|a, b| a.1.total_cmp(&b.1));
+    Test {
+        name,
+        subject: worst.map(|(i, _)| subject(i)),
+        p_value: worst.map_or(1.0, |(_, p)| (count * p).min(1.0)),
     }
-    let rms_db = (squares / f64::from(count.max(1))).sqrt() * 10.0 / LN_10;
-    Levels { p_value: chi_squared_tail(sum, f64::from(count)), rms_db, largest: largest.1 }
 }
 
-/// A measurement as the fitted model expects it.
-fn simulate(baseline: &Baseline, cases: &[&Case], values: &[f64], number: u64) -> Vec<Measured> {
-    let mut random =
-        Pcg64Mcg::seed_from_u64(baseline.config.seed ^ (number + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
-    let all: Vec<usize> = (0..baseline.pairs()).collect();
-    let mut measured = baseline.observations.measured.clone();
-    let assignment = assignment(baseline.pairs(), cases.iter().copied());
-    // Each response has a level and a drift of its own in each octave, and its prediction the errors of other rays.
-    let mut level = (usize::MAX, 0, 0.0f64);
-    let mut drift = [0.0f64; DRIFTS];
-    let mut chance: (usize, Vec<f64>) = (usize::MAX, Vec::new());
-    for r in baseline.residuals(cases, values, &all) {
-        let modes = &baseline.simulation.states[r.pair][r.band].modes;
-        if chance.0 != r.pair {
-            chance = (r.pair, (0..modes.count()).map(|_| StandardNormal.sample(&mut random)).collect());
-        }
-        if (level.0, level.1) != (r.pair, r.band) {
-            let deviate: f64 = StandardNormal.sample(&mut random);
-            level = (r.pair, r.band, baseline.level_sd[r.band] * deviate);
-            drift = std::array::from_fn(|_| StandardNormal.sample(&mut random));
-        }
-        let unit = unit_drift(r.bin, baseline.simulation.ends[r.pair][r.band]);
-        let drifted = baseline.drift_sd[r.band] * unit.iter().zip(&drift).map(|(u, z)| u * z).sum::<f64>();
-        let offset = drifted + modes.of(r.bin).iter().zip(&chance.1).map(|(m, z)| m * z).sum::<f64>();
-        let shape = 1.0 / (r.variance * baseline.dispersion[r.band]);
-        let mean = (r.ln_predicted + level.2 + offset).exp();
-        let drawn = Gamma::new(shape, mean / shape).map_or(mean, |g| g.sample(&mut random));
-        if let Some(energies) = &mut measured[assignment[r.pair]].energies[r.band] {
-            energies[r.bin] = drawn;
-        }
-    }
-    measured
+/// What a measurement is compared in with those that the fitted model makes.
+struct Compared {
+    /// Gain of a smooth difference that all responses share, in log-likelihood and in evidence.
+    smooth: (f64, f64),
+    /// Sum over responses of the squared contrasts of early and late sound.
+    early: f64,
+    /// Pair of the largest contrast.
+    largest: Option<usize>,
 }
 
-/// Bins that chance does not explain, once each band's usual spread is allowed for.
-pub(crate) fn odd_bins(residuals: &[BinResidual], bands: usize) -> usize {
-    // Wilson and Hilferty 1931: the cube root of a Gamma variate is nearly normal.
-    let deviate = |r: &BinResidual, spread: f64| {
-        let ninth = r.variance * spread / 9.0;
-        (((r.ln_ratio - r.offset) / 3.0).exp() - 1.0 + ninth) / ninth.sqrt()
-    };
-    (0..bands)
-        .map(|band| {
-            let own: Vec<&BinResidual> = residuals.iter().filter(|r| r.band == band).collect();
-            // Half of the squares of normal deviates lie below 0.455.
-            let usual = median(own.iter().map(|r| deviate(r, 1.0).powi(2)).collect()) / 0.455;
-            own.iter().filter(|r| deviate(r, usual.max(1.0)).abs() > ODD_SD).count()
+/// Tests against measurements that are simulated from the fitted model; the evidence for a smooth difference, in nats.
+fn against_simulated(search: &Search<'_>, state: &State, pairs: &[usize]) -> Result<(Vec<Test>, f64), Error> {
+    let baseline = search.baseline;
+    let cases = search.cases_of(&state.chosen, Observable::Decay);
+    let free = baseline.free_discrepancy();
+    let mut all = cases.clone();
+    all.push(&free);
+    let early_bins = |pair: usize, band: usize| baseline.simulation.states[pair][band].bins.count(EARLY_S);
+    let compare = |measured: &[Measured]| -> Result<Compared, Error> {
+        let base = baseline.fit_energy_to(measured, &cases, &search.used, Some(state.before()))?;
+        let more = baseline.fit_energy_to(measured, &all, &search.used, Some(state.before()))?;
+        let residuals = baseline.residuals_of(measured, &cases, &base.values, pairs);
+        let early = scatter::early_against_late(&residuals, &baseline.dispersion, early_bins);
+        Ok(Compared {
+            smooth: (more.log_likelihood - base.log_likelihood, more.log_evidence - base.log_evidence),
+            early: early.iter().map(|(_, contrast)| contrast).sum(),
+            largest: early.iter().max_by(|a, b| a.1.total_cmp(&b.1)).map(|(pair, _)| *pair),
         })
-        .sum()
+    };
+    let found = compare(&baseline.observations.measured)?;
+    let simulated: Vec<Compared> = (0..baseline.config.simulations as u64)
+        .into_par_iter()
+        .map(|i| compare(&simulated::simulate(baseline, &cases, &state.energy.values, i)))
+        .collect::<Result<_, Error>>()?;
+    let tail =
+        |of: fn(&Compared) -> f64| upper_tail(of(&found), &simulated.iter().map(of).collect::<Vec<f64>>());
+    let response = found.largest.map(|p| baseline.survey().responses[p].name.clone());
+    let test = |name, subject, p_value| Test { name, subject, p_value };
+    let tests = vec![
+        test("a smooth difference that all responses share", None, tail(|c| c.smooth.0)),
+        test("early sound against late in single responses", response, tail(|c| c.early)),
+    ];
+    Ok((tests, found.smooth.1))
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// Whether levels of single responses go with distance, directions, sources or receivers.
+fn what_levels_go_with(baseline: &Baseline, residuals: &[BinResidual]) -> Vec<Test> {
+    let survey = baseline.survey();
+    let line = |pair: usize| -> (f64, [f64; 3]) {
+        let response = &survey.responses[pair];
+        let (from, to) =
+            (survey.sources[response.source].position_m, survey.receivers[response.receiver].position_m);
+        let offset: [f64; 3] = std::array::from_fn(|k| to[k] - from[k]);
+        let far = offset.iter().map(|o| o * o).sum::<f64>().sqrt();
+        (far, offset.map(|o| o / far))
+    };
+    let indicator =
+        |of: usize, count: usize| -> Vec<f64> { (0..count).map(|i| f64::from(u8::from(i == of))).collect() };
+    let pairs = 0..survey.responses.len();
+    let of_each =
+        |columns: &dyn Fn(usize) -> Vec<f64>| -> Vec<Vec<f64>> { pairs.clone().map(columns).collect() };
+    let known = [
+        ("levels that go with the distance", of_each(&|p| vec![line(p).0.ln()])),
+        ("levels that go with the direction between source and receiver", of_each(&|p| line(p).1.to_vec())),
+        (
+            "levels that go with the source",
+            of_each(&|p| indicator(survey.responses[p].source, survey.sources.len())),
+        ),
+        (
+            "levels that go with the receiver",
+            of_each(&|p| indicator(survey.responses[p].receiver, survey.receivers.len())),
+        ),
+    ];
+    let test = |(name, columns): (&'static str, Vec<Vec<f64>>)| {
+        let p_value = levels::go_with(residuals, survey.bands.len(), &columns, baseline.config.seed)?;
+        Some(Test { name, subject: None, p_value })
+    };
+    known.into_iter().filter_map(test).collect()
+}
 
-    #[test]
-    fn levels_that_scatter_farther_than_is_known_of_them_are_no_chance() {
-        let found = |sd_db: f64| {
-            let one = |pair: usize| {
-                let level = sd_db * LN_10 / 10.0 * (1.9 * pair as f64).sin() * 2f64.sqrt();
-                (0..40).map(move |bin| BinResidual {
-                    pair,
-                    band: 0,
-                    bin,
-                    ln_ratio: level,
-                    level,
-                    offset: level,
-                    ln_predicted: 0.0,
-                    variance: 0.1,
-                })
-            };
-            levels(&(0..30).flat_map(one).collect::<Vec<_>>(), &[1.0], &[0.7 * LN_10 / 10.0])
-        };
-        assert!(found(0.6).p_value > 0.2 && (found(0.6).rms_db - 0.6).abs() < 0.05);
-        assert!(found(1.4).p_value < 1e-6);
+/// Whether fitted absorption, gains and places contradict the room file.
+fn against_statements(search: &Search<'_>, state: &State) -> Vec<Test> {
+    let (baseline, survey) = (search.baseline, search.baseline.survey());
+    let (energy_data, arrival_data) = (baseline.energy_data(), baseline.arrival_data());
+    let decay_cases = search.cases_of(&state.chosen, Observable::Decay);
+    let decays = EnergyModel::new(&energy_data, &decay_cases, &search.used);
+    let arrival_cases = search.cases_of(&state.chosen, Observable::Arrivals);
+    let arrivals = ArrivalModel::new(&arrival_data, &arrival_cases, &search.used);
+    let (layout, places) = (baseline.decay_layout(), baseline.arrival_layout());
+    // Below the Schroeder frequency absorption makes up for modes.
+    let of_material = |m: usize| -> Vec<usize> {
+        (survey.bands_of_modes..survey.bands.len()).map(|b| layout.absorption(m, b)).collect()
+    };
+    let absorption = (0..survey.materials.len())
+        .map(|m| (m, stated::contradiction(&state.energy, decays.priors(), &of_material(m))));
+    let mut tests = vec![least("absorption against the tables", absorption, |m| survey.materials[m].clone())];
+    if survey.measurement.levels != StatedLevels::PerResponse {
+        let gains: Vec<usize> = (0..survey.responses.len()).map(|r| layout.gain(r)).collect();
+        let p_value = stated::contradiction(&state.energy, decays.priors(), &gains);
+        tests.push(Test { name: "gains of responses against what is stated", subject: None, p_value });
     }
-
-    #[test]
-    fn a_bin_that_no_spread_of_its_band_explains_is_odd() {
-        let bin = |bin: usize, ln_ratio: f64| BinResidual {
-            pair: 0,
-            band: 0,
-            bin,
-            ln_ratio,
-            level: 0.0,
-            offset: 0.0,
-            ln_predicted: 0.0,
-            variance: 0.2,
-        };
-        let scatter = |i: usize| 0.4 * (1.7 * i as f64).sin();
-        let mut residuals: Vec<BinResidual> = (0..50).map(|i| bin(i, scatter(i))).collect();
-        assert_eq!(odd_bins(&residuals, 1), 0);
-        residuals[20].ln_ratio = 4.0;
-        assert_eq!(odd_bins(&residuals, 1), 1);
-        // Where all bins scatter as far, none of them is odd.
-        let wide: Vec<BinResidual> = (0..50).map(|i| bin(i, 4.0 * scatter(i))).collect();
-        assert_eq!(odd_bins(&wide, 1), 0);
-    }
+    let sources = survey.sources.len();
+    let of_place = |i: usize| -> Range<usize> {
+        if i < sources { places.source(i) } else { places.receiver(i - sources) }
+    };
+    let stated = (0..sources + survey.receivers.len()).map(|i| {
+        let own: Vec<usize> = of_place(i).collect();
+        (i, stated::contradiction(&state.arrivals, arrivals.priors(), &own))
+    });
+    let name = |i: usize| {
+        if i < sources { survey.sources[i].id.clone() } else { survey.receivers[i - sources].id.clone() }
+    };
+    tests.push(least("places against what is stated", stated, name));
+    tests
 }

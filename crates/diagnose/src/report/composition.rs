@@ -9,7 +9,7 @@ use crate::infer::candidates::EffectScore;
 use crate::infer::confirmation::Confirmation;
 use crate::infer::cross_validation::decay_curves;
 use crate::infer::isolability::isolability;
-use crate::infer::lack_of_fit::Levels;
+use crate::infer::lack_of_fit::{Levels, Test};
 use crate::infer::prediction::compare;
 use crate::infer::search::{Search, State};
 use crate::infer::selection::Selection;
@@ -81,10 +81,7 @@ pub(crate) fn compose(
             discrepancy_nats_explained: lack_after.discrepancy_nats,
             dispersion,
             drift_sd_db: baseline.drift_sd.iter().map(|sd| sd / LN_PER_DB).collect(),
-            tests: lack_after
-                .tests
-                .map(|(name, p_value)| FitTest { name: name.to_owned(), p_value })
-                .to_vec(),
+            tests: lack_after.tests.iter().map(fit_test).collect(),
         },
         causes,
         would_decide: words_that_decide(effects, &alternatives),
@@ -188,6 +185,10 @@ fn levels_in_words(baseline: &Baseline, levels: &Levels) -> Option<(f64, String)
     let (pair, band) = levels.largest.filter(|_| levels.p_value < baseline.config.significance)?;
     let (name, hz) = (&baseline.survey().responses[pair].name, baseline.survey().bands.nominal_hz(band));
     Some((levels.rms_db, format!("{name} at {hz} Hz")))
+}
+
+fn fit_test(test: &Test) -> FitTest {
+    FitTest { name: test.name.to_owned(), subject: test.subject.clone(), p_value: test.p_value }
 }
 
 fn candidate_scores(

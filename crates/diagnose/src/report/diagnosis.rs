@@ -60,7 +60,10 @@ pub struct LackOfFit {
 pub struct FitTest {
     /// What was tested, in words.
     pub name: String,
-    /// Probability of as much by chance, not corrected for the number of tests.
+    /// Where it stands out most, if that can be said: a response, a material, an octave.
+    #[serde(default)]
+    pub subject: Option<String>,
+    /// Probability of as much by chance, corrected for the places looked at, not for the number of tests.
     pub p_value: f64,
 }
 

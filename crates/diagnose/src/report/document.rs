@@ -123,7 +123,7 @@ mod tests {
                 discrepancy_nats_explained: 2.0,
                 dispersion: vec![1.0],
                 drift_sd_db: vec![0.5],
-                tests: vec![FitTest { name: "levels".into(), p_value: 0.2 }],
+                tests: vec![FitTest { name: "levels".into(), subject: None, p_value: 0.2 }],
             },
             causes: vec![Cause {
                 effect: "time_zero".into(),

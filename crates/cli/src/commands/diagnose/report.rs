@@ -10,7 +10,7 @@ use super::{held_out, look_alikes};
 use crate::chart::{Chart, Look, Scale, Series};
 use crate::failure::Failure;
 use crate::page::{Page, escape};
-use sabine::diagnose::{CandidateScore, Cause, DecayCurves, FittedMaterial, ResidualCell};
+use sabine::diagnose::{CandidateScore, Cause, DecayCurves, FitTest, FittedMaterial, ResidualCell};
 
 type Result<T> = std::result::Result<T, Failure>;
 
@@ -258,6 +258,29 @@ fn evidence(page: &mut Page, findings: &Findings) {
         let names: Vec<String> = none.iter().map(|c| effect(&c.effect)).collect();
         page.paragraph(&format!("Tried, and nothing speaks for: {}.", names.join("; ")));
     }
+    tests(page, findings);
+}
+
+/// What the fit was tested for, the least probable first.
+fn tests(page: &mut Page, findings: &Findings) {
+    let mut tests: Vec<&FitTest> = findings.lack_of_fit.tests.iter().collect();
+    tests.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
+    if tests.is_empty() {
+        return;
+    }
+    let header = ["Tested for", "Most in", "Probability by chance"].map(str::to_owned).to_vec();
+    let row = |test: &&FitTest| {
+        let probability =
+            if test.p_value < 1e-3 { "below 0.001".to_owned() } else { format!("{:.3}", test.p_value) };
+        vec![capital(&test.name), test.subject.clone().unwrap_or_default(), probability]
+    };
+    let rows: Vec<Vec<String>> = std::iter::once(header).chain(tests.iter().map(row)).collect();
+    page.markup("<details><summary>What the fit was tested for</summary>");
+    page.paragraph(
+        "Each way in which what is left could be more than chance. The smallest probability, times the number of tests, decides.",
+    );
+    page.table(&rows);
+    page.markup("</details>");
 }
 
 fn decays(page: &mut Page, findings: &Findings) -> Result<()> {

@@ -60,9 +60,11 @@ fn each_verdict_says_what_it_means() {
     let page = html(&findings("ambiguous", &set)).unwrap();
     assert!(page.contains("which of 2 causes it is") && page.contains("<li>Measure on a damp day.</li>"));
     let fit = json!({ "p_value": 1e-4, "p_value_explained": 1e-4, "discrepancy_nats": 30.0, "discrepancy_nats_explained": 30.0,
-        "dispersion": [1.0, 1.0], "tests": [{ "name": "odd bins", "p_value": 3e-5 }, { "name": "levels", "p_value": 0.4 }] });
+        "dispersion": [1.0, 1.0], "tests": [{ "name": "odd bins", "subject": "s1-r2", "p_value": 3e-5 }, { "name": "levels", "p_value": 0.4 }] });
     let page = html(&findings("unexplained", &json!({ "causes": [], "lack_of_fit": fit }))).unwrap();
-    assert!(page.contains("What chance does not explain: odd bins."));
+    assert!(page.contains("What chance does not explain: odd bins (most: s1-r2)."));
+    assert!(page.contains("<td>Odd bins</td><td>s1-r2</td><td>below 0.001</td>"));
+    assert!(page.contains("<td>Levels</td><td></td><td>0.400</td>"));
     assert!(page.contains("none of the known causes explains"));
     assert!(!page.contains("After: with what was found"));
 }

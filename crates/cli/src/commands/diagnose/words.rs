@@ -123,8 +123,12 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
             slight.join("; ")
         ));
     }
-    let failed: Vec<&str> =
-        fit.tests.iter().filter(|t| t.p_value < UNLIKELY).map(|t| t.name.as_str()).collect();
+    let failed: Vec<String> = fit
+        .tests
+        .iter()
+        .filter(|t| t.p_value < UNLIKELY)
+        .map(|t| t.subject.as_ref().map_or_else(|| t.name.clone(), |at| format!("{} (most: {at})", t.name)))
+        .collect();
     if !failed.is_empty() && fit.p_value_explained < UNLIKELY {
         told.push(format!("What chance does not explain: {}.", failed.join("; ")));
     }

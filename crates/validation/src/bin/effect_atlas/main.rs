@@ -31,9 +31,16 @@ struct Arguments {
     /// Rooms for each effect and strength; 0 prints the tables of the record alone
     #[arg(long, default_value_t = 3)]
     rooms: u64,
-    /// Seed of the first room; nothing was tuned on seeds from 6000 on
+    /// Seed of the first room; each effect, strength and repetition has a room of its own. For figures that are published: the first
+    /// eight hexadecimal digits of the commit, as a number
     #[arg(long, default_value_t = 6000)]
     seed: u64,
+    /// Do each N-th room alone, from the K-th on: several processes side by side, each with a record of its own
+    #[arg(long, value_name = "K/N", value_parser = part, default_value = "1/1")]
+    part: (usize, usize),
+    /// Reflections keep their sign, as image sources of other programs do
+    #[arg(long)]
+    positive_reflections: bool,
     /// Receivers in each room
     #[arg(long, default_value_t = 12)]
     receivers: usize,
@@ -120,17 +127,19 @@ fn tasks(arguments: &Arguments) -> Vec<Task> {
         arguments.effects.clone()
     };
     let mut tasks = Vec::new();
-    for room in 0..arguments.rooms {
+    let mut seeds = arguments.seed..;
+    for _ in 0..arguments.rooms {
         for &strength in &arguments.strengths {
             for effect in &effects {
                 tasks.push(Task {
                     hidden: effect.split('+').filter(|e| *e != "none").map(str::to_owned).collect(),
                     strength,
-                    seed: arguments.seed + room,
+                    seed: seeds.next().unwrap_or(u64::MAX),
                     receivers: arguments.receivers,
                     sources: arguments.sources,
                     sample_rate_hz: arguments.rate,
                     sessions: arguments.sessions,
+                    positive_reflections: arguments.positive_reflections,
                     bands_per_octave: if arguments.third_octaves { 3 } else { 1 },
                     decide: arguments.decide,
                     rays: arguments.rays,
@@ -141,7 +150,18 @@ fn tasks(arguments: &Arguments) -> Vec<Task> {
             }
         }
     }
-    tasks
+    let (first, each) = arguments.part;
+    tasks.into_iter().skip(first - 1).step_by(each).collect()
+}
+
+/// `K/N`, K from 1 to N.
+fn part(text: &str) -> Result<(usize, usize), String> {
+    let (first, each) = text.split_once('/').ok_or("a part is written 1/4")?;
+    let parse = |number: &str| number.parse::<usize>().map_err(|error| format!("{number}: {error}"));
+    match (parse(first)?, parse(each)?) {
+        (first, each) if (1..=each).contains(&first) => Ok((first, each)),
+        (first, each) => Err(format!("part {first} of {each} does not exist")),
+    }
 }
 
 fn read(path: &Path) -> Result<Vec<Trial>, AnyError> {

@@ -46,9 +46,16 @@ pub fn print(trials: &[Trial]) {
 
 /// How the answers depend on how the room was measured, if that differs.
 fn conditions(trials: &[Trial]) {
-    let mut groups: BTreeMap<(usize, usize, u32, usize, usize), Vec<&Trial>> = BTreeMap::new();
+    let mut groups: BTreeMap<(usize, usize, u32, usize, usize, bool), Vec<&Trial>> = BTreeMap::new();
     for t in trials.iter().filter(|t| t.shams == 0) {
-        let condition = (t.receivers, t.sources, t.sample_rate_hz, t.sessions, t.bands_per_octave);
+        let condition = (
+            t.receivers,
+            t.sources,
+            t.sample_rate_hz,
+            t.sessions,
+            t.bands_per_octave,
+            t.positive_reflections,
+        );
         groups.entry(condition).or_default().push(t);
     }
     if groups.len() < 2 {
@@ -56,17 +63,18 @@ fn conditions(trials: &[Trial]) {
     }
     println!("\n## By conditions\n");
     println!(
-        "| receivers | sources | sample rate, kHz | sessions | bands in an octave | null rooms: false alarms | detected | right single name | wrong or a name too many | root mean square d' | seconds (median) |"
+        "| receivers | sources | sample rate, kHz | sessions | bands in an octave | signs of reflections | null rooms: false alarms | detected | right single name | wrong or a name too many | root mean square d' | seconds (median) |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|---|");
-    for ((receivers, sources, rate, sessions, per_octave), own) in &groups {
+    println!("|{}", "---|".repeat(12));
+    for ((receivers, sources, rate, sessions, per_octave, positive), own) in &groups {
         let (nulls, hidden): (Vec<&Trial>, Vec<&Trial>) = own.iter().partition(|t| t.hidden == "none");
         let of = |among: &[&Trial], hit: &dyn Fn(&Trial) -> bool| {
             format!("{} of {}", among.iter().filter(|t| hit(t)).count(), among.len())
         };
         println!(
-            "| {receivers} | {sources} | {} | {sessions} | {per_octave} | {} | {} | {} | {} | {} | {:.0} |",
+            "| {receivers} | {sources} | {} | {sessions} | {per_octave} | {} | {} | {} | {} | {} | {} | {:.0} |",
             f64::from(*rate) / 1000.0,
+            if *positive { "kept" } else { "random" },
             of(&nulls, &|t| t.outcome != Outcome::Right),
             of(&hidden, &|t| t.outcome != Outcome::Missed),
             of(&hidden, &|t| t.outcome == Outcome::Right),

@@ -20,6 +20,8 @@ pub struct Task {
     pub sample_rate_hz: u32,
     /// Sessions in air of their own.
     pub sessions: usize,
+    /// Whether reflections keep their sign.
+    pub positive_reflections: bool,
     /// Bands in an octave: 1 or 3.
     pub bands_per_octave: usize,
     pub rays: usize,
@@ -54,6 +56,7 @@ impl Task {
             sample_rate_hz: self.sample_rate_hz,
             bands: all.part(0..highest + 1),
             time_zero,
+            positive_reflections: self.positive_reflections,
             ..LabConfig::default()
         })
     }

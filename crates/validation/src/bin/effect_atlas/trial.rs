@@ -41,6 +41,8 @@ pub struct Trial {
     pub sample_rate_hz: u32,
     #[serde(default = "one")]
     pub sessions: usize,
+    #[serde(default)]
+    pub positive_reflections: bool,
     #[serde(default = "one")]
     pub bands_per_octave: usize,
     pub shams: usize,
@@ -87,6 +89,7 @@ impl Task {
             t.hidden == self.name()
                 && t.strength == self.strength
                 && (t.seed, t.receivers, t.shams) == (self.seed, self.receivers, self.shams)
+                && t.positive_reflections == self.positive_reflections
                 && (t.sources, t.sample_rate_hz, t.sessions, t.bands_per_octave)
                     == (self.sources, self.sample_rate_hz, self.sessions, self.bands_per_octave)
         })
@@ -108,6 +111,10 @@ impl Task {
         let outcome = outcome(&found, &hidden);
         if outcome != Outcome::Right {
             found.notes.iter().for_each(|note| eprintln!("  {note}"));
+            for test in found.lack_of_fit.tests.iter().filter(|t| t.p_value < 0.01) {
+                let subject = test.subject.as_deref().unwrap_or("everywhere");
+                eprintln!("  {} ({subject}): {:.1e}", test.name, test.p_value);
+            }
         }
 
         let first = hidden.first().map(Hidden::id);
@@ -137,6 +144,7 @@ impl Task {
             sources: self.sources,
             sample_rate_hz: self.sample_rate_hz,
             sessions: self.sessions,
+            positive_reflections: self.positive_reflections,
             bands_per_octave: self.bands_per_octave,
             shams: self.shams,
             verdict: found.verdict.to_string(),
