@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::infer::baseline::Baseline;
 use crate::infer::candidates;
 use crate::infer::confirmation::confirm;
+use crate::infer::ray_dependence::more_with_half;
 use crate::infer::search::Search;
 use crate::infer::selection::select;
 use crate::report::composition::compose;
@@ -103,6 +104,8 @@ impl Diagnoser {
         baseline.calibrate_scatter(&[], &used)?;
         let first_dispersion = baseline.dispersion.clone();
         let mut found = select(&mut baseline, &cases, self.effects.len(), &used, observer)?;
+        let other_rays = (&*self.tracer, observer);
+        found.more_with_half = more_with_half(&mut baseline, &cases, &found.chosen, &used, other_rays)?;
         baseline.seconds.insert("search", started.elapsed().as_secs_f64());
 
         let search = Search::new(&baseline, &cases, self.effects.len(), used);

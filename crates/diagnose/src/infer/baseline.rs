@@ -137,7 +137,8 @@ impl Baseline {
         if self.simulation.apply(change, &self.observations.survey)? { self.expand(cases) } else { Ok(()) }
     }
 
-    fn expand(&mut self, cases: &[CatalogueCase]) -> Result<(), Error> {
+    /// Predicts energies and tables anew from the traced paths.
+    pub fn expand(&mut self, cases: &[CatalogueCase]) -> Result<(), Error> {
         self.simulation.expand(&self.observations, true)?;
         self.prepare(cases).map(|_| ())
     }

@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::infer::candidates::Candidate;
 use crate::infer::cross_validation::{Folds, Predicted, predict};
 use crate::infer::lack_of_fit::{self, Lack};
+use crate::infer::ray_dependence::unsettled;
 use crate::infer::search::{Search, State};
 use crate::infer::selection::Selection;
 use crate::likelihood::decay::WarmStart;
@@ -22,6 +23,17 @@ const LEAST_ABOVE_MODES_NATS: f64 = 1.0;
 /// Dispersion from which nothing is named: measured variance over that expected, causes and smooth discrepancy taken out.
 const MAX_DISPERSION: f64 = 100.0;
 
+/// Why a cause for which the data speak is not named.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Doubt {
+    /// Only octaves below the Schroeder frequency speak for it.
+    Modes,
+    /// Rays that were not drawn do.
+    Rays,
+    /// It does not help at positions left out.
+    Elsewhere,
+}
+
 /// What is left of a selection, and why.
 pub(crate) struct Confirmation {
     /// Without any cause.
@@ -36,10 +48,8 @@ pub(crate) struct Confirmation {
     pub hopeless: bool,
     /// Causes that the discrepancy without a name beats.
     pub unseated: Vec<&'static str>,
-    /// Causes that do not help at positions left out.
-    pub unconfirmed: Vec<&'static str>,
-    /// Causes for which only octaves below the Schroeder frequency speak.
-    pub modal: Vec<&'static str>,
+    /// Causes that were dropped, and why.
+    pub dropped: Vec<(&'static str, Doubt)>,
     pub predicting_s: f64,
     pub testing_s: f64,
 }
@@ -68,17 +78,9 @@ pub(crate) fn confirm(
     report(observer, "lack of fit", 0, 2)?;
     let lack_before = lack_of_fit::test(search, &base)?;
     report(observer, "lack of fit", 1, 2)?;
-    let (mut modal, mut unconfirmed) = (Vec::new(), Vec::new());
-    loop {
-        let worst = if let Some(worst) = resting_on_modes(search, &state)? {
-            modal.push(search.candidates[worst].id);
-            worst
-        } else if let Some(worst) = least_confirmed(search, &state, &predicted.gains) {
-            unconfirmed.push(search.candidates[worst].id);
-            worst
-        } else {
-            break;
-        };
+    let mut dropped = Vec::new();
+    while let Some((worst, doubt)) = doubtful(search, &state, found, &predicted.gains)? {
+        dropped.push((search.candidates[worst].id, doubt));
         found.drop(worst);
         state = search.state(&found.chosen, Some(&base))?;
         predicted = predict(search, &state, &in_turn, observer)?;
@@ -118,8 +120,7 @@ pub(crate) fn confirm(
         verdict,
         hopeless,
         unseated,
-        unconfirmed,
-        modal,
+        dropped,
         predicting_s,
         testing_s: started.elapsed().as_secs_f64(),
     })
@@ -140,6 +141,22 @@ fn is_beaten(search: &Search<'_>, base: &State, state: &State, lack_before: &Lac
     !energy_cases.is_empty()
         && energy_cases.len() == state.chosen.len()
         && free_alone > state.energy.log_evidence + UNNAMED_MARGIN_NATS
+}
+
+/// A cause that does not stand, and why.
+fn doubtful(
+    search: &Search<'_>,
+    state: &State,
+    found: &Selection,
+    gains: &[HeldOutGain],
+) -> Result<Option<(usize, Doubt)>, Error> {
+    if let Some(worst) = resting_on_modes(search, state)? {
+        return Ok(Some((worst, Doubt::Modes)));
+    }
+    if let Some(worst) = unsettled(search, state, &found.more_with_half)? {
+        return Ok(Some((worst, Doubt::Rays)));
+    }
+    Ok(least_confirmed(search, state, gains).map(|worst| (worst, Doubt::Elsewhere)))
 }
 
 /// A cause that bears on decays alone, and for which those above the Schroeder frequency do not speak. Below it neither paths nor waves

@@ -8,5 +8,6 @@ pub(crate) mod direct_evidence;
 pub(crate) mod isolability;
 pub(crate) mod lack_of_fit;
 pub(crate) mod prediction;
+pub(crate) mod ray_dependence;
 pub(crate) mod search;
 pub(crate) mod selection;

@@ -213,7 +213,8 @@ impl<'a> Search<'a> {
         self.baseline.config.naming_nats + (self.effects.max(1) as f64).ln()
     }
 
-    fn price(&self, candidate: usize) -> f64 {
+    /// What a candidate pays for the number of cases of its effect, in nats.
+    pub fn price(&self, candidate: usize) -> f64 {
         let effect = self.candidates[candidate].effect;
         (self.candidates.iter().filter(|c| c.effect == effect).count() as f64).ln()
     }

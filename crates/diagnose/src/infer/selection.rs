@@ -5,6 +5,7 @@ use crate::error::Error;
 use crate::extend::extension::changes;
 use crate::infer::baseline::Baseline;
 use crate::infer::candidates::{CatalogueCase, EffectScore};
+use crate::infer::ray_dependence::MoreWithHalf;
 use crate::infer::search::Search;
 use sabine_acoustics::Observer;
 
@@ -19,6 +20,8 @@ pub(crate) struct Selection {
     pub first: Vec<EffectScore>,
     /// Causes at the end of the search, and all other effects beside them, where none of these was worth a name.
     pub last: Option<(Vec<usize>, Vec<EffectScore>)>,
+    /// What half of the rays say more for a cause.
+    pub more_with_half: Vec<MoreWithHalf>,
 }
 
 impl Selection {

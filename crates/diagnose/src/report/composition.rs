@@ -116,6 +116,11 @@ fn causes(
             explanation: effects[own.effect].info().explanation.to_owned(),
             probability: found.probability(candidate),
             nats: without(search, state, candidate)?,
+            more_nats_with_half_the_rays: found
+                .more_with_half
+                .iter()
+                .find(|(c, _)| *c == candidate)
+                .map(|m| m.1),
             parameters: parameters(search, state, candidate),
             slight: own.case.observable() == Observable::Decay && gain.is_some_and(is_slight),
             held_out_gain: gain.cloned(),
@@ -154,8 +159,7 @@ fn notes_on(
         hopeless: confirmed.hopeless,
         scattered: first_dispersion.iter().any(|d| *d > WARN_DISPERSION),
         unseated: &confirmed.unseated,
-        unconfirmed: &confirmed.unconfirmed,
-        modal: &confirmed.modal,
+        dropped: &confirmed.dropped,
         beyond_limit: &beyond_limit(search, state, candidates),
         drift: drift_in_words(baseline),
         levels: levels_in_words(search.baseline, &confirmed.lack_after.levels),

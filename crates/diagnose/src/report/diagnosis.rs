@@ -113,6 +113,10 @@ pub struct Cause {
     pub probability: f64,
     /// Evidence for it beside the other causes, in nats, before correction for the number tried.
     pub nats: f64,
+    /// Evidence that half of the rays, others than these, give it beyond these, in nats: what it owes to their number, if above 0. `None`
+    /// where it does not bear on decays.
+    #[serde(default)]
+    pub more_nats_with_half_the_rays: Option<f64>,
     /// Its parameters.
     pub parameters: Vec<FoundParameter>,
     /// What it gains; `None` where no position could be held out.

@@ -1,6 +1,7 @@
 //! What must be said beside the verdict.
 
 use crate::infer::baseline::Baseline;
+use crate::infer::confirmation::Doubt;
 use crate::report::diagnosis::Verdict;
 
 /// What the words depend on.
@@ -18,10 +19,8 @@ pub(crate) struct Circumstances<'a> {
     pub scattered: bool,
     /// Causes that a discrepancy without a name beats.
     pub unseated: &'a [&'a str],
-    /// Causes that do not help at positions left out.
-    pub unconfirmed: &'a [&'a str],
-    /// Causes for which only octaves below the Schroeder frequency speak.
-    pub modal: &'a [&'a str],
+    /// Causes for which the data speak and that are not named, and why.
+    pub dropped: &'a [(&'a str, Doubt)],
     /// Effects that the data speak for beside as many causes as may be named.
     pub beyond_limit: &'a [&'a str],
     /// How far single responses drift along their decay where it is much, in dB, and in which octave.
@@ -82,15 +81,19 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
     if about.scattered && about.verdict == Verdict::Unexplained {
         notes.push("The responses scatter far more than this room would: are they of another room?".into());
     }
-    for id in about.unconfirmed {
-        notes.push(format!(
-            "{id} fits the positions that it was fitted to, but does not help to predict those left out: it is not named."
-        ));
-    }
-    for id in about.modal {
-        notes.push(format!(
-            "{id} would explain the lowest octaves alone, where few room modes decide and no simulation is that exact: it is not named."
-        ));
+    for (id, doubt) in about.dropped {
+        let why = match doubt {
+            Doubt::Elsewhere => {
+                "fits the positions that it was fitted to, but does not help to predict those left out".to_owned()
+            }
+            Doubt::Modes => "would explain the lowest octaves alone, where few room modes decide and no simulation is that exact".into(),
+            Doubt::Rays => format!(
+                "is less probable the more rays are traced, and would not be named with very many: {} do not settle it, try `rays` of four \
+                 times as many",
+                about.baseline.config.rays
+            ),
+        };
+        notes.push(format!("{id} {why}: it is not named."));
     }
     if !about.beyond_limit.is_empty() {
         notes.push(format!(

@@ -5,6 +5,10 @@ use sabine_acoustics::Air;
 use sabine_paths::{PathSet, Propagator};
 use sabine_propagate::{PathTracer, PreparedScene, TracerConfig};
 use sabine_scene::{Receiver, Scene, Source};
+use std::sync::Arc;
+
+/// Turns the seed of rays into that of others.
+const OTHER_RAYS: u64 = 0x5EED_0F07_4E25;
 
 /// A tracer that a diagnosis can use: it prepares a scene once and then traces many pairs in it.
 ///
@@ -16,6 +20,12 @@ pub trait SceneTracer: Send + Sync {
     /// # Errors
     /// For a scene that cannot be traced.
     fn prepare(&self, scene: &Scene, duration_s: f64) -> Result<Box<dyn PreparedTracer>, Error>;
+
+    /// A tracer that draws half as many rays, others than this one: what the evidence for a cause owes to the number of rays shows in it.
+    /// The default has none.
+    fn with_half_the_rays(&self) -> Option<Arc<dyn SceneTracer>> {
+        None
+    }
 }
 
 /// A scene that is ready to be traced.
@@ -57,6 +67,13 @@ impl SceneTracer for Rays {
         let prepared = tracer.prepare(scene)?;
         let scene = (!self.config.allow_leaks).then(|| scene.clone());
         Ok(Box::new(PreparedRays { tracer, prepared, scene }))
+    }
+
+    fn with_half_the_rays(&self) -> Option<Arc<dyn SceneTracer>> {
+        let seed = self.config.seed ^ OTHER_RAYS;
+        Some(Arc::new(Self {
+            config: TracerConfig { rays: self.config.rays.div_ceil(2), seed, ..self.config.clone() },
+        }))
     }
 }
 

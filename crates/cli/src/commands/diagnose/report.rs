@@ -20,6 +20,8 @@ const MOST_POSITIONS: usize = 6;
 const DECAY_POINTS: usize = 60;
 /// Lowest level of a drawn decay.
 const DECAY_FLOOR_DB: f64 = -50.0;
+/// Evidence that is owed to the chance of the rays is told from here on, in nats.
+const WORTH_SAYING_NATS: f64 = 0.5;
 /// 1.645 standard errors either side: a 90 % interval.
 const NORMAL_90: f64 = 1.645;
 
@@ -82,10 +84,11 @@ fn parameters(page: &mut Page, findings: &Findings) -> Result<()> {
             format!("{:.1} %", 100.0 * cause.probability)
         };
         page.markup(&format!(
-            "<p><strong>{}</strong>. {} Probability among everything that was tried: {sure}.{}</p>",
+            "<p><strong>{}</strong>. {} Probability among everything that was tried: {sure}.{}{}</p>",
             escape(&effect_of(&cause.effect, cause.subject.as_deref())),
             escape(&cause.explanation),
             escape(&gain_sentence(cause)),
+            escape(&rays_sentence(cause)),
         ));
         if let Some(chart) = band_chart(cause)? {
             page.markup(&format!("<div style=\"max-width:34rem\">{chart}</div>"));
@@ -107,6 +110,16 @@ fn parameters(page: &mut Page, findings: &Findings) -> Result<()> {
         ));
     }
     Ok(())
+}
+
+fn rays_sentence(cause: &Cause) -> String {
+    let more = cause.more_nats_with_half_the_rays.filter(|more| *more > WORTH_SAYING_NATS);
+    more.map_or(String::new(), |more| {
+        format!(
+            " Of its {:.0} nats of evidence about {more:.0} are owed to the chance of the rays: half as many give it so much more.",
+            cause.nats
+        )
+    })
 }
 
 fn gain_sentence(cause: &Cause) -> String {

@@ -1,13 +1,17 @@
-//! Re-tracing after a position, the air or the dimensions change.
+//! Re-tracing after a position, the air or the dimensions change, and with other rays.
 
 use super::Simulation;
 use crate::effect::Nuisance;
 use crate::error::Error;
 use crate::extend::model_change::ModelChange;
 use crate::simulate::edges::Edges;
+use crate::simulate::scene_tracer::SceneTracer;
 use crate::simulate::traced_pair::TracedPair;
-use crate::survey::Survey;
-use sabine_acoustics::Air;
+use crate::survey::{Survey, SurveyedResponse};
+use rayon::prelude::*;
+use sabine_acoustics::{Air, Observer, report};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 impl Simulation {
     /// Takes a change into all paths that it moves, and says whether there are any. Energies follow with the next expansion; arrival times
@@ -43,6 +47,50 @@ impl Simulation {
             _ => return Ok(false),
         }
         Ok(true)
+    }
+
+    /// The same room as it stands, traced by another tracer; nothing is expanded yet.
+    pub fn traced_by(
+        &self,
+        tracer: &Arc<dyn SceneTracer>,
+        survey: &Survey,
+        observer: &dyn Observer,
+    ) -> Result<Self, Error> {
+        let scene = self.traced_scene().clone();
+        let prepared = tracer.prepare(&scene, self.traced_until_s)?;
+        let (done, total) = (AtomicU64::new(0), survey.responses.len() as u64);
+        let one = |response: &SurveyedResponse| -> Result<TracedPair, Error> {
+            report(observer, "tracing other rays", done.fetch_add(1, Ordering::Relaxed), total)?;
+            let (source, receiver) = (&self.sources[response.source], &self.receivers[response.receiver]);
+            let paths = prepared.trace(source, receiver, &response.air)?;
+            let places_m = [source.position_m, receiver.position_m];
+            let diffracted = Edges::paths(self.edges.as_ref(), places_m, paths.max_length_m());
+            Ok(TracedPair::new(paths, diffracted, response.air, &self.materials)?)
+        };
+        let mut other = Self {
+            pairs: survey.responses.par_iter().map(one).collect::<Result<_, _>>()?,
+            materials: self.materials.clone(),
+            absorption: self.absorption.clone(),
+            states: Vec::new(),
+            ends: Vec::new(),
+            compared_s: Vec::new(),
+            tables: Vec::new(),
+            isolated_reflections: Vec::new(),
+            direct_s: self.direct_s.clone(),
+            speed_m_s: self.speed_m_s.clone(),
+            arrivals: self.arrivals.clone(),
+            reference: Vec::new(),
+            scene: self.scene.clone(),
+            resized: self.resized.clone(),
+            tracer: Arc::clone(tracer),
+            prepared,
+            edges: Edges::find(&scene)?,
+            sources: self.sources.clone(),
+            receivers: self.receivers.clone(),
+            ..*self
+        };
+        (0..other.pairs.len()).try_for_each(|pair| other.set_air(pair, survey))?;
+        Ok(other)
     }
 
     /// Traces the pairs of a place again. If the fitted position lies outside the room, the paths from the stated one are kept.

@@ -1,0 +1,74 @@
+//! What the evidence for a cause owes to the number of rays.
+//!
+//! A predicted decay is noisy by the rays that were drawn, and a cause that makes it smoother comes nearer to the measurement for that
+//! alone. This gain falls as one over the number of rays: what half of the rays say more for a cause, all of them still say too much, and
+//! evidence extrapolated to any number of rays is less by the difference (Richardson's extrapolation).
+
+use crate::effect::{Case, Observable};
+use crate::error::Error;
+use crate::infer::baseline::Baseline;
+use crate::infer::candidates::CatalogueCase;
+use crate::infer::search::{Search, State};
+use crate::simulate::scene_tracer::SceneTracer;
+use sabine_acoustics::Observer;
+use std::time::Instant;
+
+/// Evidence of decays that half of the rays give a chosen cause beyond what all of them give, in nats.
+pub(crate) type MoreWithHalf = (usize, f64);
+
+/// Compares the evidence of chosen causes that bear on decays under all rays with that under half as many others. Nothing where no cause
+/// bears on decays, or where the tracer draws no rays.
+pub(crate) fn more_with_half(
+    baseline: &mut Baseline,
+    cases: &[CatalogueCase],
+    chosen: &[usize],
+    used: &[bool],
+    (tracer, observer): (&dyn SceneTracer, &dyn Observer),
+) -> Result<Vec<MoreWithHalf>, Error> {
+    let bear: Vec<usize> =
+        chosen.iter().copied().filter(|&c| cases[c].case.observable().concerns(Observable::Decay)).collect();
+    let Some(tracer) = tracer.with_half_the_rays().filter(|_| !bear.is_empty()) else {
+        return Ok(Vec::new());
+    };
+    let started = Instant::now();
+    let evidence = |baseline: &Baseline| -> Result<Vec<f64>, Error> {
+        let of = |without: Option<usize>| -> Result<f64, Error> {
+            let own: Vec<&Case> =
+                bear.iter().filter(|&&c| Some(c) != without).map(|&c| &cases[c].case).collect();
+            Ok(baseline.fit_energy(&own, used, None)?.0.log_evidence)
+        };
+        let all = of(None)?;
+        bear.iter().map(|&c| Ok(all - of(Some(c))?)).collect()
+    };
+    let with_all = evidence(baseline)?;
+    let half = baseline.simulation.traced_by(&tracer, &baseline.observations.survey, observer)?;
+    let whole = std::mem::replace(&mut baseline.simulation, half);
+    let with_half = baseline.expand(cases).and_then(|()| evidence(baseline));
+    baseline.simulation = whole;
+    baseline.seconds.insert("half the rays", started.elapsed().as_secs_f64());
+    Ok(bear
+        .into_iter()
+        .zip(with_half?.into_iter().zip(with_all))
+        .map(|(c, (half, all))| (c, half - all))
+        .collect())
+}
+
+/// The chosen cause that stands least, if what speaks for it would not do with any number of rays.
+pub(crate) fn unsettled(
+    search: &Search<'_>,
+    state: &State,
+    more_with_half: &[MoreWithHalf],
+) -> Result<Option<usize>, Error> {
+    let mut weakest: Option<(f64, usize)> = None;
+    for &(candidate, more) in
+        more_with_half.iter().filter(|(c, more)| *more > 0.0 && state.chosen.contains(c))
+    {
+        let rest: Vec<usize> = state.chosen.iter().copied().filter(|&c| c != candidate).collect();
+        let without = search.state(&rest, Some(state))?;
+        let nats = state.log_evidence() - without.log_evidence() - search.price(candidate) - more;
+        if nats < search.threshold() && weakest.is_none_or(|(least, _)| nats < least) {
+            weakest = Some((nats, candidate));
+        }
+    }
+    Ok(weakest.map(|(_, candidate)| candidate))
+}
