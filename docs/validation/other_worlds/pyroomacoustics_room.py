@@ -19,7 +19,7 @@ TABLE_SD = 0.03  # how far tables are off, and how far the file says that they m
 PLACE_SD_M = 0.01
 GAIN_SD_DB = 0.3  # of each microphone
 LENGTH = 1.6  # of responses, in reverberation times of the slowest octave (Eyring): boxes of smooth walls decay more slowly than that
-NOISE_DB = -70.0  # of the recorder, relative to the peak of the loudest response
+NOISE_DB = -63.0  # energy of the recorder's white noise over a response, relative to the mean energy of the responses
 MARGIN_M = 0.6  # places to walls
 APART_M = 0.8
 SCATTERING = 0.1  # of all walls, where rays are traced
@@ -128,8 +128,8 @@ def recorded(responses, recorder, random):
     late = int(round(recorder["latency_s"] * RATE_HZ))
     gains = 10 ** ((recorder["gain_db"] + random.normal(0, GAIN_SD_DB, len(responses))) / 20)
     kept = [gain * np.concatenate([np.zeros(late), response]) for gain, response in zip(gains, responses)]
-    peak = max(np.abs(response).max() for response in kept)
-    noise = 10 ** (NOISE_DB / 20) * peak
+    power = np.mean([np.mean(response**2) for response in kept])
+    noise = 10 ** (NOISE_DB / 20) * np.sqrt(power)
     return [response + noise * random.normal(size=len(response)) for response in kept]
 
 
