@@ -80,13 +80,14 @@ fn late(room: &MeasuredRoom, latency_s: f64, folder: &Path) -> Result<MeasuredRo
             [room.sources()[entry.source].id.clone(), room.receivers()[entry.receiver].id.clone()];
         let name = format!("{source}_{receiver}");
         let samples = ImpulseResponse::new(samples, rate_hz)?;
-        Ok(NewResponse { source, receiver, name, air: None, session: None, samples })
+        Ok(NewResponse { source, receiver, name, air: None, session: None, recorded_at: None, samples })
     });
     let late = NewRoom {
         scene: room.scene().clone(),
         priors: room.priors().to_vec(),
         air: Some(room.air()),
         measurement: room.measurement(),
+        position_sd: room.position_sd().clone(),
         sources: room.sources().to_vec(),
         receivers: room.receivers().to_vec(),
         responses: responses.collect::<Result<_, sabine::scene::Error>>()?,

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use sabine_propagate::TracerConfig;
+use sabine_scene::PositionSd;
 
 /// Specular paths in a cuboid that are predicted exactly.
 const CUBOID_PATHS: usize = 150_000;
@@ -17,7 +18,7 @@ pub struct DiagnoseConfig {
     pub image_order: usize,
     /// Energy is compared until the predicted decay has fallen by so much, 20 to 60 dB.
     pub range_db: f64,
-    /// How well positions are known: one standard deviation along each axis, 0.1 mm to 1 m.
+    /// How well positions are known where the room file does not say: one standard deviation along each axis, 0.1 mm to 1 m.
     pub position_sd_m: f64,
     /// How well the gains of responses agree where the room file says that they are common or absolute, 0.01 to 10 dB.
     pub gain_sd_db: f64,
@@ -45,7 +46,7 @@ impl Default for DiagnoseConfig {
             seed: 0,
             image_order: 3,
             range_db: 35.0,
-            position_sd_m: 0.01,
+            position_sd_m: PositionSd::DEFAULT_M,
             gain_sd_db: 0.4,
             level_sd_db: 0.7,
             naming_nats: 3.0,

@@ -24,7 +24,12 @@ const BINS: usize = 14;
 /// Two materials, two octaves, one source, three receivers.
 pub(crate) fn survey(levels: Levels, time_zero: TimeZero) -> Survey {
     let air = Air::new(20.0, 50.0, 101.325).expect("ordinary air");
-    let place = |id: &str, position_m| Place { id: id.to_owned(), position_m, axis: Some([1.0, 0.0, 0.0]) };
+    let place = |id: &str, position_m| Place {
+        id: id.to_owned(),
+        position_m,
+        axis: Some([1.0, 0.0, 0.0]),
+        position_sd_m: 0.01,
+    };
     let receivers =
         vec![place("r0", [3.0, 1.5, 1.2]), place("r1", [4.0, 3.0, 1.5]), place("r2", [1.5, 3.2, 1.1])];
     let source = place("s0", [1.0, 1.0, 1.4]);
@@ -41,6 +46,7 @@ pub(crate) fn survey(levels: Levels, time_zero: TimeZero) -> Survey {
                 air,
                 duration_s: 0.4,
                 direct_s: far / air.speed_of_sound_m_s(),
+                recorded_at: None,
             }
         })
         .collect();
@@ -185,7 +191,6 @@ impl Tables {
             measured: &self.measured,
             arrivals: &self.arrivals,
             speed_m_s: &self.speed_m_s,
-            position_sd_m: 0.01,
         }
     }
 }

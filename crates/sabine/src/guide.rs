@@ -154,13 +154,14 @@
 //!     let (source, receiver) = (room.sources()[entry.source].id.clone(), room.receivers()[entry.receiver].id.clone());
 //!     let name = format!("{source}_{receiver}");
 //!     let samples = ImpulseResponse::new(samples, response.sample_rate_hz())?;
-//!     Ok(NewResponse { source, receiver, name, air: None, session: None, samples })
+//!     Ok(NewResponse { source, receiver, name, air: None, session: None, recorded_at: None, samples })
 //! });
 //! let late = NewRoom {
 //!     scene: room.scene().clone(),
 //!     priors: room.priors().to_vec(),
 //!     air: Some(room.air()),
 //!     measurement: room.measurement(), // "sample 0 is the instant of emission": no longer true
+//!     position_sd: room.position_sd().clone(),
 //!     sources: room.sources().to_vec(),
 //!     receivers: room.receivers().to_vec(),
 //!     responses: responses.collect::<Result<_, sabine::scene::Error>>()?,

@@ -88,8 +88,8 @@ pub use floor_plan::FloorPlan;
 pub use measured_room::materials::{MaterialTable, Materials};
 #[cfg(feature = "rooms")]
 pub use measured_room::{
-    DrawnRoom, Levels, MaterialPrior, MeasuredRoom, Measurement, NewResponse, NewRoom, ReadOptions,
-    ResponseEntry, RoomNote, TimeZero,
+    DrawnRoom, Levels, MaterialPrior, MeasuredRoom, Measurement, NewResponse, NewRoom, PositionSd,
+    ReadOptions, ResponseEntry, RoomNote, TimeZero,
 };
 pub use mesh_file::Mesh;
 pub use mesh_file::mesh_options::{LengthUnit, MeshOptions};

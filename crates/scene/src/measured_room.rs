@@ -5,6 +5,7 @@ mod file;
 pub(crate) mod materials;
 mod notes;
 mod other_model;
+mod position_sd;
 mod response_check;
 mod tables;
 mod turned;
@@ -12,6 +13,7 @@ mod write;
 
 pub use drawn_room::DrawnRoom;
 pub use notes::RoomNote;
+pub use position_sd::PositionSd;
 pub use write::{NewResponse, NewRoom};
 
 use crate::error::Error;
@@ -28,6 +30,9 @@ use sabine_acoustics::{
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use tables::{bands, materials, places};
+
+/// Largest number that may stand for a time of recording: milliseconds of 30,000 years, and exact in steps of one.
+const MAX_TIME: f64 = 1e15;
 
 /// When a response's first sample was taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
@@ -97,6 +102,8 @@ pub struct ResponseEntry {
     pub air: Air,
     /// The measuring session, where the file names one.
     pub session: Option<String>,
+    /// A number that rises with the time of recording, in any unit, where the file states it.
+    pub recorded_at: Option<f64>,
     /// Its sample rate.
     pub sample_rate_hz: u32,
     /// Its length in seconds.
@@ -149,6 +156,7 @@ pub struct MeasuredRoom {
     air: Air,
     air_assumed: bool,
     measurement: Measurement,
+    position_sd: PositionSd,
     sources: Vec<Source>,
     receivers: Vec<Receiver>,
     responses: Vec<ResponseEntry>,
@@ -248,6 +256,7 @@ impl MeasuredRoom {
                 return Err(error.in_file(path, "measurement").into());
             }
         };
+        let position_sd = PositionSd::read(path, file.measurement.as_ref(), &file.sources, &file.receivers)?;
         let sources: Vec<Source> = places(path, "sources", &file.sources)?
             .into_iter()
             .map(|Receiver { id, position_m, axis }| Source { id, position_m, axis })
@@ -265,6 +274,7 @@ impl MeasuredRoom {
             air,
             air_assumed: file.air.is_none(),
             measurement,
+            position_sd,
             sources,
             receivers,
             responses: Vec::new(),
@@ -281,6 +291,10 @@ impl MeasuredRoom {
         let field = |name: &str| format!("responses[{index}].{name}");
         let in_file = |name: &'static str| move |error: Error| error.in_file(&self.file, field(name));
         let (source, receiver, air) = self.ends(table).map_err(|(name, error)| in_file(name)(error))?;
+        if let Some(time) = table.recorded_at {
+            OutOfRange::check("recorded_at", time, -MAX_TIME, MAX_TIME, "finite and within 1e15")
+                .map_err(|error| in_file("recorded_at")(error.into()))?;
+        }
         if file.responses[..index].iter().any(|other| other.file == table.file) {
             let id = table.file.display().to_string();
             return Err(in_file("file")(Error::DuplicateId { id }));
@@ -296,6 +310,7 @@ impl MeasuredRoom {
             path,
             air,
             session: table.session.clone(),
+            recorded_at: table.recorded_at,
             sample_rate_hz: info.sample_rate_hz,
             duration_s,
         };
@@ -364,6 +379,11 @@ impl MeasuredRoom {
     /// What times and levels of the responses mean.
     pub fn measurement(&self) -> Measurement {
         self.measurement
+    }
+
+    /// How well places are known, as far as the file states it.
+    pub fn position_sd(&self) -> &PositionSd {
+        &self.position_sd
     }
 
     /// Sources.

@@ -12,8 +12,8 @@ use sabine_acoustics::{
     write_atomically, write_wav,
 };
 use sabine_scene::{
-    Levels, MaterialPrior, Measurement, NamedMaterial, NewResponse, NewRoom, Receiver, Scene, Source,
-    TimeZero, Triangle,
+    Levels, MaterialPrior, Measurement, NamedMaterial, NewResponse, NewRoom, PositionSd, Receiver, Scene,
+    Source, TimeZero, Triangle,
 };
 use sabine_testkit::{PhononConfig, Phonons};
 use serde_json::json;
@@ -133,6 +133,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         name: format!("{}_{}", talker.id, receiver.id),
         air: None,
         session: None,
+        recorded_at: None,
         samples,
     };
     let priors = stated.materials().iter().map(|m| MaterialPrior {
@@ -144,6 +145,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         scene: stated,
         air: Some(air),
         measurement: Measurement { time_zero: TimeZero::Emission, levels: Levels::Absolute },
+        position_sd: PositionSd::default(),
         responses: vec![measured(&microphone, at_microphone), measured(&corner, at_corner)],
         sources: vec![talker, screen],
         receivers: vec![microphone, corner],

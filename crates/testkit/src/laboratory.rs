@@ -58,8 +58,8 @@ use random_room::Declared;
 use rayon::prelude::*;
 use sabine_acoustics::{Air, Bands, Error, ImpulseResponse, Material, PerBand};
 use sabine_scene::{
-    MaterialPrior, MeasuredRoom, Measurement, NamedMaterial, NewResponse, NewRoom, Receiver, Scene, Source,
-    Triangle,
+    MaterialPrior, MeasuredRoom, Measurement, NamedMaterial, NewResponse, NewRoom, PositionSd, Receiver,
+    Scene, Source, Triangle,
 };
 use scattered_field::ScatteredField;
 use std::io;
@@ -297,6 +297,7 @@ impl Laboratory {
                 name: format!("{source}_{receiver}"),
                 air: several.then(|| self.truth.in_session(session).air()).transpose()?,
                 session: several.then(|| format!("session {}", session + 1)),
+                recorded_at: None,
                 samples,
             })
         };
@@ -305,6 +306,7 @@ impl Laboratory {
             priors: self.priors.clone(),
             air: Some(self.air),
             measurement: Measurement { time_zero: self.config.time_zero, levels: self.config.levels },
+            position_sd: PositionSd::default(),
             sources: self.sources.clone(),
             receivers: self.receivers.clone(),
             responses: responses.into_iter().enumerate().map(entry).collect::<Result<_, _>>()?,

@@ -13,8 +13,10 @@ use crate::survey::{Place, Survey};
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PositionError;
 
-/// Standard deviation of a position that is not believed, in metres.
+/// Standard deviation of a position that is not believed, in metres, at least.
 const OPEN_SD_M: f64 = 0.3;
+/// The same in standard deviations of a position that is believed: what lies within what the room file admits is no error.
+const OPEN_RATIO: f64 = 5.0;
 
 impl Effect for PositionError {
     fn info(&self) -> EffectInfo {
@@ -35,7 +37,8 @@ impl Effect for PositionError {
 }
 
 fn one_place(nuisance: Nuisance, stated: Place) -> Case {
-    Case::prior(nuisance, OPEN_SD_M).about(stated.id.clone()).changing(move |fitted| {
+    let open_sd_m = OPEN_SD_M.max(OPEN_RATIO * stated.position_sd_m);
+    Case::prior(nuisance, open_sd_m).about(stated.id.clone()).changing(move |fitted| {
         let Some(offset_m) = fitted.relaxed(nuisance) else { return Vec::new() };
         let position_m = std::array::from_fn(|k| stated.position_m[k] + offset_m[k]);
         vec![ModelChange::Position { id: stated.id.clone(), position_m }]

@@ -63,7 +63,7 @@ impl Baseline {
     ) -> Result<Self, Error> {
         let started = Instant::now();
         config.check()?;
-        let mut observations = Observations::read(room, held, observer)?;
+        let mut observations = Observations::read(room, held, config.position_sd_m, observer)?;
         if config.wave_solutions {
             observations.survey.bands_of_modes = bands_of_modes(room.scene(), &room.air());
         }
@@ -213,7 +213,6 @@ impl Baseline {
             measured: &self.observations.measured,
             arrivals: &self.simulation.arrivals,
             speed_m_s: &self.simulation.speed_m_s,
-            position_sd_m: self.config.position_sd_m,
         }
     }
 

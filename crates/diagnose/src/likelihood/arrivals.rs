@@ -46,7 +46,6 @@ pub(crate) struct ArrivalData<'a> {
     /// Predicted arrivals of each pair, the shortest first; empty where the direct line is blocked.
     pub arrivals: &'a [Vec<Arrival>],
     pub speed_m_s: &'a [f64],
-    pub position_sd_m: f64,
 }
 
 pub(crate) struct ArrivalModel<'a> {
@@ -69,9 +68,13 @@ fn normal(residual: f64, sd: f64) -> f64 {
 impl<'a> ArrivalModel<'a> {
     pub fn new(data: &'a ArrivalData<'a>, cases: &[&'a Case], used: &'a [bool]) -> Self {
         let survey = data.survey;
-        let place = Prior::normal(0.0, data.position_sd_m);
         let layout = ArrivalLayout::of(survey);
-        let mut priors = vec![place; layout.latency(0)];
+        let mut priors = vec![Prior::normal(0.0, 1.0); layout.latency(0)];
+        let sources = survey.sources.iter().enumerate().map(|(i, place)| (layout.source(i), place));
+        let receivers = survey.receivers.iter().enumerate().map(|(i, place)| (layout.receiver(i), place));
+        for (range, place) in sources.chain(receivers) {
+            priors[range].fill(Prior::normal(0.0, place.position_sd_m));
+        }
         let latency_sd_s = match survey.measurement.time_zero {
             TimeZero::PerResponse | TimeZero::Common => FREE_LATENCY_S,
             _ => EMISSION_SD_S,

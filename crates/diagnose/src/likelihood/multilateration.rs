@@ -5,7 +5,7 @@
 
 use crate::survey::Survey;
 
-/// Tolerance of a distance while places are sought: those of receivers are known to a centimetre, in metres.
+/// Tolerance of a distance while images are sought, in metres; or twice the deviation of the receiver's place, if that is more.
 const TOLERANCE_M: f64 = 0.05;
 /// What a confirming peak counts for, as odds against a stray one.
 const ODDS: f64 = 30.0;
@@ -183,9 +183,10 @@ impl UnassignedPeaks<'_> {
             let source = survey.sources[response.source].position_m;
             let receiver = survey.receivers[response.receiver].position_m;
             let Some(way) = mirrored(first, image, source, receiver, survey.box_m) else { continue };
+            let tolerance_m = TOLERANCE_M.max(2.0 * survey.receivers[response.receiver].position_sd_m);
             let worth = peaks
                 .iter()
-                .map(|p| p.stray * (-0.5 * ((p.length_m - way.length_m) / TOLERANCE_M).powi(2)).exp())
+                .map(|p| p.stray * (-0.5 * ((p.length_m - way.length_m) / tolerance_m).powi(2)).exp())
                 .fold(0.0, f64::max);
             sum += (1.0 + ODDS * worth).ln();
             confirmed += usize::from(worth > 0.2);

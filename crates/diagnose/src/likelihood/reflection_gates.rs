@@ -16,10 +16,12 @@ use crate::simulate::traced_pair::{BandState, IsolatedReflection};
 use crate::simulate::views::BandView;
 use crate::statistics::{add, ln_gamma_density};
 use crate::survey::Survey;
+use sabine_scene::PositionSd;
 
 /// Half of a gate, in units of one over the bandwidth.
 const HALF_BANDWIDTH_TIMES: f64 = 0.7;
-/// Paths are known this well in time: a centimetre of way, in seconds.
+/// Paths are known this well in time, in seconds: a centimetre of way, which is how well places are known unless the room file says that
+/// they are known worse.
 const TIME_SD_S: f64 = 3e-5;
 /// What a single reflection may be off by for other reasons, as a share of its energy: materials, edges of the gate.
 const MODEL_SD: f64 = 0.25;
@@ -84,8 +86,8 @@ pub(crate) fn gates(
             .collect();
         for (own, reflection) in reflections.iter().enumerate().filter(|(_, s)| s.order == 1) {
             let Some((place_m, plane)) = place_and_plane(survey, pair, reflection) else { continue };
-            if let Some((present_nats, missing_nats)) = weigh(observations, measured, &energies, &times, own)
-            {
+            let told = weigh((observations, measured), &energies, &times, own, time_sd_s(survey, pair));
+            if let Some((present_nats, missing_nats)) = told {
                 found.push(ReflectionGate { response: pair, place_m, plane, present_nats, missing_nats });
             }
         }
@@ -128,6 +130,14 @@ fn relative_energies(
     ln.iter().map(|l| (l - direct).exp()).collect()
 }
 
+/// How well a pair's paths are known in time.
+fn time_sd_s(survey: &Survey, pair: usize) -> f64 {
+    let response = &survey.responses[pair];
+    let places = [&survey.sources[response.source], &survey.receivers[response.receiver]];
+    let worse = places.iter().map(|place| place.position_sd_m / PositionSd::DEFAULT_M).fold(1.0, f64::max);
+    worse * TIME_SD_S
+}
+
 /// Where a path is reflected, and the plane in which that is; none if it is in no plane of the survey.
 fn place_and_plane(
     survey: &Survey,
@@ -153,11 +163,11 @@ fn place_and_plane(
 
 /// How probable (logarithms, in nats) what a gate holds is with its reflection and without it; none where no band can tell.
 fn weigh(
-    observations: &Observations,
-    measured: &Measured,
+    (observations, measured): (&Observations, &Measured),
     energies: &[Vec<f64>],
     times: &[f64],
     own: usize,
+    time_sd_s: f64,
 ) -> Option<(f64, f64)> {
     let (mut there, mut gone, mut told) = (0.0, 0.0, 0usize);
     for (band, energies) in energies.iter().enumerate().filter(|(_, e)| !e.is_empty()) {
@@ -166,7 +176,9 @@ fn weigh(
         let at_direct = measured.early.gate(band, measured.direct_s, half_s);
         let at_own = measured.early.gate(band, times[own], half_s);
         let (Some(reference), Some(energy)) = (at_direct.filter(|e| *e > 0.0), at_own) else { continue };
-        let Some([present, missing]) = expected(pulse, energies, times, own, half_s) else { continue };
+        let Some([present, missing]) = expected(pulse, energies, times, own, (half_s, time_sd_s)) else {
+            continue;
+        };
         let of_direct = pulse.before(half_s) - pulse.before(-half_s);
         let ratio = energy / reference * of_direct;
         there += ln_gamma_density(ratio, present);
@@ -209,7 +221,7 @@ fn expected(
     energies: &[f64],
     times: &[f64],
     own: usize,
-    half_s: f64,
+    (half_s, time_sd_s): (f64, f64),
 ) -> Option<[(f64, f64); 2]> {
     let share = |time_s: f64| {
         let from = times[own] - time_s;
@@ -224,7 +236,7 @@ fn expected(
         let inside = share(time_s) * energy;
         if inside > 1e-6 * energies[own] {
             reach.push((time_s, inside, i == own));
-            let moved = 0.5 * (share(time_s + TIME_SD_S) - share(time_s - TIME_SD_S)) * energy;
+            let moved = 0.5 * (share(time_s + time_sd_s) - share(time_s - time_sd_s)) * energy;
             timing_variance[0] += moved * moved;
             timing_variance[1] += if i == own { 0.0 } else { moved * moved };
         }

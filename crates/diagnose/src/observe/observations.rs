@@ -8,7 +8,7 @@ use crate::statistics::median;
 use crate::survey::planes::planes;
 use crate::survey::{Place, Survey, SurveyedResponse};
 use sabine_acoustics::{ImpulseResponse, Material, Observer, report};
-use sabine_scene::{MeasuredRoom, TimeZero};
+use sabine_scene::{MeasuredRoom, Receiver, Source, TimeZero};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
@@ -46,14 +46,20 @@ impl Observations {
 }
 
 impl Observations {
-    /// Reads all responses; those of the receivers `held` are never fitted.
-    pub fn read(room: &MeasuredRoom, held: &[usize], observer: &dyn Observer) -> Result<Self, Error> {
+    /// Reads all responses; those of the receivers `held` are never fitted. Places are known within `position_sd_m` where the room file
+    /// does not say how well.
+    pub fn read(
+        room: &MeasuredRoom,
+        held: &[usize],
+        position_sd_m: f64,
+        observer: &dyn Observer,
+    ) -> Result<Self, Error> {
         let total = room.responses().len();
         if total == 0 {
             return Err(Error::NoResponses);
         }
         let mut found = Self {
-            survey: survey_of(room),
+            survey: survey_of(room, position_sd_m),
             fitted: Vec::new(),
             measured: Vec::new(),
             pre_arrival: PreArrival::default(),
@@ -99,6 +105,7 @@ impl Observations {
                     air: entry.air,
                     duration_s: found.duration_s,
                     direct_s: found.direct_s,
+                    recorded_at: entry.recorded_at,
                 });
                 self.measured.push(found);
                 self.samples.push(response);
@@ -142,7 +149,7 @@ impl Observations {
 }
 
 /// What the room file says, without any response.
-fn survey_of(room: &MeasuredRoom) -> Survey {
+fn survey_of(room: &MeasuredRoom, position_sd_m: f64) -> Survey {
     let vertices = room.scene().vertices();
     let corner = |fold: fn(f64, f64) -> f64, from: f64| {
         std::array::from_fn(|k| vertices.iter().map(|v| v[k]).fold(from, fold))
@@ -151,7 +158,15 @@ fn survey_of(room: &MeasuredRoom) -> Survey {
     let scattering = |m: &Material| m.scattering().values().to_vec();
     let scatterings: Vec<f64> = stated.iter().flat_map(|m| scattering(&m.material)).collect();
     let (planes, material_areas_m2) = planes(room.scene());
-    let place = |id: &str, position_m, axis| Place { id: id.to_owned(), position_m, axis };
+    let place = |id: &str, position_m, axis, stated_m: Option<f64>| Place {
+        id: id.to_owned(),
+        position_m,
+        axis,
+        position_sd_m: stated_m.unwrap_or(position_sd_m),
+    };
+    let known = room.position_sd();
+    let source = |s: &Source| place(&s.id, s.position_m, s.axis, known.source_m(&s.id));
+    let receiver = |r: &Receiver| place(&r.id, r.position_m, r.axis, known.receiver_m(&r.id));
     Survey {
         planes,
         material_areas_m2,
@@ -161,8 +176,8 @@ fn survey_of(room: &MeasuredRoom) -> Survey {
         air_assumed: room.air_assumed(),
         measurement: room.measurement(),
         materials: stated.iter().map(|m| m.name.clone()).collect(),
-        sources: room.sources().iter().map(|s| place(&s.id, s.position_m, s.axis)).collect(),
-        receivers: room.receivers().iter().map(|r| place(&r.id, r.position_m, r.axis)).collect(),
+        sources: room.sources().iter().map(source).collect(),
+        receivers: room.receivers().iter().map(receiver).collect(),
         responses: Vec::new(),
         box_m: [corner(f64::min, f64::INFINITY), corner(f64::max, f64::NEG_INFINITY)],
         bands_of_modes: 0,

@@ -18,6 +18,7 @@ use crate::report::diagnosis::{
 };
 use crate::report::found_parameters::{at_bounds, parameters};
 use crate::report::notes::{Circumstances, notes};
+use crate::report::recording_order;
 use crate::report::residual_map::residual_map;
 use sabine_acoustics::Observer;
 use std::time::Instant;
@@ -150,7 +151,7 @@ fn notes_on(
         .map(|&c| (search.candidates[c].id, at_bounds(search, state, c)))
         .filter(|(_, parameters)| !parameters.is_empty())
         .collect();
-    notes(&Circumstances {
+    let mut notes = notes(&Circumstances {
         baseline,
         verdict: confirmed.verdict,
         held_out: confirmed.predicted.held_out.is_some(),
@@ -164,7 +165,9 @@ fn notes_on(
         drift: drift_in_words(baseline),
         levels: levels_in_words(search.baseline, &confirmed.lack_after.levels),
         at_bounds: &at_bounds,
-    })
+    });
+    notes.extend(recording_order::notes(baseline, state));
+    notes
 }
 
 /// Effects that the data speak for beside as many causes as may be named.

@@ -89,7 +89,8 @@ pub struct FoundParameter {
 pub struct HeldOutGain {
     /// Mean gain of the logarithm of the predictive density, per compared bin.
     pub nats_per_bin: f64,
-    /// Ends of the 90 % interval of the mean over positions (bootstrap), per compared bin.
+    /// Ends of the 90 % interval of the mean over positions (Student's t over groups that were left out together), per compared bin. One
+    /// position has none: its ends are infinite, and null in JSON.
     pub low: f64,
     /// Upper end.
     pub high: f64,
@@ -187,7 +188,8 @@ pub struct HeldOut {
     pub c50_jnd: [f64; 3],
     /// Gain of the logarithm of the predictive density over the baseline, per compared bin: named causes, free discrepancy.
     pub nats_per_bin: [f64; 2],
-    /// 90 % intervals of these (bootstrap over positions).
+    /// 90 % intervals of these (Student's t over groups of positions that were left out together); infinite, and null in JSON, for one
+    /// position.
     pub nats_interval: [[f64; 2]; 2],
 }
 

@@ -5,4 +5,5 @@ pub(crate) mod diagnosis;
 mod document;
 pub(crate) mod found_parameters;
 pub(crate) mod notes;
+mod recording_order;
 pub(crate) mod residual_map;

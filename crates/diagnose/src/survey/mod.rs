@@ -22,6 +22,8 @@ pub struct SurveyedResponse {
     pub duration_s: f64,
     /// When the direct sound comes, in seconds from the first sample.
     pub direct_s: f64,
+    /// A number that rises with the time of recording, where the room file states it.
+    pub recorded_at: Option<f64>,
 }
 
 /// A source or a receiver.
@@ -34,6 +36,8 @@ pub struct Place {
     pub position_m: [f64; 3],
     /// Acoustic axis, where the room file states one.
     pub axis: Option<[f64; 3]>,
+    /// How well the position is known: one standard deviation along each axis, in metres.
+    pub position_sd_m: f64,
 }
 
 /// What the room file and the responses say, before any fit.

@@ -8,6 +8,8 @@ mod hidden_effects;
 mod hidden_local_reaction;
 mod hidden_surfaces;
 mod hidden_waves;
+mod invariances;
 mod look_alikes;
 mod odd_input;
+mod places;
 mod rendering;

@@ -79,8 +79,8 @@ impl DrawnRoom {
             measurement: None,
             bands: BandsTable { centres_hz: Bands::T60.iter_hz().collect() },
             materials: scene.materials().iter().zip(libraries).map(table).collect(),
-            sources: self.sources.iter().map(|s| place(&s.id, s.position_m, s.axis)).collect(),
-            receivers: self.receivers.iter().map(|r| place(&r.id, r.position_m, r.axis)).collect(),
+            sources: self.sources.iter().map(|s| place(&s.id, s.position_m, s.axis, None)).collect(),
+            receivers: self.receivers.iter().map(|r| place(&r.id, r.position_m, r.axis, None)).collect(),
             responses: Vec::new(),
         };
         write_folder(folder.as_ref(), &file, &obj(&scene), &[])

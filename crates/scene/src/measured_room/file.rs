@@ -48,6 +48,8 @@ pub(super) struct AirTable {
 pub(super) struct MeasurementTable {
     pub time_zero: super::TimeZero,
     pub levels: super::Levels,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_sd_m: Option<f64>,
 }
 
 #[derive(Deserialize, Serialize)]
@@ -77,6 +79,8 @@ pub(super) struct PlaceTable {
     pub position_m: Vec<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub orientation: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_sd_m: Option<f64>,
 }
 
 #[derive(Deserialize, Serialize)]
@@ -91,4 +95,6 @@ pub(super) struct ResponseTable {
     pub relative_humidity_percent: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub session: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recorded_at: Option<f64>,
 }

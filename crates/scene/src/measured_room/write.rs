@@ -3,7 +3,7 @@
 use super::file::{
     AirTable, BandsTable, MaterialTable, MeasurementTable, PlaceTable, ResponseTable, RoomFile, RoomTable,
 };
-use super::{MaterialPrior, MeasuredRoom, Measurement};
+use super::{MaterialPrior, MeasuredRoom, Measurement, PositionSd};
 use crate::error::Error;
 use crate::scene::{Receiver, Scene, Source};
 use sabine_acoustics::{
@@ -29,6 +29,7 @@ use std::path::{Path, PathBuf};
 ///     priors: vec![prior; 6],
 ///     air: Some(Air::default()),
 ///     measurement: Measurement { time_zero: TimeZero::Emission, levels: Levels::Absolute },
+///     position_sd: PositionSd { all_m: Some(0.02), ..PositionSd::default() },
 ///     sources: vec![Source::omni("s1", [1.0, 2.0, 1.5])?],
 ///     receivers: vec![Receiver::omni("r1", [4.0, 2.0, 1.5])?],
 ///     responses: vec![NewResponse {
@@ -37,6 +38,7 @@ use std::path::{Path, PathBuf};
 ///         name: "s1_r1".into(),
 ///         air: None,
 ///         session: None,
+///         recorded_at: None,
 ///         samples: ImpulseResponse::new(samples, 48_000)?,
 ///     }],
 /// };
@@ -57,6 +59,8 @@ pub struct NewRoom {
     pub air: Option<Air>,
     /// What times and levels mean.
     pub measurement: Measurement,
+    /// How well places are known, as far as the file is to state it.
+    pub position_sd: PositionSd,
     /// Sources.
     pub sources: Vec<Source>,
     /// Receivers.
@@ -78,6 +82,8 @@ pub struct NewResponse {
     pub air: Option<Air>,
     /// The measuring session.
     pub session: Option<String>,
+    /// A number that rises with the time of recording, in any unit.
+    pub recorded_at: Option<f64>,
     /// The samples, written in 32-bit floating point.
     pub samples: ImpulseResponse,
 }
@@ -87,7 +93,8 @@ impl NewRoom {
     /// exist before, or be empty.
     ///
     /// # Errors
-    /// As [`MeasuredRoom::read`]; [`sabine_acoustics::Error::MaterialCount`] unless there is a prior for each material; [`sabine_acoustics::Error::Io`] if
+    /// As [`MeasuredRoom::read`]; [`sabine_acoustics::Error::MaterialCount`] unless there is a prior for each material;
+    /// [`sabine_acoustics::Error::UnknownId`] for a name in [`NewRoom::position_sd`] that no place has; [`sabine_acoustics::Error::Io`] if
     /// something cannot be written.
     pub fn write(&self, folder: impl AsRef<Path>) -> Result<MeasuredRoom, Error> {
         let folder = folder.as_ref();
@@ -95,6 +102,9 @@ impl NewRoom {
             let (expected, found) = (self.scene.materials().len(), self.priors.len());
             return Err(ValueError::MaterialCount { expected, found }.into());
         }
+        let names =
+            (self.sources.iter().map(|s| s.id.as_str()), self.receivers.iter().map(|r| r.id.as_str()));
+        self.position_sd.check_names(names.0, names.1)?;
         write_folder(folder, &self.tables(), &obj(&self.scene), &self.responses)
     }
 
@@ -116,6 +126,7 @@ impl NewRoom {
             temperature_c: response.air.map(|air| air.temperature_c()),
             relative_humidity_percent: response.air.map(|air| air.relative_humidity_percent()),
             session: response.session.clone(),
+            recorded_at: response.recorded_at,
         };
         RoomFile {
             room: RoomTable { mesh: "room.obj".into(), units: None, up_axis: None },
@@ -127,11 +138,20 @@ impl NewRoom {
             measurement: Some(MeasurementTable {
                 time_zero: self.measurement.time_zero,
                 levels: self.measurement.levels,
+                position_sd_m: self.position_sd.all_m,
             }),
             bands: BandsTable { centres_hz: self.scene.materials()[0].material.bands().iter_hz().collect() },
             materials: self.scene.materials().iter().zip(&self.priors).map(material).collect(),
-            sources: self.sources.iter().map(|s| place(&s.id, s.position_m, s.axis)).collect(),
-            receivers: self.receivers.iter().map(|r| place(&r.id, r.position_m, r.axis)).collect(),
+            sources: self
+                .sources
+                .iter()
+                .map(|s| place(&s.id, s.position_m, s.axis, self.position_sd.sources_m.get(&s.id)))
+                .collect(),
+            receivers: self
+                .receivers
+                .iter()
+                .map(|r| place(&r.id, r.position_m, r.axis, self.position_sd.receivers_m.get(&r.id)))
+                .collect(),
             responses: self.responses.iter().map(response).collect(),
         }
     }
@@ -196,6 +216,16 @@ pub(super) fn obj(scene: &Scene) -> String {
 }
 
 /// A source or receiver as the file has it.
-pub(super) fn place(id: &str, position_m: [f64; 3], axis: Option<[f64; 3]>) -> PlaceTable {
-    PlaceTable { id: id.to_owned(), position_m: position_m.to_vec(), orientation: axis.map(|a| a.to_vec()) }
+pub(super) fn place(
+    id: &str,
+    position_m: [f64; 3],
+    axis: Option<[f64; 3]>,
+    position_sd_m: Option<&f64>,
+) -> PlaceTable {
+    PlaceTable {
+        id: id.to_owned(),
+        position_m: position_m.to_vec(),
+        orientation: axis.map(|a| a.to_vec()),
+        position_sd_m: position_sd_m.copied(),
+    }
 }

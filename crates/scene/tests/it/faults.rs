@@ -6,8 +6,8 @@ use sabine_acoustics::{
     write_wav, write_wav_channels,
 };
 use sabine_scene::{
-    Levels, MaterialPrior, MeasuredRoom, Measurement, NamedMaterial, NewResponse, NewRoom, Receiver, Scene,
-    Source, TimeZero, Triangle,
+    Levels, MaterialPrior, MeasuredRoom, Measurement, NamedMaterial, NewResponse, NewRoom, PositionSd,
+    Receiver, Scene, Source, TimeZero, Triangle,
 };
 use std::io::Write;
 use std::path::Path;
@@ -31,6 +31,7 @@ fn room(samples: usize) -> NewRoom {
         name: name.into(),
         air: None,
         session: None,
+        recorded_at: None,
         samples: ImpulseResponse::new((0..samples).map(|i| (-1e-3 * i as f32).exp()).collect(), 48_000)
             .unwrap(),
     };
@@ -39,6 +40,7 @@ fn room(samples: usize) -> NewRoom {
         scene,
         air: None,
         measurement: Measurement { time_zero: TimeZero::Emission, levels: Levels::Absolute },
+        position_sd: PositionSd::default(),
         sources: vec![Source { id: source.0, position_m: source.1, axis: None }],
         receivers: vec![Receiver { id: receiver.0, position_m: receiver.1, axis: None }],
         responses: vec![response("one"), response("two")],

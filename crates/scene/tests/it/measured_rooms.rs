@@ -4,8 +4,8 @@ use sabine_acoustics::{
     Air, Bands, Error as ValueError, ImpulseResponse, SampleFormat, library_material, write_wav,
 };
 use sabine_scene::{
-    Error, Levels, MaterialPrior, MeasuredRoom, Measurement, NewResponse, NewRoom, Receiver, Scene, Source,
-    TimeZero,
+    Error, Levels, MaterialPrior, MeasuredRoom, Measurement, NewResponse, NewRoom, PositionSd, Receiver,
+    Scene, Source, TimeZero,
 };
 use std::path::Path;
 use tempfile::TempDir;
@@ -86,6 +86,23 @@ fn a_good_room_is_read_as_it_stands() {
 }
 
 #[test]
+fn places_are_known_as_well_as_the_file_says_of_all_or_of_one() {
+    let silent = folder(TOML, OBJ);
+    let room = MeasuredRoom::read(silent.path()).unwrap();
+    assert_eq!(room.position_sd(), &PositionSd::default());
+    assert_eq!((room.position_sd().source_m("s1"), room.responses()[0].recorded_at), (None, None));
+    let toml = TOML
+        .replace("levels = \"common\"", "levels = \"common\"\nposition_sd_m = 0.02")
+        .replace("id = \"r1\"", "id = \"r1\"\nposition_sd_m = 0.1")
+        .replace("session = \"evening\"", "recorded_at = 3");
+    let stated = folder(&toml, OBJ);
+    let room = MeasuredRoom::read(stated.path()).unwrap();
+    assert_eq!(room.position_sd().source_m("s1"), Some(0.02));
+    assert_eq!(room.position_sd().receiver_m("r1"), Some(0.1));
+    assert_eq!(room.responses()[0].recorded_at, Some(3.0));
+}
+
+#[test]
 fn air_that_is_not_stated_is_assumed_and_says_so() {
     let toml = TOML.replace(
         "[air]\ntemperature_c = 24.0\nrelative_humidity_percent = 45.0\npressure_kpa = 101.325\n",
@@ -100,7 +117,28 @@ fn air_that_is_not_stated_is_assumed_and_says_so() {
 /// (what is changed in room.toml, into what, the file at fault, the words that must be there)
 type Case = (&'static str, &'static str, &'static str, &'static [&'static str]);
 
-const TOML_FAULTS: [Case; 41] = [
+const TOML_FAULTS: [Case; 47] = [
+    (
+        "levels = \"common\"",
+        "levels = \"common\"\nposition_sd_m = 0.00001",
+        "room.toml",
+        &["measurement.position_sd_m", "10e-6", "between 0.1 mm and 1 m"],
+    ),
+    (
+        "levels = \"common\"",
+        "levels = \"common\"\nposition_sd_m = nan",
+        "room.toml",
+        &["measurement.position_sd_m", "NaN"],
+    ),
+    ("id = \"s1\"", "id = \"s1\"\nposition_sd_m = 1.5", "room.toml", &["sources[0].position_sd_m", "1.5"]),
+    (
+        "id = \"r1\"",
+        "id = \"r1\"\nposition_sd_m = -0.1",
+        "room.toml",
+        &["receivers[0].position_sd_m", "-0.1"],
+    ),
+    ("id = \"r1\"", "id = \"r1\"\nposition_sd_m = \"1 cm\"", "room.toml", &["position_sd_m"]),
+    ("session = \"evening\"", "recorded_at = inf", "room.toml", &["responses[0].recorded_at", "inf"]),
     ("[materials.floor]\n", "", "", &["`floor`", "room.obj", "no table"]),
     ("[materials.floor]", "[materials.floor]\n[materials.roof]", "room.toml", &["materials.roof", "no face"]),
     (
@@ -337,6 +375,11 @@ fn new_room() -> NewRoom {
         priors,
         air: Some(Air::new(21.0, 40.0, 100.0).unwrap()),
         measurement: Measurement { time_zero: TimeZero::PerResponse, levels: Levels::Absolute },
+        position_sd: PositionSd {
+            all_m: Some(0.03),
+            sources_m: [("s".into(), 0.002)].into(),
+            receivers_m: [("r".into(), 0.25)].into(),
+        },
         sources: vec![Source { id: "s".into(), position_m: [1.0, 1.1, 1.2], axis: Some([0.6, 0.8, 0.0]) }],
         receivers: vec![Receiver::omni("r", [3.0, 2.1, 1.7]).unwrap()],
         responses: vec![NewResponse {
@@ -345,6 +388,7 @@ fn new_room() -> NewRoom {
             name: "s_r".into(),
             air: Some(Air::new(22.5, 41.0, 100.0).unwrap()),
             session: Some("morning".into()),
+            recorded_at: Some(-3.5),
             samples: ImpulseResponse::new(vec![0.0, 1.0, -0.25], 44_100).unwrap(),
         }],
     }
@@ -363,6 +407,8 @@ fn a_written_room_comes_back() {
     assert_eq!(room.priors()[3].absorption, None);
     assert_eq!((room.sources(), room.receivers()), (&new.sources[..], &new.receivers[..]));
     assert_eq!(room.measurement(), new.measurement);
+    assert_eq!(room.position_sd(), &new.position_sd);
+    assert_eq!(room.responses()[0].recorded_at, Some(-3.5));
     assert_eq!(Some(room.responses()[0].air), new.responses[0].air);
     assert_eq!(room.load_response(0).unwrap(), new.responses[0].samples);
     // A second time there is something in the way.
@@ -379,6 +425,16 @@ fn a_room_that_could_not_be_read_back_is_not_written() {
     new.responses[0].receiver = "nobody".into();
     let error = new.write(parent.path().join("room")).unwrap_err();
     assert!(error.to_string().contains("`nobody`"), "{error}");
+    let refused = |new: &NewRoom, words: &str| {
+        let error = new.write(parent.path().join("room")).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    };
+    // A deviation of a place that is not there, or no deviation at all.
+    let mut unplaced = new_room();
+    unplaced.position_sd.sources_m = [("r".into(), 0.1)].into();
+    refused(&unplaced, "`r`");
+    unplaced.position_sd = PositionSd { all_m: Some(0.0), ..PositionSd::default() };
+    refused(&unplaced, "measurement.position_sd_m");
     new.priors.pop();
     assert!(matches!(
         new.write(parent.path().join("room")),

@@ -10,8 +10,8 @@ use crate::wave_grid::{ThinScreen, WaveGrid};
 use rand_pcg::Pcg64Mcg;
 use sabine_acoustics::{Air, Bands, Error, ImpulseResponse, Material, OutOfRange, PerBand};
 use sabine_scene::{
-    Levels, MaterialPrior, MeasuredRoom, Measurement, NamedMaterial, NewResponse, NewRoom, Receiver, Scene,
-    Source, TimeZero, Triangle,
+    Levels, MaterialPrior, MeasuredRoom, Measurement, NamedMaterial, NewResponse, NewRoom, PositionSd,
+    Receiver, Scene, Source, TimeZero, Triangle,
 };
 use std::path::Path;
 
@@ -212,6 +212,7 @@ impl ScreenedRoom {
             name: format!("{}_{}", declared.source.id, receiver.id),
             air: None,
             session: None,
+            recorded_at: None,
             samples,
         };
         NewRoom {
@@ -219,6 +220,7 @@ impl ScreenedRoom {
             priors: declared.priors.clone(),
             air: Some(declared.air),
             measurement: Measurement { time_zero: TimeZero::Emission, levels: Levels::Common },
+            position_sd: PositionSd::default(),
             sources: vec![declared.source.clone()],
             receivers: declared.receivers.clone(),
             responses: responses.into_iter().zip(&declared.receivers).map(entry).collect(),

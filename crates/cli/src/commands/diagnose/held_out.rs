@@ -64,16 +64,20 @@ fn held_out_bars(held: &HeldOut, shown: &[usize]) -> String {
         html += &bars::group(PREDICTIONS[i], &[bar], None);
     }
     html += "<p class=\"key\">Gain in predicting them, over materials refitted only (longer is better; line: 90 % interval over positions)</p>";
-    let most = held.nats_interval.iter().flatten().chain(&held.nats_per_bin).copied().fold(1e-3, f64::max);
+    let ends = held.nats_interval.iter().flatten().chain(&held.nats_per_bin);
+    let most = ends.copied().filter(|end| end.is_finite()).fold(1e-3, f64::max);
     for &i in &shown[1..] {
         let (nats, [low, high]) = (held.nats_per_bin[i - 1], held.nats_interval[i - 1]);
+        let known = low.is_finite() && high.is_finite();
         let bar = Bar {
             colour: i,
             share: nats / most,
-            interval: Some((low / most, high / most)),
+            interval: known.then_some((low / most, high / most)),
             text: format!("{nats:.3}"),
         };
-        html += &bars::group(&format!("{} ({low:.3} to {high:.3})", PREDICTIONS[i]), &[bar], None);
+        let interval =
+            if known { format!("{low:.3} to {high:.3}") } else { "one position has no interval".to_owned() };
+        html += &bars::group(&format!("{} ({interval})", PREDICTIONS[i]), &[bar], None);
     }
     html + "<p class=\"key\">In nats for each compared time bin: 0.7 means twice as probable.</p></div>"
 }

@@ -1,0 +1,209 @@
+"""One measured room simulated by pyroomacoustics, in the on-disk form of docs/measured-room.md, with truth.json beside room.toml.
+
+What is simulated shares no code and no random numbers with this project: image sources of positive sign (Allen and Berkley), or
+image sources of low order joined to ray tracing. The room file states what a careful user knows: the mesh, tables that are off by
+their stated deviation, places that are off by theirs. An effect is planted by simulating another room than the file describes.
+"""
+
+import argparse
+import json
+import pathlib
+
+import numpy as np
+import pyroomacoustics as pra
+import soundfile
+
+CENTRES_HZ = [125, 250, 500, 1000, 2000, 4000]
+RATE_HZ = 16000
+TABLE_SD = 0.03  # how far tables are off, and how far the file says that they may be
+PLACE_SD_M = 0.01
+GAIN_SD_DB = 0.3  # of each microphone
+LENGTH = 1.6  # of responses, in reverberation times of the slowest octave (Eyring): boxes of smooth walls decay more slowly than that
+NOISE_DB = -63.0  # energy of the recorder's white noise over a response, relative to the mean energy of the responses
+MARGIN_M = 0.6  # places to walls
+APART_M = 0.8
+SCATTERING = 0.1  # of all walls, where rays are traced
+MAX_IMAGE_ORDER = 130  # 3 million images
+FACES = ["west", "east", "south", "north", "floor", "ceiling"]
+MATERIALS = {"west": "brick", "east": "plaster", "south": "brick", "north": "plaster", "floor": "carpet", "ceiling": "board"}
+SHAPES = {"brick": [0, 0, 0, 0, 0, 0], "plaster": [3, 1, 0, -1, -1, 0], "carpet": [-4, -2, 0, 2, 3, 4], "board": [2, 1, 0, 0, 1, 1]}
+EFFECTS = ["null", "position", "surface", "temperature", "latency", "gain"]
+
+
+def draw(random, receivers):
+    """A room: sides, tables, places, climate."""
+    sides = [random.uniform(4.0, 7.5), random.uniform(3.5, 6.0), random.uniform(2.4, 3.3)]
+    level = {name: random.uniform(0.15, 0.4) for name in SHAPES}
+    absorption = {
+        name: np.clip(level[name] * 10 ** (0.05 * np.array(SHAPES[name]) + random.normal(0, 0.06, 6)), 0.03, 0.7)
+        for name in SHAPES
+    }
+    places = []
+    while len(places) < receivers + 1:
+        place = np.array([random.uniform(MARGIN_M, side - MARGIN_M) for side in sides])
+        if all(np.linalg.norm(place - other) > APART_M for other in places):
+            places.append(place)
+    climate = {"temperature_c": random.uniform(16, 26), "relative_humidity_percent": random.uniform(30, 65)}
+    return sides, absorption, places, climate
+
+
+def planted(effect, random, absorption, places, climate):
+    """What is true in place of what the file will say, and what of it is hidden."""
+    absorption = {name: table.copy() for name, table in absorption.items()}
+    places = [place.copy() for place in places]
+    climate = dict(climate)
+    recorder = {"latency_s": 0.0, "gain_db": np.zeros(len(places) - 1)}
+    hidden = {}
+    if effect == "position":
+        index = int(random.integers(1, len(places)))
+        direction = random.normal(size=3)
+        offset = 0.15 * direction / np.linalg.norm(direction)
+        places[index] = places[index] + offset
+        hidden = {"receiver": f"r{index}", "offset_m": offset.tolist()}
+    elif effect == "surface":
+        name = str(random.choice(["carpet", "board"]))
+        absorption[name] = np.clip(absorption[name] + 0.3, 0.0, 0.95)
+        hidden = {"material": name, "added": 0.3}
+    elif effect == "temperature":
+        climate["temperature_c"] -= 9.0
+        hidden = {"true_c": climate["temperature_c"]}
+    elif effect == "latency":
+        recorder["latency_s"] = 0.003
+        hidden = {"latency_ms": 3.0}
+    elif effect == "gain":
+        index = int(random.integers(1, len(places)))
+        recorder["gain_db"][index - 1] = 5.0
+        hidden = {"receiver": f"r{index}", "gain_db": 5.0}
+    return absorption, places, climate, recorder, hidden
+
+
+def eyring_s(sides, absorption):
+    """Longest reverberation time of the octaves, without air."""
+    x, y, z = sides
+    areas = dict(zip(FACES, [y * z, y * z, x * z, x * z, x * y, x * y]))
+    total = sum(areas.values())
+    mean = sum(area * absorption[MATERIALS[face]] for face, area in areas.items()) / total
+    return float(np.max(0.161 * x * y * z / (-total * np.log(1 - mean))))
+
+
+def simulate(method, sides, absorption, places, climate, rays, seed):
+    """Responses of all receivers, sample 0 at the emission."""
+    table = lambda name: {"coeffs": absorption[name].tolist(), "center_freqs": CENTRES_HZ}
+    scattering = {"coeffs": [SCATTERING] * 6, "center_freqs": CENTRES_HZ}
+    traced = method == "rays"
+    walls = {face: pra.Material(table(MATERIALS[face]), scattering if traced else None) for face in FACES}
+    length_s = LENGTH * eyring_s(sides, absorption)
+    # Its own formula for the speed of sound, 331.4 + 0.6 T + 0.0124 H, is up to 1 m/s above that of dry air: nobody planted that.
+    speed = 331.3 * np.sqrt(1 + climate["temperature_c"] / 273.15)
+    # Every image that is heard in time, or what takes the place of rays early on.
+    order = 3 if traced else int(np.ceil(length_s * speed / min(sides)))
+    if order > MAX_IMAGE_ORDER:
+        raise SystemExit(f"images of order {order} would be needed: take another seed")
+    room = pra.ShoeBox(
+        sides,
+        fs=RATE_HZ,
+        max_order=order,
+        materials=walls,
+        temperature=climate["temperature_c"],
+        humidity=climate["relative_humidity_percent"],
+        air_absorption=True,
+        ray_tracing=traced,
+    )
+    room.set_sound_speed(speed)
+    if traced:
+        np.random.seed(seed)  # the phases of its late part
+        room.set_ray_tracing(n_rays=rays, receiver_radius=0.3, hist_bin_size=0.004, time_thres=length_s)
+    room.add_source(places[0])
+    room.add_microphone_array(np.array(places[1:]).T)
+    room.compute_rir()
+    # Its fractional delays are filters of this length: what comes before sample 0 of the emission is theirs.
+    lead = pra.constants.get("frac_delay_length") // 2
+    samples = int(length_s * RATE_HZ)
+    responses = [np.asarray(room.rir[m][0], dtype=float)[lead : lead + samples] for m in range(len(places) - 1)]
+    return responses, order, speed
+
+
+def recorded(responses, recorder, random):
+    """What the recorder makes of them."""
+    late = int(round(recorder["latency_s"] * RATE_HZ))
+    gains = 10 ** ((recorder["gain_db"] + random.normal(0, GAIN_SD_DB, len(responses))) / 20)
+    kept = [gain * np.concatenate([np.zeros(late), response]) for gain, response in zip(gains, responses)]
+    power = np.mean([np.mean(response**2) for response in kept])
+    noise = 10 ** (NOISE_DB / 20) * np.sqrt(power)
+    return [response + noise * random.normal(size=len(response)) for response in kept]
+
+
+def mesh(sides):
+    x, y, z = sides
+    corners = [[0, 0, 0], [x, 0, 0], [0, y, 0], [x, y, 0], [0, 0, z], [x, 0, z], [0, y, z], [x, y, z]]
+    faces = {"west": "1 5 7 3", "east": "2 4 8 6", "south": "1 2 6 5", "north": "3 7 8 4", "floor": "1 3 4 2", "ceiling": "5 6 8 7"}
+    lines = ["v {:.6f} {:.6f} {:.6f}".format(*corner) for corner in corners]
+    return "\n".join(lines + [f"usemtl {MATERIALS[face]}\nf {faces[face]}" for face in FACES]) + "\n"
+
+
+def room_file(absorption, places, climate, scattering):
+    """What a careful user would write."""
+    numbers = lambda values: "[" + ", ".join(f"{value:.4f}" for value in values) + "]"
+    lines = ['[room]\nmesh = "room.obj"\n', "[air]"]
+    lines += [f"{key} = {value:.2f}" for key, value in climate.items()] + ["pressure_kpa = 101.325\n"]
+    lines += ['[measurement]\ntime_zero = "emission"\nlevels = "common"', f"position_sd_m = {PLACE_SD_M}\n"]
+    lines += [f"[bands]\ncentres_hz = {CENTRES_HZ}\n"]
+    for name, table in absorption.items():
+        lines += [f"[materials.{name}]", f"absorption = {numbers(table)}"]
+        lines += [f"absorption_sd = {numbers([TABLE_SD] * 6)}", f"scattering = {numbers([scattering] * 6)}\n"]
+    lines += [f'[[sources]]\nid = "s1"\nposition_m = {numbers(places[0])}\n']
+    for i, place in enumerate(places[1:], 1):
+        lines += [f'[[receivers]]\nid = "r{i}"\nposition_m = {numbers(place)}\n']
+    for i in range(1, len(places)):
+        lines += [f'[[responses]]\nsource = "s1"\nreceiver = "r{i}"\nfile = "ir/s1_r{i}.wav"\n']
+    return "\n".join(lines)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument("--method", choices=["images", "rays"], required=True)
+    parser.add_argument("--effect", choices=EFFECTS, default="null")
+    parser.add_argument("--receivers", type=int, default=8)
+    parser.add_argument("--rays", type=int, default=100_000, help="of pyroomacoustics")
+    parser.add_argument("--out", type=pathlib.Path, required=True)
+    arguments = parser.parse_args()
+
+    random = np.random.default_rng(arguments.seed)
+    sides, absorption, places, climate = draw(random, arguments.receivers)
+    true = planted(arguments.effect, random, absorption, places, climate)
+    true_absorption, true_places, true_climate, recorder, hidden = true
+    # Nobody knows tables and places exactly: the file is off, the truth is what was drawn.
+    stated = {name: np.clip(table + random.normal(0, TABLE_SD, 6), 0.01, 0.95) for name, table in absorption.items()}
+    stated_places = [place + random.normal(0, PLACE_SD_M, 3) for place in places]
+    responses, order, speed = simulate(
+        arguments.method, sides, true_absorption, true_places, true_climate, arguments.rays, arguments.seed
+    )
+    responses = recorded(responses, recorder, random)
+
+    (arguments.out / "ir").mkdir(parents=True)
+    for i, response in enumerate(responses, 1):
+        soundfile.write(arguments.out / "ir" / f"s1_r{i}.wav", response.astype(np.float32), RATE_HZ, subtype="FLOAT")
+    scattering = SCATTERING if arguments.method == "rays" else 0.0
+    (arguments.out / "room.obj").write_text(mesh(sides))
+    (arguments.out / "room.toml").write_text(room_file(stated, stated_places, climate, scattering))
+    truth = {
+        "program": f"pyroomacoustics {pra.__version__}",
+        "method": arguments.method,
+        "effect": arguments.effect,
+        "hidden": hidden,
+        "seed": arguments.seed,
+        "image_order": order,
+        "speed_of_sound_m_s": speed,
+        "rays": arguments.rays if arguments.method == "rays" else 0,
+        "sides_m": list(sides),
+        "absorption": {name: table.tolist() for name, table in true_absorption.items()},
+        "source_m": true_places[0].tolist(),
+        "receivers_m": [place.tolist() for place in true_places[1:]],
+        "climate": true_climate,
+    }
+    (arguments.out / "truth.json").write_text(json.dumps(truth, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
