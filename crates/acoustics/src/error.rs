@@ -40,6 +40,13 @@ pub enum Error {
         /// Bands of the right operand.
         right: Bands,
     },
+    /// Sounds that belong together and have different sample rates.
+    SampleRates {
+        /// Sample rate of the first, in Hz.
+        left_hz: u32,
+        /// Sample rate of the other, in Hz.
+        right_hz: u32,
+    },
     /// A number outside its physical range, or not finite.
     OutOfRange(OutOfRange),
     /// No samples, no vertices, no triangles, ...
@@ -192,6 +199,9 @@ impl fmt::Display for Error {
                     right.len(),
                     right.nominal_hz(0)
                 )
+            }
+            Self::SampleRates { left_hz, right_hz } => {
+                write!(f, "sample rates of {left_hz} Hz and {right_hz} Hz; they must be the same")
             }
             Self::OutOfRange(inner) => inner.fmt(f),
             Self::Empty { what } => {

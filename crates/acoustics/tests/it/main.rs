@@ -9,6 +9,7 @@ mod audio_files;
 mod audio_formats;
 mod decay_accuracy;
 mod hard_input;
+mod listener_measures;
 #[cfg(feature = "audio")]
 mod real_responses;
 #[cfg(feature = "audio")]
