@@ -14,4 +14,5 @@ mod listener_measures;
 mod real_responses;
 #[cfg(feature = "audio")]
 mod response_files;
+mod speech_transmission;
 mod synthetic;
