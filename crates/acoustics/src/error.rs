@@ -7,6 +7,7 @@
 use crate::audio::kind::FileKind;
 use crate::bands::Bands;
 use crate::out_of_range::OutOfRange;
+use crate::sweep_error::SweepError;
 use std::fmt;
 use std::path::PathBuf;
 
@@ -47,6 +48,8 @@ pub enum Error {
         /// Sample rate of the other, in Hz.
         right_hz: u32,
     },
+    /// A recording of a sweep that is no measurement.
+    Sweep(SweepError),
     /// A number outside its physical range, or not finite.
     OutOfRange(OutOfRange),
     /// No samples, no vertices, no triangles, ...
@@ -203,6 +206,7 @@ impl fmt::Display for Error {
             Self::SampleRates { left_hz, right_hz } => {
                 write!(f, "sample rates of {left_hz} Hz and {right_hz} Hz; they must be the same")
             }
+            Self::Sweep(inner) => inner.fmt(f),
             Self::OutOfRange(inner) => inner.fmt(f),
             Self::Empty { what } => {
                 write!(f, "{what} is empty")
@@ -298,6 +302,12 @@ impl std::error::Error for Error {
 impl From<OutOfRange> for Error {
     fn from(error: OutOfRange) -> Self {
         Self::OutOfRange(error)
+    }
+}
+
+impl From<SweepError> for Error {
+    fn from(error: SweepError) -> Self {
+        Self::Sweep(error)
     }
 }
 

@@ -39,6 +39,7 @@
 //! - [`Bands`], octaves or third octaves, and [`PerBand`] (IEC 61260-1).
 //! - Sound: [`Signal`], [`ImpulseResponse`] (**pressure**), [`read_audio`], [`write_wav`], [`resample()`]; for files of any length
 //!   [`AudioReader`], [`WavWriter`] and [`BlockResampler`], which work in blocks; [`read_response`].
+//! - Measuring (ISO 18233): [`ExponentialSweep`], and [`deconvolve`], which tells recordings that are no measurement.
 //! - Measures: [`RoomParameters`], [`BandParameters`] (full band and third octaves), [`DecayFit`], [`EnergyDecayCurve`],
 //!   [`equalisation()`], [`Onset`], [`FilterBank`]; [`SoundStrength`], [`LateralEnergy`], [`InterauralCorrelation`];
 //!   single numbers over bands ([`mid_frequency_mean`], [`bass_ratio`]) and over positions ([`SpatialMean`]). A number comes as a [`Reading`]: an [`Estimate`] with its standard error, or
@@ -51,7 +52,7 @@
 //!
 //! # Does not
 //! - know rooms or paths: meshes, sources and measured rooms are in `sabine-scene`, traced paths in `sabine-paths`.
-//! - deconvolve sweeps: it starts from impulse responses.
+//! - play or record: it makes the sweep and the response of what was recorded ([`deconvolve`]).
 //! - fall back: where T30 cannot be had it does not give T20 in its place.
 //!
 //! # Units
@@ -80,7 +81,8 @@
 //! - `symphonia`: [`read_audio`] reads FLAC, Ogg Vorbis and AIFF besides WAV.
 //!
 //! # References
-//! - ISO 3382-1:2009 and 3382-2:2008 (parameters), IEC 60268-16:2020 (speech transmission), IEC 61260-1:2014 (bands), ISO 9613-1:1993 (air).
+//! - ISO 3382-1:2009 and 3382-2:2008 (parameters), IEC 60268-16:2020 (speech transmission),
+//!   ISO 18233:2006 (sweeps), IEC 61260-1:2014 (bands), ISO 9613-1:1993 (air).
 //! - M. R. Schroeder: New method of measuring reverberation time. JASA 37, 1965.
 //! - M. Karjalainen, P. Antsalo, A. Mäkivirta, T. Peltonen, V. Välimäki: Estimation of modal decay parameters from noisy
 //!   response measurements. J. Audio Eng. Soc. 50, 2002.
@@ -93,7 +95,9 @@ mod atomic_file;
 mod audio;
 mod band_energy;
 mod bands;
+mod correlation;
 mod decay_fit;
+mod deconvolution;
 mod directivity;
 mod directivity_table;
 mod energy;
@@ -123,6 +127,8 @@ mod single_number;
 mod spectrum;
 mod speech_transmission;
 mod strength;
+mod sweep;
+mod sweep_error;
 mod targets;
 
 pub use air::Air;
@@ -134,6 +140,7 @@ pub use audio::{
 };
 pub use bands::Bands;
 pub use decay_fit::{DecayFit, Slope};
+pub use deconvolution::{DeconvolutionConfig, SweepMeasurement, deconvolve};
 pub use directivity::Directivity;
 pub use energy::{EnergyDecayCurve, EnergyResponse};
 pub use engineering::Engineering;
@@ -165,4 +172,6 @@ pub use speech_transmission::{
     MODULATION_HZ, ModulationTransfer, QualificationBand, SpeechTransmission, speech_levels,
 };
 pub use strength::{FreeFieldReference, SoundStrength};
+pub use sweep::{ExponentialSweep, SweepConfig};
+pub use sweep_error::SweepError;
 pub use targets::RoomTargets;

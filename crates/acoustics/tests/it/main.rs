@@ -15,4 +15,5 @@ mod real_responses;
 #[cfg(feature = "audio")]
 mod response_files;
 mod speech_transmission;
+mod sweeps;
 mod synthetic;
