@@ -41,6 +41,16 @@ impl Prepared {
         Self { samples: level.into_iter().map(f64::from).collect(), last, sample_rate_hz, onset }
     }
 
+    /// A response made ready whose time zero is that of another channel of the same measurement.
+    pub(crate) fn with_onset(response: &ImpulseResponse, onset: Result<Onset, NoReading>) -> Self {
+        Self { onset, ..Self::new(response) }
+    }
+
+    /// The samples without offset.
+    pub(crate) fn samples(&self) -> &[f64] {
+        &self.samples
+    }
+
     /// The direct sound alone, in place, the rest silent.
     fn direct(&self, onset: Onset) -> Vec<f64> {
         let half = (DIRECT_HALF_WIDTH_S * f64::from(self.sample_rate_hz)).round() as usize;
@@ -175,15 +185,47 @@ impl BandEnergy {
         }
     }
 
+    /// Energy from a step on without the noise, with what the fitted decay says of the time after the knee, and the variance that
+    /// the noise gives it.
+    pub(crate) fn from(&self, step: usize) -> (f64, f64) {
+        let end = self.trusted_end();
+        let (net, variance) = self.net(step, end.max(step));
+        let tail = match &self.fit {
+            Ok(fit) if end == self.end => {
+                fit.decay_energy_after(end.max(step) as f64 * self.step_s, self.step_s)
+            }
+            _ => 0.0,
+        };
+        (net + tail, variance)
+    }
+
+    /// Energy of the whole response without the noise, and the variance that the noise gives it.
+    pub(crate) fn total(&self) -> (f64, f64) {
+        self.from(self.first)
+    }
+
+    /// The knee, or the end of the response where sound follows that the fitted decay does not know: a distinct echo.
+    pub(crate) fn trusted_end(&self) -> usize {
+        let (after, variance) = self.net(self.end, self.energy.len());
+        let unexplained = after - self.tail;
+        // Six standard deviations of the noise, and 0.1 dB of what the fit says.
+        let is_echo = unexplained > 6.0 * variance.sqrt() && unexplained > 0.023 * self.tail;
+        if is_echo { self.energy.len() } else { self.end }
+    }
+
     /// Energy between two steps without the noise, and the variance that the noise gives it.
     pub(crate) fn net(&self, from: usize, to: usize) -> (f64, f64) {
         let to = to.min(self.energy.len());
         let from = from.min(to);
-        let gross: f64 = self.energy[from..to].iter().sum();
-        let net = gross - self.noise * (to - from) as f64;
+        self.without_noise(self.energy[from..to].iter().sum(), to - from)
+    }
+
+    /// An energy summed over so many steps less the noise in them, and the variance that the noise gives it.
+    pub(crate) fn without_noise(&self, gross: f64, steps: usize) -> (f64, f64) {
+        let net = gross - self.noise * steps as f64;
         // Signal times noise, and noise alone, each with 1 / (B dt) of relative variance in a step dt.
         let spread = 1.0 / (self.statistical_bandwidth_hz * self.step_s);
-        let variance = spread * (2.0 * net.max(0.0) * self.noise + (to - from) as f64 * self.noise.powi(2));
+        let variance = spread * (2.0 * net.max(0.0) * self.noise + steps as f64 * self.noise.powi(2));
         (net, variance)
     }
 }

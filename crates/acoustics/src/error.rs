@@ -7,6 +7,7 @@
 use crate::audio::kind::FileKind;
 use crate::bands::Bands;
 use crate::out_of_range::OutOfRange;
+use crate::sweep_error::SweepError;
 use std::fmt;
 use std::path::PathBuf;
 
@@ -40,6 +41,15 @@ pub enum Error {
         /// Bands of the right operand.
         right: Bands,
     },
+    /// Sounds that belong together and have different sample rates.
+    SampleRates {
+        /// Sample rate of the first, in Hz.
+        left_hz: u32,
+        /// Sample rate of the other, in Hz.
+        right_hz: u32,
+    },
+    /// A recording of a sweep that is no measurement.
+    Sweep(SweepError),
     /// A number outside its physical range, or not finite.
     OutOfRange(OutOfRange),
     /// No samples, no vertices, no triangles, ...
@@ -193,6 +203,10 @@ impl fmt::Display for Error {
                     right.nominal_hz(0)
                 )
             }
+            Self::SampleRates { left_hz, right_hz } => {
+                write!(f, "sample rates of {left_hz} Hz and {right_hz} Hz; they must be the same")
+            }
+            Self::Sweep(inner) => inner.fmt(f),
             Self::OutOfRange(inner) => inner.fmt(f),
             Self::Empty { what } => {
                 write!(f, "{what} is empty")
@@ -288,6 +302,12 @@ impl std::error::Error for Error {
 impl From<OutOfRange> for Error {
     fn from(error: OutOfRange) -> Self {
         Self::OutOfRange(error)
+    }
+}
+
+impl From<SweepError> for Error {
+    fn from(error: SweepError) -> Self {
+        Self::Sweep(error)
     }
 }
 

@@ -54,6 +54,13 @@ pub enum NoReading {
         /// The sample rate, in Hz.
         sample_rate_hz: u32,
     },
+    /// A band that the quantity is made of is not among those that were measured.
+    NoBand {
+        /// Nominal centre of the first band needed, in Hz.
+        first_hz: f64,
+        /// Nominal centre of the last band needed, in Hz.
+        last_hz: f64,
+    },
     /// The response ends before the quantity is defined.
     TooShort {
         /// Length needed, in seconds.
@@ -92,6 +99,9 @@ impl fmt::Display for NoReading {
             Self::NoOnset => f.write_str("there is no onset: the response is silent or all noise"),
             Self::AboveNyquist { sample_rate_hz } => {
                 write!(f, "the band reaches beyond half the sample rate of {sample_rate_hz} Hz")
+            }
+            Self::NoBand { first_hz, last_hz } => {
+                write!(f, "needs the bands from {first_hz} to {last_hz} Hz")
             }
             Self::TooShort { needed_s, available_s } => {
                 write!(f, "needs {needed_s:.3} s after the onset; there are {available_s:.3} s")

@@ -303,7 +303,7 @@ fn clarity(band: &BandEnergy, limit_s: f64) -> (Reading, Reading) {
 const LEAST_SHARE: f64 = 1e-20;
 
 /// An energy that stands out of its uncertainty, or how far it sinks below the total.
-fn positive(energy: f64, variance: f64, total: f64) -> Result<f64, NoReading> {
+pub(crate) fn positive(energy: f64, variance: f64, total: f64) -> Result<f64, NoReading> {
     let least = (2.0 * variance.sqrt()).max(LEAST_SHARE * total);
     if energy > least {
         return Ok(energy);

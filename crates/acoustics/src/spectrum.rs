@@ -49,8 +49,13 @@ pub(crate) struct Spectrum {
 impl Spectrum {
     /// Transforms `samples` with at least `padding_s` of silence after them.
     pub(crate) fn new(samples: &[f64], sample_rate_hz: u32, padding_s: f64) -> Self {
+        let padding = (padding_s * f64::from(sample_rate_hz)).ceil() as usize;
+        Self::with_length(samples, sample_rate_hz, fast_len(samples.len() + padding))
+    }
+
+    /// Transforms `samples` with silence after them up to a length that [`fast_len`] gave, at least their own.
+    pub(crate) fn with_length(samples: &[f64], sample_rate_hz: u32, transform_len: usize) -> Self {
         let rate = f64::from(sample_rate_hz);
-        let transform_len = fast_len(samples.len() + (padding_s * rate).ceil() as usize);
         let forward = plan(transform_len).forward;
         let mut padded = samples.to_vec();
         padded.resize(transform_len, 0.0);
@@ -81,6 +86,29 @@ impl Spectrum {
         output
     }
 
+    /// The whole transform back in time, after each bin and its frequency in Hz went through `change`: sounds of negative time
+    /// stand at the end.
+    pub(crate) fn changed(&self, change: impl Fn(usize, f64, Complex<f64>) -> Complex<f64>) -> Vec<f64> {
+        let inverse = plan(self.transform_len).inverse;
+        let mut product = inverse.make_input_vec();
+        let scale = 1.0 / self.transform_len as f64;
+        for (i, bin) in self.bins.iter().enumerate() {
+            product[i] = change(i, i as f64 * self.bin_hz, *bin) * scale;
+        }
+        // A real signal has no imaginary part at zero and at half the sample rate.
+        product[0].im = 0.0;
+        product[self.transform_len / 2].im = 0.0;
+        let mut output = inverse.make_output_vec();
+        let done = inverse.process(&mut product, &mut output);
+        debug_assert!(done.is_ok());
+        output
+    }
+
+    /// The bins with their frequencies in Hz.
+    pub(crate) fn bins(&self) -> impl Iterator<Item = (f64, Complex<f64>)> + '_ {
+        self.bins.iter().enumerate().map(|(i, bin)| (i as f64 * self.bin_hz, *bin))
+    }
+
     /// Sum of the products of the samples of two signals of one length, both filtered by a gain: with itself, the energy.
     pub(crate) fn product(&self, other: &Self, support_hz: (f64, f64), gain: impl Fn(f64) -> f64) -> f64 {
         debug_assert_eq!(self.transform_len, other.transform_len);
@@ -106,7 +134,7 @@ impl Spectrum {
 }
 
 /// The next even length whose only prime factors are 2, 3 and 5.
-fn fast_len(least: usize) -> usize {
+pub(crate) fn fast_len(least: usize) -> usize {
     let mut best = least.max(2).next_power_of_two();
     for threes_and_fives in [3, 5, 9, 15, 25, 27, 45, 75, 81, 125, 135, 225] {
         let mut candidate = 2 * threes_and_fives;

@@ -9,8 +9,11 @@ mod audio_files;
 mod audio_formats;
 mod decay_accuracy;
 mod hard_input;
+mod listener_measures;
 #[cfg(feature = "audio")]
 mod real_responses;
 #[cfg(feature = "audio")]
 mod response_files;
+mod speech_transmission;
+mod sweeps;
 mod synthetic;
