@@ -33,6 +33,7 @@ pub mod page;
 mod room;
 mod shell;
 pub mod spectrogram;
+pub mod stop;
 
 pub use command::{Sabine, command, run};
 pub use failure::Failure;

@@ -209,3 +209,46 @@ fn bad_input_is_named_and_nothing_is_written() {
         assert!(!out.exists());
     }
 }
+
+/// A diagnosis that is stopped says at what stage it was, and writes nothing.
+fn stops(output: &Output, out: &Path, cause: &str) {
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(
+        message.contains(&format!("stopped {cause} after")) && message.contains(", during "),
+        "{message}"
+    );
+    assert!(message.contains("nothing was written") && !message.contains("panicked"), "{message}");
+    assert!(!out.exists(), "{} was written", out.display());
+}
+
+#[test]
+fn the_time_limit_stops_a_diagnosis_that_says_where_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    // More rays than a second can trace.
+    let arguments = ["--rays", "20000", "--time-limit", "1", "--out", out.to_str().unwrap()];
+    stops(&run("diagnose", &arguments), &out, "by the time limit");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_stops_a_diagnosis_that_says_where_it_was() {
+    use std::process::{Command, Stdio};
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let child = sabine("diagnose")
+        .args(["--rays", "20000", "--out", out.to_str().unwrap()])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // The folder is made just before the work begins, and signals are listened for then.
+    while !out.exists() {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    std::thread::sleep(std::time::Duration::from_millis(700));
+    let signalled = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(signalled.success());
+    stops(&child.wait_with_output().unwrap(), &out, "on request");
+}

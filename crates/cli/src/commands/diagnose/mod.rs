@@ -19,9 +19,11 @@ use crate::output::OutputFolder;
 use crate::room::RoomArguments;
 use clap::Args;
 use findings::Findings;
-use sabine::diagnose::{DiagnoseConfig, Diagnoser, catalogue};
+use sabine::acoustics::Error as ValueError;
+use sabine::diagnose::{DiagnoseConfig, Diagnoser, Error as DiagnoseError, catalogue};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Find what a simulation of a room gets wrong against measured responses.
 #[derive(Args)]
@@ -43,6 +45,9 @@ pub struct Arguments {
     /// Go on although more than one ray in a thousand escapes through holes of the mesh
     #[arg(long)]
     allow_leaks: bool,
+    /// Stop after so many seconds, write nothing, and say how far it came
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..))]
+    time_limit: Option<u64>,
     /// Folder for diagnosis.json, report.html and extended_model.toml
     #[arg(long, value_name = "DIR", default_value = "out/diagnose")]
     out: PathBuf,
@@ -75,8 +80,16 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     // A folder that cannot be written to should not cost the user a computation first.
     let mut out = OutputFolder::create(&arguments.out)?;
     let (room, name) = arguments.room.read(&mut demo)?;
-    let bar = Bar::new();
-    let diagnosis = diagnoser.diagnose(&room, &arguments.hold_out, &bar)?;
+    let bar = Bar::stopped_on_request(arguments.time_limit.map(Duration::from_secs))?;
+    let diagnosis = diagnoser.diagnose(&room, &arguments.hold_out, &bar).map_err(|error| -> Failure {
+        // An error of its own may come first, and counts then.
+        match (&error, bar.stopped()) {
+            (DiagnoseError::Acoustics(ValueError::Cancelled { .. }), Some(place)) => {
+                format!("{place}; nothing was written").into()
+            }
+            _ => error.into(),
+        }
+    })?;
     bar.finish();
 
     let mut receivers: Vec<usize> = room.responses().iter().map(|r| r.receiver).collect();
