@@ -2,8 +2,8 @@
 
 use crate::channel;
 use crate::commands::{
-    augment, diagnose, eq, estimate, evaluate, fit, listen, live, match_room, materials, measure, mix,
-    new_room, replace, trace, train, validate, walk,
+    augment, deconvolve, diagnose, eq, estimate, evaluate, fit, listen, live, match_room, materials, measure,
+    mix, new_room, replace, sweep, trace, train, validate, walk,
 };
 use crate::console;
 use crate::failure::Failure;
@@ -32,8 +32,12 @@ pub struct Sabine {
 enum Job {
     /// Match a simulated room to a recording of speech and render dry sound in it
     Match(match_room::Arguments),
-    /// Measure impulse responses: EDT, T20, T30, C50, C80, D50, centre time, DRR per octave
+    /// Measure impulse responses: EDT, T20, T30, C50, C80, D50, centre time, DRR, G, J_LF, IACC, STI
     Measure(measure::Arguments),
+    /// Write an exponential sweep to measure a room with
+    Sweep(sweep::Arguments),
+    /// Make impulse responses of a recorded sweep
+    Deconvolve(deconvolve::Arguments),
     /// Design a linear-phase FIR filter from octave-band gains
     Eq(eq::Arguments),
     /// Estimate reverberation time and equalisation from recordings of speech
@@ -146,6 +150,8 @@ impl Job {
         match self {
             Self::Match(arguments) => match_room::run(arguments),
             Self::Measure(arguments) => measure::run(arguments),
+            Self::Sweep(arguments) => sweep::run(arguments),
+            Self::Deconvolve(arguments) => deconvolve::run(arguments),
             Self::Eq(arguments) => eq::run(arguments),
             Self::Estimate(arguments) => estimate::run(arguments),
             Self::Trace(arguments) => trace::run(arguments),

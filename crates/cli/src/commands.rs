@@ -1,6 +1,7 @@
 //! One module for each command: its arguments, and `run`.
 
 pub mod augment;
+pub mod deconvolve;
 pub mod diagnose;
 pub mod eq;
 pub mod estimate;
@@ -14,6 +15,7 @@ pub mod measure;
 pub mod mix;
 pub mod new_room;
 pub mod replace;
+pub mod sweep;
 pub mod trace;
 pub mod train;
 pub mod validate;

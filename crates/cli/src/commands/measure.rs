@@ -1,5 +1,7 @@
 //! Measures impulse responses: room-acoustic parameters per octave, with the reason where there is no answer.
 
+mod listener;
+
 use crate::channel::channel;
 use crate::chart::{Chart, Look, Scale, Series, chart_sheet};
 use crate::failure::Failure;
@@ -18,7 +20,8 @@ use std::time::Instant;
 /// Points in a plotted decay.
 const PLOT_POINTS: usize = 300;
 
-/// Read EDT, T20, T30, T60, C50, C80, D50 and DRR from impulse responses, octave by octave.
+/// Read EDT, T20, T30, T60, C50, C80, D50 and DRR from impulse responses, octave by octave; with more channels and references
+/// sound strength, lateral energy, interaural correlation and the speech transmission index.
 #[derive(Args)]
 pub struct Arguments {
     /// Impulse responses (WAV)
@@ -42,6 +45,8 @@ pub struct Arguments {
     /// Folder for plots of the decays, an SVG for each file
     #[arg(long, value_name = "DIR")]
     plots: Option<PathBuf>,
+    #[command(flatten)]
+    listener: listener::ListenerArguments,
 }
 
 /// Runs the command.
@@ -54,8 +59,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     } else {
         Bands::octaves(arguments.from.unwrap_or(62.5), arguments.to.unwrap_or(8000.0))?
     };
-    let channel = arguments.channel.unwrap_or_default();
-    let (mut results, mut plots) = (Vec::new(), Vec::new());
+    arguments.listener.check(arguments.files.len())?;
+    let channel = arguments.listener.channel().or(arguments.channel).unwrap_or_default();
+    let (mut results, mut plots, mut rooms) = (Vec::new(), Vec::new(), Vec::new());
     for path in &arguments.files {
         let found = read_response(path, channel)?;
         let response = &found.response;
@@ -66,11 +72,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let whole = BandParameters::full_band(response);
         let whole_seconds = start.elapsed().as_secs_f64();
         let eq_db = equalisation(response, bands)?;
+        let listener = arguments.listener.read(path, &found, bands)?;
         print!("{}", table(path, &room, &whole));
         println!(
-            "eq_db re 1k   {}\n",
+            "eq_db re 1k   {}",
             eq_db.values().iter().map(|e| format!("{:>9}", cell(e))).collect::<String>()
         );
+        print!("{}", listener.lines(&room));
         let notes = notes(&found);
         for note in &notes {
             println!("note: {note}");
@@ -80,10 +88,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         result["notes"] = json!(notes);
         result["eq_db"] = eq_db.values().iter().map(|e| e.as_ref().ok().map(|e| e.value)).collect();
         result["seconds"] = json!({ "octaves": octaves_seconds, "full_band": whole_seconds });
+        listener.add_to(&mut result, &room);
         results.push(result);
         if arguments.plots.is_some() {
             plots.push((plot_name(path, plots.len()), plot(response, &room)?));
         }
+        rooms.push(room);
+    }
+    if rooms.len() > 1 {
+        print!("{}", listener::spatial_means(&rooms)?);
     }
     if let Some(folder) = &arguments.plots {
         let mut out = OutputFolder::create(folder)?;
@@ -192,6 +205,11 @@ fn cell(reading: &Reading) -> String {
     reading.as_ref().map_or_else(|_| "-".to_owned(), |estimate| format!("{:.3}", estimate.value))
 }
 
+/// The value in each band, null where there is none.
+fn as_values(readings: &PerBand<Reading>) -> Value {
+    readings.values().iter().map(|reading| reading.as_ref().map_or(Value::Null, |e| json!(e.value))).collect()
+}
+
 fn as_json(path: &Path, room: &RoomParameters, whole: &BandParameters) -> Value {
     let value = |reading: &Reading| reading.as_ref().map_or(Value::Null, |e| json!(e.value));
     let deviation = |reading: &Reading| reading.as_ref().map_or(Value::Null, |e| json!(e.standard_error));
@@ -199,7 +217,7 @@ fn as_json(path: &Path, room: &RoomParameters, whole: &BandParameters) -> Value 
     result["bands_hz"] = room.bands().iter_hz().collect();
     let mut reasons = vec![serde_json::Map::new(); room.bands().len()];
     for (name, per_band) in quantities(room) {
-        result[name] = per_band.values().iter().map(value).collect();
+        result[name] = as_values(per_band);
         if name == "t60_s" {
             result["t60_sd_s"] = per_band.values().iter().map(deviation).collect();
         }

@@ -18,6 +18,7 @@ mod match_room;
 mod process;
 mod replace;
 mod rooms;
+mod sweep;
 mod trace;
 
 use std::process::Command;
