@@ -58,11 +58,19 @@ impl BandMask {
         self.integral(limit_hz, 2).powi(2) / self.integral(limit_hz, 4)
     }
 
-    /// Integral of a power of the gain over frequency, by the midpoint rule on a logarithmic scale.
+    /// Integral of a power of the gain over frequency.
     fn integral(&self, limit_hz: f64, power: i32) -> f64 {
+        self.integral_between((0.0, limit_hz), power)
+    }
+
+    /// The same between two frequencies, by the midpoint rule on a logarithmic scale.
+    fn integral_between(&self, range_hz: (f64, f64), power: i32) -> f64 {
         const STEPS: u32 = 96;
         let (low, high) = self.support_hz();
-        let (low, high) = (low.max(1.0), high.min(limit_hz));
+        let (low, high) = (low.max(range_hz.0).max(1.0), high.min(range_hz.1));
+        if low >= high {
+            return 0.0;
+        }
         let step = (high / low).ln() / f64::from(STEPS);
         (0..STEPS)
             .map(|i| {
@@ -165,6 +173,29 @@ impl FilterBank {
         })
     }
 
+    /// Share of the energy that [`analyse`](Self::analyse) passes in a band which comes from each band of the bank, its own among them,
+    /// for sound of a flat spectrum up to half the sample rate. The shares add up to 1; what lies beyond the outer bands counts as theirs.
+    /// Of an octave 3 % come from the octave below and 8 % from that above: where a neighbour rings longer, that is most of the late decay.
+    ///
+    /// # Panics
+    /// If there is no such band.
+    pub fn shares(&self, band: usize) -> PerBand<f64> {
+        let mask = BandMask::between(self.bands.edges_hz(band));
+        let limit_hz = 0.5 * f64::from(self.sample_rate_hz);
+        let last = self.bands.len() - 1;
+        let passed = PerBand::from_fn(self.bands, |i| {
+            let (lower_hz, upper_hz) = self.bands.edges_hz(i);
+            let from_hz = if i == 0 { 0.0 } else { lower_hz };
+            let to_hz = if i == last { limit_hz } else { upper_hz.min(limit_hz) };
+            mask.integral_between((from_hz, to_hz), 2)
+        });
+        let whole: f64 = passed.values().iter().sum();
+        // A band that lies above half the sample rate altogether passes nothing, of whatever origin.
+        PerBand::from_fn(self.bands, |i| {
+            if whole > 0.0 { passed.values()[i] / whole } else { f64::from(u8::from(i == band)) }
+        })
+    }
+
     fn spectrum(&self, samples: &[f32]) -> Spectrum {
         let samples: Vec<f64> = samples.iter().copied().map(f64::from).collect();
         Spectrum::new(&samples, self.sample_rate_hz, padding_s(self.bands.edges_hz(0)))
@@ -241,6 +272,40 @@ mod tests {
                 assert!((band[1234 - lag] - band[1234 + lag]).abs() < 1e-6, "{hz} Hz, lag {lag}");
             }
         }
+    }
+
+    /// By Parseval's theorem, from the filtered impulse: a plain sum over its discrete spectrum, line by line.
+    #[test]
+    fn shares_of_the_bands_are_those_of_a_filtered_impulse() {
+        const RATE_HZ: f64 = 16_000.0;
+        const LENGTH: usize = 2048;
+        for bands in [Bands::octaves(500.0, 4000.0).unwrap(), Bands::third_octaves(1000.0, 2000.0).unwrap()] {
+            let bank = FilterBank::new(bands, RATE_HZ as u32).unwrap();
+            let mut input = vec![0.0; LENGTH];
+            input[LENGTH / 2] = 1.0;
+            for (band, filtered) in bank.analyse(&input).values().iter().enumerate() {
+                let mut expected = vec![0.0; bands.len()];
+                for line in 0..LENGTH / 2 {
+                    let hz = (line as f64 + 0.5) * RATE_HZ / LENGTH as f64;
+                    let (mut re, mut im) = (0.0, 0.0);
+                    for (n, x) in filtered.iter().enumerate() {
+                        let (sin, cos) = (std::f64::consts::TAU * hz / RATE_HZ * n as f64).sin_cos();
+                        re += f64::from(*x) * cos;
+                        im += f64::from(*x) * sin;
+                    }
+                    let own = (1..bands.len()).take_while(|&i| bands.edges_hz(i).0 <= hz).count();
+                    expected[own] += re * re + im * im;
+                }
+                let whole: f64 = expected.iter().sum();
+                for (found, expected) in bank.shares(band).values().iter().zip(&expected) {
+                    // A line of the spectrum that lies across an edge counts on one side: 4 Hz of some hundred at half power.
+                    assert!((found - expected / whole).abs() < 0.01, "{band}: {found} {}", expected / whole);
+                }
+            }
+        }
+        // Nothing of an octave above half the sample rate is there to be shared out.
+        let bank = FilterBank::new(Bands::octaves(2000.0, 16_000.0).unwrap(), 8000).unwrap();
+        assert_eq!(bank.shares(3).values(), [0.0, 0.0, 0.0, 1.0]);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Settings of a diagnosis.
 
-use crate::error::Error;
+use sabine_acoustics::OutOfRange;
 use sabine_propagate::TracerConfig;
 use sabine_scene::PositionSd;
 
@@ -60,7 +60,7 @@ impl Default for DiagnoseConfig {
 }
 
 impl DiagnoseConfig {
-    pub(crate) fn check(&self) -> Result<(), Error> {
+    pub(crate) fn check(&self) -> Result<(), OutOfRange> {
         let limits = [
             ("rays", self.rays as f64, 100.0, 1e7, "between 100 and 10 million"),
             ("image_order", self.image_order as f64, 1.0, 6.0, "between 1 and 6"),
@@ -74,9 +74,7 @@ impl DiagnoseConfig {
             ("simulations", self.simulations as f64, 10.0, 1000.0, "between 10 and 1000"),
         ];
         for (field, value, low, high, range) in limits {
-            if !(low..=high).contains(&value) {
-                return Err(Error::OutOfRange { field, value, range });
-            }
+            OutOfRange::check(field, value, low, high, range)?;
         }
         Ok(())
     }

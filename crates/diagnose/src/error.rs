@@ -1,5 +1,7 @@
 //! What can go wrong in a diagnosis.
 
+use sabine_acoustics::OutOfRange;
+
 /// Errors of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -14,15 +16,8 @@ pub enum Error {
     #[error(transparent)]
     Propagate(#[from] sabine_propagate::Error),
     /// A setting is out of range.
-    #[error("{field} is {value}, but must be {range}")]
-    OutOfRange {
-        /// The setting.
-        field: &'static str,
-        /// Its value.
-        value: f64,
-        /// What is allowed.
-        range: &'static str,
-    },
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
     /// The room has no measured responses.
     #[error("the room has no measured responses: there is nothing to compare the simulation with")]
     NoResponses,

@@ -1,7 +1,6 @@
 //! Settings of a fit and what is known of the materials beforehand.
 
-use crate::Error;
-use sabine_acoustics::{Bands, PerBand};
+use sabine_acoustics::{Bands, OutOfRange, PerBand};
 use sabine_scene::{MaterialPrior, MeasuredRoom, NamedMaterial};
 
 /// Which slope of the simulated decay is made to meet the target.
@@ -111,11 +110,8 @@ impl Default for FitConfig {
 
 impl FitConfig {
     /// Checks every field.
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        let within = |field, value: f64, low: f64, high: f64, range| {
-            // Written so that NaN fails.
-            if value >= low && value <= high { Ok(()) } else { Err(Error::Config { field, value, range }) }
-        };
+    pub(crate) fn check(&self) -> Result<(), OutOfRange> {
+        let within = OutOfRange::check;
         within("range_db.0", self.range_db.0, -30.0, 0.0, "between -30 and 0 dB")?;
         within(
             "range_db.1",

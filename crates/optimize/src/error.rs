@@ -1,5 +1,7 @@
 //! What can go wrong with a fit.
 
+use sabine_acoustics::OutOfRange;
+
 /// Errors of this crate; each names the offending field, and the band or material where there is one.
 ///
 /// A target that cannot be reached is no error but part of the result: see [`Unreachable`](crate::Unreachable).
@@ -7,15 +9,8 @@
 #[non_exhaustive]
 pub enum Error {
     /// A setting outside its range, or not finite.
-    #[error("setting {field} is {value}; it must be {range}")]
-    Config {
-        /// The field of the settings.
-        field: &'static str,
-        /// What it was set to.
-        value: f64,
-        /// The range in words.
-        range: &'static str,
-    },
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
     /// A reverberation time that no room has, or one that is not a number.
     #[error("target at {band_hz} Hz: T60 of {value_s} s; it must lie between {low_s} and {high_s} s")]
     Target {

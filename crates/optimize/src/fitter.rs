@@ -35,7 +35,7 @@ impl MaterialFitter {
     /// A fitter with these settings.
     ///
     /// # Errors
-    /// [`Error::Config`] for a setting out of its range.
+    /// [`Error::OutOfRange`] for a setting out of its range.
     pub fn new(config: FitConfig) -> Result<Self, Error> {
         config.check()?;
         Ok(Self { config })

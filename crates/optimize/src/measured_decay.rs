@@ -16,6 +16,8 @@ const RINGING: f64 = 1.5;
 const BINS: usize = 64;
 /// Fewest time bins that a decay is read from.
 const LEAST_BINS: usize = 6;
+/// Bands of which a filter passes less than this, as a share of what it passes of its own, are left out: -70 dB.
+const MIN_LEAK: f64 = 1e-7;
 /// Noise may not exceed this share of what a bin holds.
 const MOST_NOISE: f64 = 0.5;
 
@@ -34,7 +36,7 @@ pub struct MeasuredDecay {
 pub(crate) struct BinnedDecay {
     /// Edges of the bins in seconds from the first sample, one more than bins.
     pub edges_s: Vec<f64>,
-    /// Energy of each bin less the noise; a unit impulse has energy 1.
+    /// Energy of each bin less the noise; what a unit impulse has within the edges of the band is 1.
     pub energy: Vec<f64>,
     /// Independent values of the band in each bin.
     pub values: Vec<f64>,
@@ -42,6 +44,8 @@ pub(crate) struct BinnedDecay {
     pub signal: Vec<f64>,
     /// How the filter spreads the energy of an instant.
     pub pulse: Pulse,
+    /// Other bands, and what the filter passes of the energy of each, as a share of what it passes of the band's own.
+    pub leaks: Vec<(usize, f64)>,
     /// Energy after the last bin, by the decay fit.
     pub tail: f64,
 }
@@ -71,6 +75,7 @@ impl MeasuredDecay {
                 onset_s,
                 upper_hz - lower_hz,
                 (&impulses.values()[b], middle),
+                (b, &bank.shares(b)),
                 fit,
             )
         };
@@ -105,11 +110,14 @@ impl BinnedDecay {
         onset_s: f64,
         bandwidth_hz: f64,
         (impulse, middle): (&[f32], usize),
+        (band, shares): (usize, &PerBand<f64>),
         fit: &DecayFit,
     ) -> Result<Self, NoReading> {
         let from_s = onset_s + DIRECT_S.max(RINGING / bandwidth_hz);
         let to_s = fit.knee_s().min(samples.len() as f64 / rate_hz);
-        let unit_energy: f64 = impulse.iter().map(|&x| f64::from(x) * f64::from(x)).sum();
+        let own_share = shares.values()[band];
+        let unit_energy = own_share * impulse.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>();
+        let leaks = shares.values().iter().map(|share| share / own_share).enumerate();
         let first_s = RINGING / bandwidth_hz;
         let growth = growth((to_s - from_s) / first_s);
         let mut width_s = first_s;
@@ -119,6 +127,7 @@ impl BinnedDecay {
             values: Vec::new(),
             signal: Vec::new(),
             pulse: Pulse::new(impulse, middle, rate_hz),
+            leaks: leaks.filter(|&(other, share)| other != band && share > MIN_LEAK).collect(),
             tail: 0.0,
         };
         let mut end = (from_s * rate_hz).round() as usize;
@@ -165,6 +174,7 @@ impl BinnedDecay {
             values: Vec::new(),
             signal: Vec::new(),
             pulse: self.pulse.clone(),
+            leaks: self.leaks.clone(),
             tail: self.tail,
         };
         let bins = self.energy.len();
@@ -229,6 +239,7 @@ mod tests {
             values: vec![1.0, 1.0, 1.0, 2.0, 4.0, 0.5],
             signal: vec![1.0, 0.8, 1.0, 0.5, 0.5, 0.5],
             pulse: Pulse::new(&[0.0, 1.0, 0.0], 1, 1e4),
+            leaks: Vec::new(),
             tail: 0.05,
         };
         let wide = narrow.widened(0.002);

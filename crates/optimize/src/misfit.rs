@@ -2,8 +2,8 @@
 
 use crate::history::{History, check_paths};
 use crate::responses::latencies_s;
-use crate::{Error, MeasuredPair};
-use sabine_acoustics::{Air, EnergyDecayCurve, Material, NoReading, PerBand, Reading};
+use crate::{Error, MeasuredDecay, MeasuredPair};
+use sabine_acoustics::{Air, EnergyDecayCurve, EnergyResponse, Material, NoReading, PerBand, Reading};
 use sabine_paths::Conditions;
 use sabine_scene::TimeZero;
 
@@ -17,7 +17,7 @@ const BIN_S: f64 = 1e-3;
 pub struct DecayMisfit {
     /// T30 of the response, in seconds.
     pub measured_t30_s: PerBand<Reading>,
-    /// T30 of the paths, in seconds.
+    /// T30 of the paths, in seconds, as the filters of the measurement pass them: with what leaks in from neighbouring bands.
     pub simulated_t30_s: PerBand<Reading>,
     /// Root mean square difference of the two decay curves, in dB: both start just after the direct sound at 0 dB and are
     /// compared down to -35 dB or the noise, every second of the decay counting alike.
@@ -46,20 +46,15 @@ impl DecayMisfit {
         let history = History::new(pair.paths, air, BIN_S);
         let latency_s = latencies_s(&[pair], std::slice::from_ref(&history), time_zero)[0];
         let energy = pair.paths.energy_response(&Conditions::new(materials, air), BIN_S)?;
+        let filtered = filtered(pair.measured, &energy, latency_s);
         let simulated_t30_s = PerBand::from_fn(bands, |b| {
-            let t30 = energy.decay_curve(b).decay_time_s(-5.0, -35.0)?;
+            let t30 = EnergyDecayCurve::from_energy(&filtered[b], BIN_S).decay_time_s(-5.0, -35.0)?;
             Ok(sabine_acoustics::Estimate::exact(t30))
         });
         let curves = |b: usize| -> Result<Vec<(f64, f64, f64)>, NoReading> {
             let decay = pair.measured.band(b).as_ref().map_err(NoReading::clone)?;
-            let remaining = EnergyDecayCurve::from_energy(energy.band(b), BIN_S);
-            let at = |t: f64| -> f64 {
-                // Straight between the edges of bins.
-                let place = (t / BIN_S).max(0.0);
-                let of = |i: usize| remaining.remaining().get(i).copied().unwrap_or(0.0);
-                let (i, part) = (place as usize, place.fract());
-                of(i) * (1.0 - part) + of(i + 1) * part
-            };
+            let remaining = EnergyDecayCurve::from_energy(&filtered[b], BIN_S);
+            let at = |t: f64| energy_after(&remaining, t);
             let start = at(decay.edges_s[0] - latency_s);
             let level = decay.level_db();
             let points = decay.edges_s.iter().zip(level).map(|(t, measured)| {
@@ -87,4 +82,37 @@ impl DecayMisfit {
             curves: PerBand::from_fn(bands, |b| curves(b).unwrap_or_default()),
         })
     }
+}
+
+/// Energy still to come at a time after the emission, straight between the edges of bins.
+fn energy_after(curve: &EnergyDecayCurve, time_s: f64) -> f64 {
+    let place = (time_s / BIN_S).max(0.0);
+    let of = |i: usize| curve.remaining().get(i).copied().unwrap_or(0.0);
+    let (i, part) = (place as usize, place.fract());
+    of(i) * (1.0 - part) + of(i + 1) * part
+}
+
+/// Energies of all bands as the filters pass them, each in the units of its own paths. How much louder a neighbour is measured to be than
+/// the paths say counts; where it cannot be read, it is taken to be as loud as the band itself.
+fn filtered(measured: &MeasuredDecay, energy: &EnergyResponse, latency_s: f64) -> Vec<Vec<f64>> {
+    let count = measured.bands().len();
+    let gain = |b: usize| -> Option<f64> {
+        let decay = measured.band(b).as_ref().ok()?;
+        let curve = EnergyDecayCurve::from_energy(energy.band(b), BIN_S);
+        let [from_s, to_s] = [decay.edges_s.first()?, decay.edges_s.last()?].map(|t| t - latency_s);
+        let simulated = energy_after(&curve, from_s) - energy_after(&curve, to_s);
+        (simulated > 0.0).then(|| decay.energy.iter().sum::<f64>() / simulated)
+    };
+    let gains: Vec<Option<f64>> = (0..count).map(gain).collect();
+    (0..count)
+        .map(|b| {
+            let mut sum = energy.band(b).to_vec();
+            let leaks = measured.band(b).as_ref().map_or(&[][..], |decay| &decay.leaks);
+            for &(other, share) in leaks {
+                let louder = gains[other].zip(gains[b]).map_or(1.0, |(other, own)| other / own);
+                sum.iter_mut().zip(energy.band(other)).for_each(|(s, e)| *s += share * louder * e);
+            }
+            sum
+        })
+        .collect()
 }

@@ -17,6 +17,9 @@ const QUARTERS: i32 = 12;
 /// Least width of a bin, in standard deviations of an arrival: errors of neighbouring bins, in truth of opposite signs, are taken for
 /// independent, which may not be all that there is in a bin.
 const WIDTH: f64 = 2.0;
+/// Most exact paths of a response that are taken one by one, the earliest: all reflections up to the third in most rooms. Where a tracer
+/// knows more (closed forms of cuboids hold a hundred thousand), those that follow are as dense as a diffuse field.
+const MAX_EXACT: usize = 512;
 /// Pairs that interfere less are left out.
 const LEAST_OVERLAP: f64 = 1e-7;
 
@@ -34,7 +37,12 @@ pub(crate) struct BandResponse<'a> {
     pub traces: Traces<&'a History>,
     /// The exact ones: where they stand in the history, and their energy if nothing absorbed.
     pub exact: Vec<(usize, f64)>,
+    /// Empty where the response cannot be read in this band: then it only leaks into those beside it.
     pub windows: Vec<Window>,
+    /// How many of them are fitted, from the first on.
+    pub fitted: usize,
+    /// What the filter passes of other bands ([`BinnedDecay::leaks`]).
+    pub leaks: Vec<(usize, f64)>,
 }
 
 /// A measured bin and what falls into it.
@@ -52,6 +60,8 @@ pub(crate) struct Window {
     pub exact: Vec<Arrival>,
     /// Pairs of these, by their place in this list, and how much they interfere ([`Pulse::overlap`]).
     pub overlaps: Vec<(usize, usize, f64)>,
+    /// Energy of other bands that the filter passes, in the units of the paths of this band.
+    pub leak: f64,
 }
 
 /// An exact path in a measured bin.
@@ -74,7 +84,7 @@ impl<'a> ResponseBand<'a> {
         &mut self,
         index: usize,
         history: &'a History,
-        mut weights: Vec<f32>,
+        weights: Vec<f32>,
         decay: &BinnedDecay,
         latency_s: f64,
         arrival_error_s: f64,
@@ -83,16 +93,9 @@ impl<'a> ResponseBand<'a> {
         let end_s = history.bins() as f64 * history.bin_s;
         let edges_s: Vec<f64> =
             decay.edges_s.iter().map(|t| t - latency_s).take_while(|t| *t <= end_s).collect();
-        if edges_s.len() < 3 {
-            return false;
-        }
-        let mut exact = Vec::new();
-        for (i, weight) in weights.iter_mut().enumerate() {
-            if history.batches[i] == PathSet::BATCHES && *weight > 0.0 {
-                exact.push((i, f64::from(*weight)));
-                *weight = 0.0;
-            }
-        }
+        self.add_unread(index, history, weights);
+        let Some(response) = self.responses.last_mut().filter(|_| edges_s.len() >= 3) else { return false };
+        let exact = &response.exact;
         let pulse = &decay.pulse;
         let level_db = decay.level_db();
         let window = |(j, edges): (usize, &[f64])| {
@@ -116,30 +119,48 @@ impl<'a> ResponseBand<'a> {
                 shares,
                 exact: exact_here,
                 overlaps,
+                leak: 0.0,
             }
         };
-        let windows = edges_s.windows(2).enumerate().map(window).collect();
-        let traces = vec![(history, weights)];
-        self.responses.push(BandResponse { index, traces, exact, windows });
+        response.windows = edges_s.windows(2).enumerate().map(window).collect();
+        response.fitted = response.windows.len();
+        response.leaks.clone_from(&decay.leaks);
         true
     }
 
-    /// Takes out what begins below a level of the decay curve, by response.
-    pub fn take_below(&mut self, level_db: f64) -> Vec<Vec<Window>> {
-        let take = |response: &mut BandResponse<'_>| {
-            let kept = response.windows.iter().take_while(|w| w.level_db >= level_db).count();
-            response.windows.split_off(kept)
-        };
-        self.responses.iter_mut().map(take).collect()
+    /// Adds a response that cannot be read in this band, for what its paths leak into others.
+    pub fn add_unread(&mut self, index: usize, history: &'a History, mut weights: Vec<f32>) {
+        let mut exact = Vec::new();
+        for (i, weight) in weights.iter_mut().enumerate() {
+            // Those without energy too: bands have the same list.
+            if history.batches[i] == PathSet::BATCHES && exact.len() < MAX_EXACT {
+                exact.push((i, f64::from(*weight)));
+                *weight = 0.0;
+            }
+        }
+        let traces = vec![(history, weights)];
+        let (windows, leaks) = (Vec::new(), Vec::new());
+        self.responses.push(BandResponse { index, traces, exact, windows, fitted: 0, leaks });
     }
 
-    /// Puts back what was taken out.
-    pub fn put_back(&mut self, taken: Vec<Vec<Window>>) {
-        self.responses.iter_mut().zip(taken).for_each(|(response, windows)| response.windows.extend(windows));
+    /// Leaves out what begins below a level of the decay curve; whether that is anything.
+    pub fn leave_below(&mut self, level_db: f64) -> bool {
+        let mut any = false;
+        for response in &mut self.responses {
+            response.fitted = response.windows.iter().take_while(|w| w.level_db >= level_db).count();
+            any |= response.fitted < response.windows.len();
+        }
+        any
     }
 
+    /// Takes everything in again.
+    pub fn take_all(&mut self) {
+        self.responses.iter_mut().for_each(|response| response.fitted = response.windows.len());
+    }
+
+    /// Whether no response can be read.
     pub fn is_empty(&self) -> bool {
-        self.responses.is_empty()
+        self.responses.iter().all(|response| response.windows.is_empty())
     }
 
     /// Whether a response has a gain of its own, shares it with the band, or has none.

@@ -18,10 +18,13 @@ pub(crate) struct Bin {
     pub chance: f64,
     /// Inverse relative variance of the measurement and of the rays.
     pub weight: f64,
+    /// Logarithm of the energy of the band's own paths.
     log_energy: f64,
-    /// Mean hits of each material, weighted by energy.
-    pub hits: Vec<f64>,
-    /// Relative share of each batch of rays.
+    /// Energy that leaks in from other bands.
+    leak: f64,
+    /// Mean hits of each material by the band's own paths, weighted by energy.
+    hits: Vec<f64>,
+    /// Share of each batch of rays in the energy, leaks and all.
     pub batches: Vec<f64>,
 }
 
@@ -43,7 +46,7 @@ impl<'b> ResponseExpansion<'b> {
             let mut functional = vec![0.0; history.bins()];
             functional[window.from..window.from + window.shares.len()].copy_from_slice(&window.shares);
             bin.batches = history.batch_sums(weights, absorption, &functional);
-            let energy = bin.log_energy.exp();
+            let energy = bin.log_energy.exp() + bin.leak;
             bin.batches.iter_mut().for_each(|p| *p /= energy);
             bin.weight = 1.0 / (bin.chance + variance_of_sum(&bin.batches));
         }
@@ -65,9 +68,12 @@ impl<'b> ResponseExpansion<'b> {
     fn without_weights(band: &'b ResponseBand<'b>, absorption: &[f64], path_error: f64) -> Self {
         let mut bins = Vec::new();
         for (place, response) in band.responses.iter().enumerate() {
+            if response.fitted == 0 {
+                continue;
+            }
             let fine = Bins::of(&response.traces, absorption);
             let exact = exact_energies(response, absorption);
-            for (j, window) in response.windows.iter().enumerate() {
+            for (j, window) in response.windows[..response.fitted].iter().enumerate() {
                 let bin = Bin::of(window, &fine, &exact, path_error);
                 let group = band.gain_group(response.index);
                 bins.extend(bin.map(|bin| Bin { group, place, window: j, ..bin }));
@@ -76,10 +82,23 @@ impl<'b> ResponseExpansion<'b> {
         Self { band, about: absorption.to_vec(), bins }
     }
 
-    /// ln E of a bin at an absorption.
-    fn log_energy(&self, bin: &Bin, absorption: &[f64]) -> f64 {
+    /// ln E of a bin at an absorption, and the share of the band's own paths in E.
+    fn log_energy(&self, bin: &Bin, absorption: &[f64]) -> (f64, f64) {
         let change = absorption.iter().zip(&self.about).zip(&bin.hits);
-        bin.log_energy + change.map(|((a, a0), h)| h * ((-a).ln_1p() - (-a0).ln_1p())).sum::<f64>()
+        let own = bin.log_energy + change.map(|((a, a0), h)| h * ((-a).ln_1p() - (-a0).ln_1p())).sum::<f64>();
+        if bin.leak == 0.0 {
+            return (own, 1.0);
+        }
+        // Own energy over that which leaks, as a logarithm: far from the expansion it exceeds any number.
+        let over = own - bin.leak.ln();
+        let share = 1.0 / (1.0 + (-over).exp());
+        (if over > 0.0 { own - share.ln() } else { bin.leak.ln() + over.exp().ln_1p() }, share)
+    }
+
+    /// Derivative of ln E of a bin by the absorption of each material, at an absorption.
+    pub fn slopes(&self, bin: &Bin, absorption: &[f64]) -> Vec<f64> {
+        let share = self.log_energy(bin, absorption).1;
+        bin.hits.iter().zip(absorption).map(|(h, a)| -share * h / (1.0 - a)).collect()
     }
 
     pub fn groups(&self) -> usize {
@@ -90,7 +109,7 @@ impl<'b> ResponseExpansion<'b> {
     /// ratios.
     fn log_ratios(&self, absorption: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let raw: Vec<f64> =
-            self.bins.iter().map(|b| b.measured.ln() - self.log_energy(b, absorption)).collect();
+            self.bins.iter().map(|b| b.measured.ln() - self.log_energy(b, absorption).0).collect();
         // Far from the expansion ratios exceed any number: they are summed relative to the greatest.
         let mut greatest = vec![f64::NEG_INFINITY; self.groups()];
         for (bin, raw) in self.bins.iter().zip(&raw) {
@@ -126,8 +145,8 @@ impl<'b> ResponseExpansion<'b> {
             cost += bin.weight * (log_ratio.exp_m1() - log_ratio);
             // At its most likely value a gain takes no part in the gradient.
             let by = -bin.weight * log_ratio.exp_m1();
-            for (k, g) in gradient.iter_mut().enumerate() {
-                *g -= by * bin.hits[k] / (1.0 - absorption[k]);
+            for (g, slope) in gradient.iter_mut().zip(self.slopes(bin, absorption)) {
+                *g += by * slope;
             }
         }
         cost
@@ -144,7 +163,10 @@ impl<'b> ResponseExpansion<'b> {
 }
 
 /// Energy and hits of the exact paths of a response, by their place.
-fn exact_energies<'r>(response: &'r BandResponse<'_>, absorption: &[f64]) -> Vec<(f64, &'r [u16])> {
+pub(crate) fn exact_energies<'r>(
+    response: &'r BandResponse<'_>,
+    absorption: &[f64],
+) -> Vec<(f64, &'r [u16])> {
     let history = response.traces[0].0;
     let k = absorption.len();
     let of = |&(i, weight): &(usize, f64)| {
@@ -193,6 +215,7 @@ impl Bin {
             chance: variance / (energy * energy) + window.noise,
             weight: 0.0,
             log_energy: energy.ln(),
+            leak: window.leak,
             hits,
             batches: Vec::new(),
         })

@@ -3,7 +3,7 @@
 use crate::bounded::minimise;
 use crate::fit::Unconverged;
 use crate::objective::Objective;
-use crate::response_band::{BandResponse, ResponseBand, Window};
+use crate::response_band::{BandResponse, ResponseBand};
 use crate::response_expansion::ResponseExpansion;
 use crate::uncertainty::Spread;
 use crate::unknowns::Unknowns;
@@ -59,29 +59,26 @@ pub(crate) struct Solved {
 pub(crate) fn solve_where_explained(
     bands: &mut [ResponseBand<'_>],
     config: &FitConfig,
+    start: Option<&[Vec<f64>]>,
 ) -> Result<Solved, Error> {
-    let first = solve(bands, config)?;
+    bands.iter_mut().for_each(ResponseBand::take_all);
+    let first = solve(bands, config, start)?;
     let level_db = config.range_db.1 - MARGIN_DB;
-    let take = |(band, dispersion): (&mut ResponseBand<'_>, &Option<f64>)| {
-        if dispersion.is_some_and(|d| d > MAX_DISPERSION) { band.take_below(level_db) } else { Vec::new() }
+    let leave = |(band, dispersion): (&mut ResponseBand<'_>, &Option<f64>)| {
+        dispersion.is_some_and(|d| d > MAX_DISPERSION) && band.leave_below(level_db)
     };
-    let taken: Vec<Vec<Vec<Window>>> = bands.iter_mut().zip(&first.dispersion).map(take).collect();
-    if taken.iter().flatten().all(Vec::is_empty) {
+    let some: Vec<bool> = bands.iter_mut().zip(&first.dispersion).map(leave).collect();
+    if !some.contains(&true) {
         return Ok(first);
     }
-    let second = solve(bands, config)?;
+    let second = solve(bands, config, start)?;
     let explained = |b: usize| match (first.dispersion[b], second.dispersion[b]) {
         (Some(before), Some(after)) => after < BETTER * before,
         _ => false,
     };
-    let some = |b: usize| taken[b].iter().any(|windows| !windows.is_empty());
-    let confined: Vec<bool> = (0..bands.len()).map(|b| some(b) && explained(b)).collect();
-    let all = (0..bands.len()).all(|b| confined[b] == some(b));
-    for ((band, taken), confined) in bands.iter_mut().zip(taken).zip(&confined) {
-        if !confined {
-            band.put_back(taken);
-        }
-    }
+    let confined: Vec<bool> = (0..bands.len()).map(|b| some[b] && explained(b)).collect();
+    let all = confined == some;
+    bands.iter_mut().zip(&confined).filter(|(_, confined)| !**confined).for_each(|(band, _)| band.take_all());
     let iterations = first.iterations + second.iterations;
     if all {
         return Ok(Solved { confined, iterations, ..second });
@@ -89,7 +86,7 @@ pub(crate) fn solve_where_explained(
     if !confined.contains(&true) {
         return Ok(Solved { iterations, ..first });
     }
-    let third = solve(bands, config)?;
+    let third = solve(bands, config, start)?;
     Ok(Solved { confined, iterations: iterations + third.iterations, ..third })
 }
 
@@ -100,7 +97,13 @@ pub(crate) fn solve_where_explained(
 /// what that is worth, and the reach grows or shrinks by how well the expansion foretold it; until nothing more is promised. Then weights
 /// and dispersions are taken anew, until the materials stay where they are: the iteratively reweighted fit of a generalised linear
 /// model (McCullagh and Nelder 1989, section 2.5).
-pub(crate) fn solve(bands: &[ResponseBand<'_>], config: &FitConfig) -> Result<Solved, Error> {
+///
+/// The search begins at `start`, by band and material, or else at the means of the priors.
+pub(crate) fn solve(
+    bands: &[ResponseBand<'_>],
+    config: &FitConfig,
+    start: Option<&[Vec<f64>]>,
+) -> Result<Solved, Error> {
     let unknowns = Unknowns::new(bands.iter().map(|b| &b.prior).collect(), config);
     let expand = |x: &[f64]| -> Vec<ResponseExpansion<'_>> {
         let absorption = unknowns.absorption(x);
@@ -110,7 +113,7 @@ pub(crate) fn solve(bands: &[ResponseBand<'_>], config: &FitConfig) -> Result<So
             .map(|(band, a)| ResponseExpansion::about(band, &a, config.reflection_error))
             .collect()
     };
-    let mut x = unknowns.start();
+    let mut x = start.map_or_else(|| unknowns.start(), |absorption| unknowns.variables(absorption));
     let mut expansions = expand(&x);
     // Far from the answer everything is badly explained, which says nothing of how well it will be.
     let mut dispersion = vec![1.0; bands.len()];

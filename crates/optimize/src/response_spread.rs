@@ -37,13 +37,14 @@ impl Spread {
         for (b, expansion) in expansions.iter().enumerate() {
             let sd = &expansion.band.prior.standard_deviation;
             // Derivative of ln E by each deviation.
-            let by = |hits: &[f64]| {
+            let by = |slopes: Vec<f64>| {
                 DVector::from_fn(n, |i, _| match unknowns.free[i] {
-                    (of, k) if of == b => -hits[k] * sd[k] / (1.0 - absorption[b][k]),
+                    (of, k) if of == b => slopes[k] * sd[k],
                     _ => 0.0,
                 })
             };
-            let raw: Vec<DVector<f64>> = expansion.bins.iter().map(|bin| by(&bin.hits)).collect();
+            let raw: Vec<DVector<f64>> =
+                expansion.bins.iter().map(|bin| by(expansion.slopes(bin, &absorption[b]))).collect();
             // What a gain takes up is no information.
             let mut means = vec![(DVector::zeros(n), 0.0); expansion.groups()];
             for (bin, row) in expansion.bins.iter().zip(&raw) {

@@ -7,7 +7,7 @@ use crate::history::{History, Trace, check_paths};
 use crate::measured_decay::MeasuredDecay;
 use crate::prediction::t60_of_traces;
 use crate::response_band::ResponseBand;
-use crate::response_solver::{Solved, solve_where_explained};
+use crate::response_leaks::solve_with_leaks;
 use crate::{Error, MaterialFit, MaterialFitter};
 use rayon::prelude::*;
 use sabine_acoustics::{NoReading, Observer, PerBand, report};
@@ -28,7 +28,7 @@ pub struct MeasuredPair<'a> {
 pub struct ResponseFit {
     /// The materials and what must be said about them; no target is unreachable here, for there are none.
     pub fit: MaterialFit,
-    /// Gain of each response in each band, in dB: measured energy over that of the paths (1 at 1 m). `None` where the response
+    /// Gain of each response in each band, in dB: measured energy over that of the paths (1 at 1 m), leaks of neighbouring bands taken off. `None` where the response
     /// cannot be read.
     pub gain_db: Vec<PerBand<Option<f64>>>,
     /// How much farther the measured energies lie from the fitted ones than chance puts them, as a variance ratio (1 =
@@ -37,6 +37,9 @@ pub struct ResponseFit {
     /// Responses that were left out of a band, and why: index of the response, nominal centre in Hz, reason.
     pub left_out: Vec<(usize, f64, NoReading)>,
 }
+
+/// [`ResponseFit::left_out`].
+type LeftOut = Vec<(usize, f64, NoReading)>;
 
 /// Name of this work to an observer.
 const STAGE: &str = "fit to responses";
@@ -48,7 +51,8 @@ impl MaterialFitter {
     /// lets fall into it. Its variance is that of arrivals which interfere at random: of the exact paths one by one, each known to
     /// [`FitConfig::reflection_error`](crate::FitConfig::reflection_error), of the sampled ones as a diffuse field; with what noise and few rays add. Gains
     /// are free or shared as [`Measurement::levels`] says; with an unknown gain each octave has its own, for a loudspeaker's response is
-    /// not flat. Time zero is the emission, or what puts the onset on the shortest path ([`Measurement::time_zero`]). The direct sound itself (5 ms,
+    /// not flat. The filters pass some per cent of the neighbouring octaves; what leaks in so is predicted from what is found there, in as
+    /// many rounds as it takes ([`FilterBank::shares`](sabine_acoustics::FilterBank::shares)). Time zero is the emission, or what puts the onset on the shortest path ([`Measurement::time_zero`]). The direct sound itself (5 ms,
     /// more in low octaves) is left out: it depends on the source's directivity.
     ///
     /// Of the settings it uses bin width, bounds, smoothness, the errors of reflections and of their arrival and the number of iterations. It runs
@@ -74,47 +78,14 @@ impl MaterialFitter {
         }
         let config = self.config();
         let histories: Vec<History> = paths.par_iter().map(|p| History::new(p, air, config.bin_s)).collect();
-        let latencies_s = latencies_s(pairs, &histories, measurement.time_zero);
-        let exponents = air.energy_exponent_per_m(octaves);
-        let mut left_out = Vec::new();
-        let mut bands = (0..octaves.len())
-            .map(|b| {
-                let mut band = ResponseBand::new(priors, b, measurement.levels);
-                for (i, pair) in pairs.iter().enumerate() {
-                    match pair.measured.band(b) {
-                        Ok(decay) => {
-                            let exponent = exponents.values()[b];
-                            let weights = histories[i].weights(pair.paths, materials, exponent, b, 1.0)?;
-                            if !band.add(
-                                i,
-                                &histories[i],
-                                weights,
-                                decay,
-                                latencies_s[i],
-                                config.arrival_error_s,
-                            ) {
-                                let needed_s = decay.edges_s[1] - latencies_s[i];
-                                let available_s = histories[i].bins() as f64 * config.bin_s;
-                                let reason = NoReading::TooShort { needed_s, available_s };
-                                left_out.push((i, octaves.nominal_hz(b), reason));
-                            }
-                        }
-                        Err(reason) => left_out.push((i, octaves.nominal_hz(b), reason.clone())),
-                    }
-                }
-                Ok(band)
-            })
-            .collect::<Result<Vec<_>, Error>>()?;
+        let (mut bands, left_out) = self.read_bands(pairs, &histories, measurement, problem)?;
         if bands.iter().all(ResponseBand::is_empty) {
             return Err(Error::NoDecay { responses: pairs.len(), bands: octaves.len() });
         }
 
         let together = if config.smoothness > 0.0 { bands.len() } else { 1 };
         report(observer, STAGE, 0, 1)?;
-        let solved: Vec<Solved> = bands
-            .par_chunks_mut(together)
-            .map(|bands| solve_where_explained(bands, config))
-            .collect::<Result<_, Error>>()?;
+        let solved = solve_with_leaks(&mut bands, together, config)?;
         report(observer, STAGE, 1, 1)?;
 
         let group = |b: usize| (&solved[b / together], b % together);
@@ -150,6 +121,44 @@ impl MaterialFitter {
             .collect();
         let dispersion = PerBand::from_fn(octaves, |b| group(b).0.dispersion[group(b).1]);
         Ok(ResponseFit { fit, gain_db, dispersion, left_out })
+    }
+
+    /// What each band holds of each response, and what is left out of it.
+    fn read_bands<'h>(
+        &self,
+        pairs: &[MeasuredPair<'_>],
+        histories: &'h [History],
+        measurement: Measurement,
+        problem: &FitProblem<'_>,
+    ) -> Result<(Vec<ResponseBand<'h>>, LeftOut), Error> {
+        let FitProblem { materials, priors, air } = *problem;
+        let (octaves, config) = (materials[0].bands(), self.config());
+        let latencies_s = latencies_s(pairs, histories, measurement.time_zero);
+        let exponents = air.energy_exponent_per_m(octaves);
+        let mut left_out = Vec::new();
+        let mut bands = Vec::with_capacity(octaves.len());
+        for (b, band_hz) in octaves.iter_hz().enumerate() {
+            let mut band = ResponseBand::new(priors, b, measurement.levels);
+            for (i, (pair, history)) in pairs.iter().zip(histories).enumerate() {
+                let weights = history.weights(pair.paths, materials, exponents.values()[b], b, 1.0)?;
+                match pair.measured.band(b) {
+                    Ok(decay) => {
+                        let arrival_error_s = config.arrival_error_s;
+                        if !band.add(i, history, weights, decay, latencies_s[i], arrival_error_s) {
+                            let needed_s = decay.edges_s[1] - latencies_s[i];
+                            let available_s = history.bins() as f64 * config.bin_s;
+                            left_out.push((i, band_hz, NoReading::TooShort { needed_s, available_s }));
+                        }
+                    }
+                    Err(reason) => {
+                        band.add_unread(i, history, weights);
+                        left_out.push((i, band_hz, reason.clone()));
+                    }
+                }
+            }
+            bands.push(band);
+        }
+        Ok((bands, left_out))
     }
 }
 

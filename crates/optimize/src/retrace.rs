@@ -4,7 +4,7 @@ use crate::fit_problem::FitProblem;
 use crate::history::{Trace, check_paths};
 use crate::prediction::t60_of_traces;
 use crate::{Error, MaterialFit, MaterialFitter, Unreachable, UnreachableReason};
-use sabine_acoustics::{Air, Bands, Estimate, Material, Observer, PerBand, Reading, report};
+use sabine_acoustics::{Air, Bands, Estimate, Material, Observer, OutOfRange, PerBand, Reading, report};
 use sabine_paths::PathSet;
 use std::time::Instant;
 
@@ -77,11 +77,8 @@ impl Default for RetraceConfig {
 }
 
 impl RetraceConfig {
-    fn check(&self) -> Result<(), Error> {
-        let within = |field, value: f64, low: f64, high: f64, range| {
-            // Written so that NaN fails.
-            if value >= low && value <= high { Ok(()) } else { Err(Error::Config { field, value, range }) }
-        };
+    fn check(&self) -> Result<(), OutOfRange> {
+        let within = OutOfRange::check;
         within("t60_error", self.t60_error, 1e-4, 0.5, "between 0.0001 and 0.5")?;
         within("max_effort", self.max_effort, 1.0, 1e6, "between 1 and a million")?;
         within("max_paths", self.max_paths as f64, 1.0, 4e9, "between 1 and 4 billion")?;
@@ -163,7 +160,7 @@ impl MaterialFitter {
     ///    ([`Retrace::read_t60_s`]), the aim moves by as much.
     ///
     /// # Errors
-    /// As [`MaterialFitter::fit_t60`], those of the tracer, and [`Error::Config`] for a setting out of range.
+    /// As [`MaterialFitter::fit_t60`], those of the tracer, and [`Error::OutOfRange`] for a setting out of range.
     pub fn fit_t60_retracing(
         &self,
         room: &dyn Retrace,

@@ -2,6 +2,7 @@
 
 use crate::objective::Objective;
 use crate::{Error, SlopeEvaluation};
+use sabine_acoustics::OutOfRange;
 
 /// Half the squared deviations of absorption from a prior, in standard deviations, plus weight/2 (m/m' - 1)2: what the fit
 /// minimises in one band, as an objective for any solver. Variables are absorptions.
@@ -16,7 +17,7 @@ impl RegularisedSlope {
     /// A slope with a prior for each material; `weight` is the inverse of the variance that m/m' is allowed: 1e6 for 0.1 %.
     ///
     /// # Errors
-    /// [`Error::Count`] where there are not as many means or deviations as materials, [`Error::Config`] for a weight that is
+    /// [`Error::Count`] where there are not as many means or deviations as materials, [`Error::OutOfRange`] for a weight that is
     /// not positive, [`Error::Prior`] for a deviation that is not positive.
     pub fn new(
         slope: SlopeEvaluation,
@@ -31,7 +32,7 @@ impl RegularisedSlope {
             }
         }
         if !(weight > 0.0 && weight.is_finite()) {
-            return Err(Error::Config { field: "weight", value: weight, range: "finite and positive" });
+            return Err(OutOfRange { field: "weight", value: weight, range: "finite and positive" }.into());
         }
         let band_hz = slope.band_hz();
         match standard_deviation.iter().position(|&sd| !(sd > 0.0 && sd.is_finite())) {

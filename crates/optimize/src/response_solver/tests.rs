@@ -170,6 +170,7 @@ fn by_solver(bands: usize, smoothness: f64, path_error: f64, prior: (f64, f64)) 
         // Noise of this relative variance.
         signal: vec![(1.0 + NOISE * VALUES).sqrt().recip(); WINDOWS],
         pulse: Pulse::new(&[0.0, 0.0, 1.0, 0.0, 0.0], 2, 1e7),
+        leaks: Vec::new(),
         tail: 0.0,
     };
     let bands: Vec<ResponseBand<'_>> = (0..bands)
@@ -185,7 +186,7 @@ fn by_solver(bands: usize, smoothness: f64, path_error: f64, prior: (f64, f64)) 
             band
         })
         .collect();
-    solve(&bands, &config).unwrap()
+    solve(&bands, &config, None).unwrap()
 }
 
 #[test]
@@ -253,13 +254,14 @@ fn long_decay(levels: Levels, prior: (f64, f64)) -> Solved {
         values: vec![VALUES; bins],
         signal: vec![1.0; bins],
         pulse: Pulse::new(&[0.0, 0.0, 1.0, 0.0, 0.0], 2, 1e7),
+        leaks: Vec::new(),
         tail: 0.0,
     };
     let priors = [AbsorptionPrior::uniform(OCTAVES, prior.0, prior.1)];
     let mut band = ResponseBand::new(&priors, 0, levels);
     let weights = vec![1.0; history.len()];
     assert!(band.add(0, &history, weights, &decay, 0.0, 0.0));
-    solve(&[band], &config).unwrap()
+    solve(&[band], &config, None).unwrap()
 }
 
 #[test]

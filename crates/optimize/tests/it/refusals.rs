@@ -1,7 +1,7 @@
 //! Bad input is refused by name.
 
 use crate::ergodic::Ergodic;
-use sabine_acoustics::{Air, Bands, Estimate, Material, PerBand};
+use sabine_acoustics::{Air, Bands, Estimate, Material, OutOfRange, PerBand};
 use sabine_optimize::{AbsorptionPrior, Error, FitConfig, FitProblem, MaterialFit, MaterialFitter};
 use sabine_paths::PathSet;
 use std::ops::ControlFlow;
@@ -103,7 +103,7 @@ fn settings_out_of_range() {
     ];
     for (name, config) in wrong {
         match MaterialFitter::new(config) {
-            Err(Error::Config { field, .. }) => assert_eq!(field, name),
+            Err(Error::OutOfRange(OutOfRange { field, .. })) => assert_eq!(field, name),
             other => panic!("{name}: {other:?}"),
         }
     }

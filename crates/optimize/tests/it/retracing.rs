@@ -1,7 +1,7 @@
 //! The fit that traces again until other rays confirm it.
 
 use crate::ergodic::Ergodic;
-use sabine_acoustics::{Air, Bands, Estimate, Material, PerBand, Reading};
+use sabine_acoustics::{Air, Bands, Estimate, Material, OutOfRange, PerBand, Reading};
 use sabine_optimize::{
     AbsorptionPrior, Error, FitConfig, FitProblem, MaterialFitter, PredictedChange, Retrace, RetraceConfig,
     RetracedFit,
@@ -145,7 +145,7 @@ fn settings_out_of_range_and_a_tracer_that_fails() {
         ("max_rounds", RetraceConfig { max_rounds: 0, ..good() }),
     ] {
         match fit(&trace, &config) {
-            Err(Error::Config { field, .. }) => assert_eq!(field, name),
+            Err(Error::OutOfRange(OutOfRange { field, .. })) => assert_eq!(field, name),
             other => panic!("{name}: {other:?}"),
         }
     }

@@ -8,7 +8,11 @@ use sabine::paths::{PathSet, Propagator};
 use sabine::propagate::{PathTracer, TracerConfig};
 use sabine::scene::MeasuredRoom;
 use sabine_testkit::{LabConfig, Laboratory};
+use std::path::Path;
 
+/// Specular paths of cuboids in closed form, as the diagnosis takes them: few rays miss the late decay of a box of mirrors, and the fits
+/// shall differ in nothing but what they make of the paths.
+const CUBOID_PATHS: usize = 150_000;
 /// The data say something of a value if its standard deviation has fallen to this share of the prior's.
 const DETERMINED: f64 = 0.9;
 /// Half the width of a 90 % interval, in standard deviations.
@@ -22,7 +26,13 @@ fn by_optimize(room: &MeasuredRoom, bands: Bands) -> Found {
         room.scene().materials().iter().map(|named| named.material.resampled(bands)).collect();
     let priors = AbsorptionPrior::of_room(room, bands);
     let scene = room.scene().with_materials(materials.clone()).unwrap();
-    let config = TracerConfig { rays: 5000, duration_s: 1.25, seed: 1, ..TracerConfig::default() };
+    let config = TracerConfig {
+        rays: 5000,
+        duration_s: 1.25,
+        seed: 1,
+        cuboid_paths: CUBOID_PATHS,
+        ..TracerConfig::default()
+    };
     let tracer = PathTracer::new(config).unwrap();
     let measured: Vec<(MeasuredDecay, PathSet)> = room
         .responses()
@@ -58,20 +68,12 @@ fn by_diagnose(room: &MeasuredRoom) -> (Bands, Found) {
     (found.bands, found.materials.iter().map(of).collect())
 }
 
-/// Distances of what both determine, in half widths of both intervals together: 1 where they only touch.
-fn distances(room: &MeasuredRoom, truth: Option<&dyn Fn(usize, usize) -> f64>) -> Vec<f64> {
+/// What both determine: material and band, with the distance in half widths of both intervals together, 1 where they only touch.
+fn distances(room: &MeasuredRoom, truth: Option<&dyn Fn(usize, usize) -> f64>) -> Vec<(String, f64)> {
     let (bands, diagnosed) = by_diagnose(room);
     let optimised = by_optimize(room, bands);
     let priors = AbsorptionPrior::of_room(room, bands);
     let mut distances = Vec::new();
-    let areas = room.scene().material_areas_m2();
-    let total: f64 = areas.iter().sum();
-    for (b, hz) in bands.iter_hz().enumerate() {
-        let mean = |found: &Found| -> f64 {
-            areas.iter().zip(found).map(|(area, of)| area * of[b].0).sum::<f64>() / total
-        };
-        println!("mean at {hz} Hz: optimize {:.3}, diagnose {:.3}", mean(&optimised), mean(&diagnosed));
-    }
     for (k, prior) in priors.iter().enumerate() {
         for (b, hz) in bands.iter_hz().enumerate() {
             let ((one, one_sd), (other, other_sd)) = (optimised[k][b], diagnosed[k][b]);
@@ -80,15 +82,20 @@ fn distances(room: &MeasuredRoom, truth: Option<&dyn Fn(usize, usize) -> f64>) -
                 continue;
             }
             let distance = (one - other).abs() / (QUANTILE_90 * (one_sd + other_sd));
-            let name = &room.scene().materials()[k].name;
+            let name = format!("{} at {hz} Hz", room.scene().materials()[k].name);
             let truth = truth.map_or(String::new(), |truth| format!(", true {:.3}", truth(k, b)));
             println!(
-                "{name} at {hz} Hz: optimize {one:.3} +- {one_sd:.3}, diagnose {other:.3} +- {other_sd:.3}{truth}: {distance:.2}"
+                "{name}: optimize {one:.3} +- {one_sd:.3}, diagnose {other:.3} +- {other_sd:.3}{truth}: {distance:.2}"
             );
-            distances.push(distance);
+            distances.push((name, distance));
         }
     }
     distances
+}
+
+/// Those whose intervals do not overlap.
+fn apart(distances: &[(String, f64)]) -> Vec<&str> {
+    distances.iter().filter(|(_, distance)| *distance >= 1.0).map(|(name, _)| name.as_str()).collect()
 }
 
 #[test]
@@ -96,21 +103,66 @@ fn both_fits_agree_on_the_fixture() {
     let room = MeasuredRoom::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/room")).unwrap();
     let distances = distances(&room, None);
     assert!(!distances.is_empty(), "nothing is determined by both");
-    assert!(distances.iter().all(|d| *d < 1.0), "{distances:.2?}");
+    assert!(apart(&distances).is_empty(), "{distances:.2?}");
 }
 
-#[test]
-fn both_fits_agree_on_a_laboratory_room() {
-    let lab = Laboratory::new(LabConfig { seed: 501, receivers: 6, ..LabConfig::default() }).unwrap();
+/// A room of image sources by code that neither fit knows, drawn from a seed.
+fn laboratory(seed: u64) -> Vec<(String, f64)> {
+    let lab = Laboratory::new(LabConfig { seed, receivers: 6, ..LabConfig::default() }).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let room = lab.write(&[], &folder.path().join("room"), None).unwrap();
     let scene = lab.true_scene(&[]).unwrap();
     let truth = |k: usize, b: usize| scene.materials()[k].material.absorption().values()[b];
-    let distances = distances(&room, Some(&truth));
+    distances(&room, Some(&truth))
+}
+
+#[test]
+fn both_fits_agree_on_a_laboratory_room() {
+    // One wall absorbs half of all energy and more, and some octaves ring twice as long as their neighbours.
+    let distances = laboratory(501);
     assert!(distances.len() > 20, "{} are determined by both", distances.len());
-    // They do not agree everywhere: of the wall that absorbs half of all energy and more the fit to responses gives 0.05 to 0.1 less
-    // than is true, the diagnosis what is true. Everything else agrees.
-    let apart = distances.iter().filter(|d| **d >= 1.0).count();
-    assert!(apart <= 4, "{apart} of {}: {distances:.2?}", distances.len());
-    assert!(distances.iter().all(|d| *d < 2.2), "{distances:.2?}");
+    assert!(apart(&distances).is_empty(), "{distances:.2?}");
+}
+
+#[test]
+fn both_fits_agree_on_another_but_for_a_value_at_8_khz() {
+    // A seed looked at once. The true value at 8 kHz lies between the two, two standard deviations from one and 1.4 from the other.
+    let distances = laboratory(7019);
+    assert!(distances.len() > 15, "{} are determined by both", distances.len());
+    assert!(apart(&distances).iter().all(|name| *name == "cork at 8000 Hz"), "{distances:.2?}");
+    assert!(distances.iter().all(|(_, distance)| *distance < 1.1), "{distances:.2?}");
+}
+
+/// The room's folder with the first responses only.
+fn with_first_responses(folder: &Path, count: usize, to: &Path) -> MeasuredRoom {
+    let text = std::fs::read_to_string(folder.join("room.toml")).unwrap();
+    let mut parts = text.split("[[responses]]");
+    let mut shorter = parts.next().unwrap().to_owned();
+    parts.take(count).for_each(|entry| shorter += &format!("[[responses]]{entry}"));
+    std::fs::create_dir_all(to.join("ir")).unwrap();
+    std::fs::write(to.join("room.toml"), shorter).unwrap();
+    std::fs::copy(folder.join("room.obj"), to.join("room.obj")).unwrap();
+    for entry in std::fs::read_dir(folder.join("ir")).unwrap() {
+        let entry = entry.unwrap();
+        std::fs::copy(entry.path(), to.join("ir").join(entry.file_name())).unwrap();
+    }
+    MeasuredRoom::read(to).unwrap()
+}
+
+#[test]
+fn both_fits_agree_on_dechorate_but_for_the_floor_in_two_octaves() {
+    let rooms = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/rooms");
+    let dechorate = Path::new(rooms).join("dechorate_011111");
+    if !dechorate.exists() {
+        eprintln!("skipped: {} is absent", dechorate.display());
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let room = with_first_responses(&dechorate, 4, folder.path());
+    let distances = distances(&room, None);
+    assert!(distances.len() > 10, "{} are determined by both", distances.len());
+    // The source is a directional loudspeaker of unknown axis. Gains that are free in each octave of each response take that up; the
+    // diagnosis has one gain for all octaves, and makes up for the rest with the surface that absorbs most.
+    let apart = apart(&distances);
+    assert!(apart.iter().all(|name| ["floor at 4000 Hz", "floor at 8000 Hz"].contains(name)), "{apart:?}");
 }
