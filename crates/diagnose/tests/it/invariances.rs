@@ -144,7 +144,8 @@ fn unchanged_by_what_means_nothing(lab: &Laboratory, hidden: &[Hidden]) -> Diagn
     let room = lab.write(hidden, &folder.path().join("room"), None).unwrap();
     let found = diagnose(&room);
     let expected = answer(&found);
-    let changes: [(&str, fn(&mut NewRoom)); 5] = [
+    type Change = fn(&mut NewRoom);
+    let changes: [(&str, Change); 5] = [
         ("scaled", scaled),
         ("later", later),
         ("renamed", under_other_names),

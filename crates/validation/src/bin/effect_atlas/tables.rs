@@ -46,7 +46,8 @@ pub fn print(trials: &[Trial]) {
 
 /// How the answers depend on how the room was measured, if that differs.
 fn conditions(trials: &[Trial]) {
-    let mut groups: BTreeMap<(usize, usize, u32, usize, usize, bool), Vec<&Trial>> = BTreeMap::new();
+    type Condition = (usize, usize, u32, usize, usize, bool);
+    let mut groups: BTreeMap<Condition, Vec<&Trial>> = BTreeMap::new();
     for t in trials.iter().filter(|t| t.shams == 0) {
         let condition = (
             t.receivers,
