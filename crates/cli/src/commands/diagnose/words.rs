@@ -144,7 +144,8 @@ fn p_value(p: f64) -> String {
     if p < 1e-3 {
         "less than 1 chance in 1000".to_owned()
     } else {
-        format!("a misfit as large comes by chance with probability {p:.2}")
+        let digits = if p < UNLIKELY { 3 } else { 2 };
+        format!("a misfit as large comes by chance with probability {p:.digits$}")
     }
 }
 
