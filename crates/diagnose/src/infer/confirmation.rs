@@ -79,7 +79,7 @@ pub(crate) fn confirm(
     let lack_before = lack_of_fit::test(search, &base)?;
     report(observer, "lack of fit", 1, 2)?;
     let mut dropped = Vec::new();
-    while let Some((worst, doubt)) = doubtful(search, &state, found, &predicted.gains)? {
+    while let Some((worst, doubt)) = doubtful(search, &state, found, &predicted)? {
         dropped.push((search.candidates[worst].id, doubt));
         found.drop(worst);
         state = search.state(&found.chosen, Some(&base))?;
@@ -148,7 +148,7 @@ fn doubtful(
     search: &Search<'_>,
     state: &State,
     found: &Selection,
-    gains: &[HeldOutGain],
+    predicted: &Predicted,
 ) -> Result<Option<(usize, Doubt)>, Error> {
     if let Some(worst) = resting_on_modes(search, state)? {
         return Ok(Some((worst, Doubt::Modes)));
@@ -156,7 +156,7 @@ fn doubtful(
     if let Some(worst) = unsettled(search, state, &found.more_with_half)? {
         return Ok(Some((worst, Doubt::Rays)));
     }
-    Ok(least_confirmed(search, state, gains).map(|worst| (worst, Doubt::Elsewhere)))
+    Ok(least_confirmed(search, state, predicted).map(|worst| (worst, Doubt::Elsewhere)))
 }
 
 /// A cause that bears on decays alone, and for which those above the Schroeder frequency do not speak. Below it neither paths nor waves
@@ -193,7 +193,7 @@ fn is_of_decays_alone(candidate: &Candidate<'_>) -> bool {
 }
 
 /// The cause at work everywhere that gains least at positions which the fit has not seen, if chance may explain even that.
-fn least_confirmed(search: &Search<'_>, state: &State, gains: &[HeldOutGain]) -> Option<usize> {
+fn least_confirmed(search: &Search<'_>, state: &State, predicted: &Predicted) -> Option<usize> {
     let everywhere = |c: &usize| {
         let case = search.candidates[*c].case;
         let local = |(nuisance, _): &(Nuisance, f64)| {
@@ -203,14 +203,16 @@ fn least_confirmed(search: &Search<'_>, state: &State, gains: &[HeldOutGain]) ->
         case.channel_change().is_none() && !all_local && !case.relaxes.iter().any(local)
     };
     // A few positions leave a wide interval: a gain in the mean counts where the decays come nearer, too.
-    let helps = |gain: &HeldOutGain| {
+    // Two or three groups have no interval worth the name: that all of them gain counts as well.
+    let helps = |(gain, everywhere): (&HeldOutGain, bool)| {
         let nearer = gain.db_rmse_after < MAX_RMSE_RATIO * gain.db_rmse_before;
         // Likelier bins under decays that lie farther off: the cause stands for something else.
         let farther = MAX_RMSE_RATIO * gain.db_rmse_after > gain.db_rmse_before;
-        (gain.low > 0.0 && !farther) || (gain.nats_per_bin > 0.0 && nearer)
+        ((gain.low > 0.0 || everywhere) && !farther) || (gain.nats_per_bin > 0.0 && nearer)
     };
-    let doubtful = state.chosen.iter().zip(gains).filter(|(c, gain)| everywhere(c) && !helps(gain));
-    doubtful.min_by(|a, b| a.1.nats_per_bin.total_cmp(&b.1.nats_per_bin)).map(|(c, _)| *c)
+    let gains = predicted.gains.iter().zip(predicted.gains_everywhere.iter().copied());
+    let doubtful = state.chosen.iter().zip(gains).filter(|(c, gain)| everywhere(c) && !helps(*gain));
+    doubtful.min_by(|a, b| a.1.0.nats_per_bin.total_cmp(&b.1.0.nats_per_bin)).map(|(c, _)| *c)
 }
 
 #[cfg(test)]

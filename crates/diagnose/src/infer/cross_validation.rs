@@ -82,6 +82,8 @@ pub(crate) struct Predicted {
     pub held_out: Option<HeldOut>,
     /// Of each cause.
     pub gains: Vec<HeldOutGain>,
+    /// Whether every group of positions that was left out gains by each cause.
+    pub gains_everywhere: Vec<bool>,
     pub decays: Vec<DecayCurves>,
 }
 
@@ -249,7 +251,12 @@ fn summary(baseline: &Baseline, causes: usize, folds: &Folds, splits: &[SplitGai
         })
         .collect();
     let curves = |s: &SplitGain| decay_curves(baseline, &s.predicted[0], &s.predicted[1], true);
-    Predicted { held_out: Some(held_out), gains, decays: splits.iter().flat_map(curves).collect() }
+    Predicted {
+        held_out: Some(held_out),
+        gains,
+        gains_everywhere: (0..causes).map(|i| splits.iter().all(|s| s.each[i] > 0.0)).collect(),
+        decays: splits.iter().flat_map(curves).collect(),
+    }
 }
 
 /// Curves of what was measured, and predicted before and after.
