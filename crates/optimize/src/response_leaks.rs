@@ -17,7 +17,7 @@ const ROUNDS: usize = 24;
 /// Relative change of any leak from one fit to the next below which they have converged: 0.01 dB. How far the materials move would say
 /// little: in small steps they may go a long way.
 const SETTLED: f64 = 0.002;
-/// Fits in which it is decided anew whether a late decay is left out. Then it stands: near the threshold leaks and decision could make
+/// Fits in which it is decided again whether a late decay is left out. Then it stands: near the threshold leaks and decision could make
 /// each other change for ever.
 const DECIDING: usize = 4;
 /// Least and greatest step towards new leaks, 1 being the whole way.

@@ -92,7 +92,7 @@ fn strength_of_noisy_and_truncated_decays_has_no_bias() {
             }
         }
         println!("G of {what} decays, mean error in dB from 500 Hz on: {errors:.3?}");
-        // One reading has 10 / ln 10 / sqrt(B T / 13.8) of chance: 0.75 dB at 500 Hz, 0.15 dB in the mean of 24.
+        // One reading has 10 / ln 10 / sqrt(B T / 13.8) of chance: 0.75 dB at 500 Hz, 0.15 dB for the mean of 24.
         for (i, error) in errors.iter().enumerate() {
             let bandwidth_hz = bands.edges_hz(i).1 - bands.edges_hz(i).0;
             let chance_db = 4.34 / (bandwidth_hz * 2.0 * t60_s / 13.8).sqrt() / 24f64.sqrt();
@@ -185,7 +185,7 @@ fn ears_that_share_part_of_the_sound_correlate_by_that_part() {
 
 #[test]
 fn early_and_late_correlation_of_pulses() {
-    // Alike at the direct sound, opposite and weaker at 30 ms; alike but for sign at 200 ms.
+    // Equal at the direct sound, opposite and weaker at 30 ms; equal but for sign at 200 ms.
     let left = pulses(&[(0.0, 1.0), (0.03, 1.0), (0.2, 0.5)]);
     let right = pulses(&[(0.0, 1.0), (0.03, -0.5), (0.2, -0.5)]);
     let bands = Bands::octaves(500.0, 4000.0).unwrap();

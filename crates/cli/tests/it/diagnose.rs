@@ -237,7 +237,7 @@ fn an_interrupt_stops_a_diagnosis_that_says_where_it_was() {
     use std::process::{Command, Stdio};
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
-    let child = sabine("diagnose")
+    let mut child = sabine("diagnose")
         .args(["--rays", "20000", "--out", out.to_str().unwrap()])
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
@@ -245,6 +245,7 @@ fn an_interrupt_stops_a_diagnosis_that_says_where_it_was() {
         .unwrap();
     // The folder is made just before the work begins, and signals are listened for then.
     while !out.exists() {
+        assert!(child.try_wait().unwrap().is_none(), "it ended before it began");
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
     std::thread::sleep(std::time::Duration::from_millis(700));

@@ -77,7 +77,7 @@ fn a_sweep_becomes_a_response_that_is_measured() {
         "{text}"
     );
     let result: Value = serde_json::from_slice(&std::fs::read(folder.join("result.json")).unwrap()).unwrap();
-    // Direct sound alike but for 10 samples, the reflection opposite: (0.25 - 0.04 c) / 0.29 with |c| up to 1.
+    // Direct sound equal but for 10 samples, the reflection opposite: (0.25 - 0.04 c) / 0.29 with |c| up to 1.
     let iacc = result[0]["iacc_early"][2].as_f64().unwrap();
     assert!((0.72..=1.0).contains(&iacc), "{iacc}");
     // m = |0.25 + 0.04 exp(-2 pi i F 0.05 s)| / 0.29 / (1 + 10^-1.5) in every octave.

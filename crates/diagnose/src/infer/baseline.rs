@@ -137,7 +137,7 @@ impl Baseline {
         if self.simulation.apply(change, &self.observations.survey)? { self.expand(cases) } else { Ok(()) }
     }
 
-    /// Predicts energies and tables anew from the traced paths.
+    /// Predicts energies and tables again from the traced paths.
     pub fn expand(&mut self, cases: &[CatalogueCase]) -> Result<(), Error> {
         self.simulation.expand(&self.observations, true)?;
         self.prepare(cases).map(|_| ())

@@ -72,3 +72,56 @@ pub(crate) fn unsettled(
     }
     Ok(weakest.map(|(_, candidate)| candidate))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::DiagnoseConfig;
+    use crate::effect::Effect;
+    use crate::effects::{TimeZeroOffset, TransducerResponse};
+    use crate::hand_made::Tables;
+    use crate::infer::candidates::cases;
+    use crate::simulate::scene_tracer::{EachScene, Rays};
+    use sabine_propagate::PathTracer;
+    use sabine_scene::{Levels, TimeZero};
+
+    #[test]
+    fn a_cause_falls_if_the_chance_of_the_rays_is_as_large_as_its_evidence() {
+        let mut tables = Tables::new(Levels::Absolute, TimeZero::Emission);
+        for (measured, states) in tables.measured.iter_mut().zip(&tables.states) {
+            for (band, (energies, state)) in measured.energies.iter_mut().zip(states).enumerate() {
+                let gain = if band == 1 { 4.0 } else { 1.0 };
+                *energies = Some(state.ln_energy.iter().map(|l| gain * l.exp()).collect());
+            }
+        }
+        let baseline = tables.baseline(DiagnoseConfig::default());
+        let effects: Vec<Box<dyn Effect>> = vec![Box::new(TransducerResponse)];
+        let cases = cases(&effects, baseline.survey());
+        let search = Search::new(&baseline, &cases, 1, vec![true; 3]);
+        let state = search.state(&[0], None).expect("a fit");
+        let nats = state.log_evidence() - search.state(&[], None).expect("a fit").log_evidence();
+        assert!(nats > search.threshold() + 2.0, "{nats}");
+        let falls = |more: f64| unsettled(&search, &state, &[(0, more)]).expect("fits");
+        assert_eq!(falls(nats - search.threshold() + 1.0), Some(0));
+        assert_eq!(falls(nats - search.threshold() - 1.0), None);
+        // What more rays make surer stands as it is, and what is not chosen is not asked.
+        assert_eq!(falls(-nats), None);
+        assert_eq!(unsettled(&search, &state, &[]).expect("fits"), None);
+    }
+
+    #[test]
+    fn causes_of_arrivals_and_tracers_without_rays_ask_for_none() {
+        let mut baseline =
+            Tables::new(Levels::Common, TimeZero::Emission).baseline(DiagnoseConfig::default());
+        let effects: Vec<Box<dyn Effect>> = vec![Box::new(TimeZeroOffset), Box::new(TransducerResponse)];
+        let cases = cases(&effects, baseline.survey());
+        let config = DiagnoseConfig::default().tracer();
+        let rays = Rays { config: config.clone() };
+        let other = EachScene(PathTracer::new(config).expect("settings"));
+        let used = [true; 3];
+        let mut of = |chosen: &[usize], tracer: &dyn SceneTracer| {
+            more_with_half(&mut baseline, &cases, chosen, &used, (tracer, &())).expect("fits")
+        };
+        assert!(of(&[0], &rays).is_empty() && of(&[], &rays).is_empty() && of(&[1], &other).is_empty());
+    }
+}

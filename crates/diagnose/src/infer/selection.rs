@@ -38,7 +38,7 @@ impl Selection {
     }
 }
 
-/// Greedy naming, the scatter estimated anew after each name, and a backward check.
+/// Greedy naming, the scatter estimated again after each name, and a backward check.
 pub(crate) fn select(
     baseline: &mut Baseline,
     cases: &[CatalogueCase],

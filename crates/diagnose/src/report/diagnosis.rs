@@ -91,13 +91,33 @@ pub struct HeldOutGain {
     pub nats_per_bin: f64,
     /// Ends of the 90 % interval of the mean over positions (Student's t over groups that were left out together), per compared bin. One
     /// position has none: its ends are infinite, and null in JSON.
+    #[serde(deserialize_with = "infinite_ends::low")]
     pub low: f64,
     /// Upper end.
+    #[serde(deserialize_with = "infinite_ends::high")]
     pub high: f64,
     /// Root mean square error of the decay curves at held-out positions without the cause, in dB.
     pub db_rmse_before: f64,
     /// The same with it.
     pub db_rmse_after: f64,
+}
+
+/// JSON has no infinity: an end that is null is infinite.
+mod infinite_ends {
+    use serde::{Deserialize, Deserializer};
+
+    pub fn low<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+        Ok(Option::deserialize(from)?.unwrap_or(f64::NEG_INFINITY))
+    }
+
+    pub fn high<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+        Ok(Option::deserialize(from)?.unwrap_or(f64::INFINITY))
+    }
+
+    pub fn intervals<'de, D: Deserializer<'de>>(from: D) -> Result<[[f64; 2]; 2], D::Error> {
+        let ends: [[Option<f64>; 2]; 2] = Deserialize::deserialize(from)?;
+        Ok(ends.map(|[low, high]| [low.unwrap_or(f64::NEG_INFINITY), high.unwrap_or(f64::INFINITY)]))
+    }
 }
 
 /// A named cause.
@@ -190,6 +210,7 @@ pub struct HeldOut {
     pub nats_per_bin: [f64; 2],
     /// 90 % intervals of these (Student's t over groups of positions that were left out together); infinite, and null in JSON, for one
     /// position.
+    #[serde(deserialize_with = "infinite_ends::intervals")]
     pub nats_interval: [[f64; 2]; 2],
 }
 
@@ -273,5 +294,31 @@ impl FittedMaterial {
     /// The fitted absorption in its bands.
     pub fn per_band(&self, bands: Bands) -> PerBand<f64> {
         PerBand::from_fn(bands, |b| self.absorption[b])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)] // a panic is how a test fails
+    use super::*;
+
+    #[test]
+    fn intervals_of_one_position_come_back_from_json() {
+        let (low, high) = (f64::NEG_INFINITY, f64::INFINITY);
+        let gain = HeldOutGain { nats_per_bin: 0.1, low, high, db_rmse_before: 1.0, db_rmse_after: 0.5 };
+        let text = serde_json::to_string(&gain).unwrap();
+        assert!(text.contains("\"low\":null"), "{text}");
+        assert_eq!(serde_json::from_str::<HeldOutGain>(&text).unwrap(), gain);
+        let held = HeldOut {
+            receivers: vec!["r1".to_owned()],
+            never_fitted: true,
+            db_rmse: [1.0, 0.5, 0.6],
+            t20_jnd: [1.0, 0.5, 0.6],
+            c50_jnd: [1.0, 0.5, 0.6],
+            nats_per_bin: [0.1, 0.2],
+            nats_interval: [[low, high], [0.1, 0.3]],
+        };
+        let text = serde_json::to_string(&held).unwrap();
+        assert_eq!(serde_json::from_str::<HeldOut>(&text).unwrap(), held);
     }
 }

@@ -84,7 +84,8 @@ impl Simulation {
         let prepared = tracer.prepare(&scene, traced_until_s)?;
         prepared.check(source_m)?;
         let edges = Edges::find(&scene)?;
-        let pairs = trace(room, survey, &materials, (&*prepared, edges.as_ref()), observer)?;
+        let places = (room.sources(), room.receivers());
+        let pairs = trace(places, survey, &materials, (&*prepared, edges.as_ref()), observer)?;
         let clamped = |m: &Material| {
             m.absorption().values().iter().map(|a| a.clamp(ABSORPTION.0, ABSORPTION.1)).collect()
         };

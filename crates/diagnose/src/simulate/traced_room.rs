@@ -9,7 +9,7 @@ use crate::simulate::traced_pair::TracedPair;
 use crate::survey::Survey;
 use rayon::prelude::*;
 use sabine_acoustics::{Material, Observer, PerBand, report};
-use sabine_scene::{MeasuredRoom, Scene};
+use sabine_scene::{MeasuredRoom, Receiver, Scene, Source};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Extra scattering of the bands of the traced scene, in turn: its paths then serve any scattering.
@@ -71,9 +71,9 @@ pub(crate) fn traced_until_s(survey: &Survey, traced_s: f64) -> f64 {
     traced_s + diagonal / slowest + 0.05
 }
 
-/// Traces all pairs.
+/// Traces all pairs of sources and receivers that stand where they are given.
 pub(crate) fn trace(
-    room: &MeasuredRoom,
+    (sources, receivers): (&[Source], &[Receiver]),
     survey: &Survey,
     materials: &[Material],
     (tracer, edges): (&dyn PreparedTracer, Option<&Edges>),
@@ -85,7 +85,7 @@ pub(crate) fn trace(
         .par_iter()
         .map(|response| {
             report(observer, "tracing", done.fetch_add(1, Ordering::Relaxed), total)?;
-            let (source, receiver) = (&room.sources()[response.source], &room.receivers()[response.receiver]);
+            let (source, receiver) = (&sources[response.source], &receivers[response.receiver]);
             let paths = tracer.trace(source, receiver, &response.air)?;
             let places_m = [source.position_m, receiver.position_m];
             let diffracted = Edges::paths(edges, places_m, paths.max_length_m());

@@ -39,7 +39,7 @@ fn answer(found: &Diagnosis) -> Answer {
 }
 
 /// The room once more, to be changed.
-fn copy(room: &MeasuredRoom) -> NewRoom {
+pub(crate) fn copy(room: &MeasuredRoom) -> NewRoom {
     let response = |(i, entry): (usize, &sabine_scene::ResponseEntry)| NewResponse {
         source: room.sources()[entry.source].id.clone(),
         receiver: room.receivers()[entry.receiver].id.clone(),

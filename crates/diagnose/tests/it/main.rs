@@ -13,3 +13,4 @@ mod look_alikes;
 mod odd_input;
 mod places;
 mod rendering;
+mod wrong_tables;

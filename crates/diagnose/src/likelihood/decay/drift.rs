@@ -1,6 +1,6 @@
 //! How far single responses drift from the prediction along their decay: a variance component, estimated from the data.
 //!
-//! Bins scatter by themselves where sound has random phase. Where reflections keep theirs (between parallel walls that reflect alike, or
+//! Bins scatter by themselves where sound has random phase. Where reflections keep theirs (between parallel walls that reflect equally, or
 //! below the Schroeder frequency) the decay of a response runs above and below the mean of its energies for many bins together. A hundred
 //! bins would then agree on an effect that is none.
 

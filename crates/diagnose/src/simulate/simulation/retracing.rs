@@ -7,11 +7,10 @@ use crate::extend::model_change::ModelChange;
 use crate::simulate::edges::Edges;
 use crate::simulate::scene_tracer::SceneTracer;
 use crate::simulate::traced_pair::TracedPair;
-use crate::survey::{Survey, SurveyedResponse};
-use rayon::prelude::*;
-use sabine_acoustics::{Air, Observer, report};
+use crate::simulate::traced_room::trace;
+use crate::survey::Survey;
+use sabine_acoustics::{Air, Observer};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 impl Simulation {
     /// Takes a change into all paths that it moves, and says whether there are any. Energies follow with the next expansion; arrival times
@@ -58,17 +57,10 @@ impl Simulation {
     ) -> Result<Self, Error> {
         let scene = self.traced_scene().clone();
         let prepared = tracer.prepare(&scene, self.traced_until_s)?;
-        let (done, total) = (AtomicU64::new(0), survey.responses.len() as u64);
-        let one = |response: &SurveyedResponse| -> Result<TracedPair, Error> {
-            report(observer, "tracing other rays", done.fetch_add(1, Ordering::Relaxed), total)?;
-            let (source, receiver) = (&self.sources[response.source], &self.receivers[response.receiver]);
-            let paths = prepared.trace(source, receiver, &response.air)?;
-            let places_m = [source.position_m, receiver.position_m];
-            let diffracted = Edges::paths(self.edges.as_ref(), places_m, paths.max_length_m());
-            Ok(TracedPair::new(paths, diffracted, response.air, &self.materials)?)
-        };
+        let edges = Edges::find(&scene)?;
+        let places = (&self.sources[..], &self.receivers[..]);
         let mut other = Self {
-            pairs: survey.responses.par_iter().map(one).collect::<Result<_, _>>()?,
+            pairs: trace(places, survey, &self.materials, (&*prepared, edges.as_ref()), observer)?,
             materials: self.materials.clone(),
             absorption: self.absorption.clone(),
             states: Vec::new(),
@@ -84,7 +76,7 @@ impl Simulation {
             resized: self.resized.clone(),
             tracer: Arc::clone(tracer),
             prepared,
-            edges: Edges::find(&scene)?,
+            edges,
             sources: self.sources.clone(),
             receivers: self.receivers.clone(),
             ..*self
