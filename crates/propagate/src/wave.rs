@@ -5,6 +5,7 @@ mod axes;
 mod band_runs;
 mod crossings;
 mod crossover;
+mod error;
 mod leapfrog;
 mod point_weights;
 mod response;
@@ -14,6 +15,7 @@ mod source_pulse;
 
 pub use admittance::{absorption_of_admittance, admittance_of_absorption};
 pub use crossover::{Crossover, JoinedResponse};
+pub use error::WaveError;
 pub use response::WaveResponse;
 pub use room::WaveRoom;
 pub use solver::{WaveConfig, WaveSolver};

@@ -22,7 +22,6 @@ LENGTH = 1.6  # of responses, in reverberation times of the slowest octave (Eyri
 NOISE_DB = -63.0  # energy of the recorder's white noise over a response, relative to the mean energy of the responses
 MARGIN_M = 0.6  # places to walls
 APART_M = 0.8
-SCATTERING = 0.1  # of all walls, where rays are traced
 MAX_IMAGE_ORDER = 130  # 3 million images
 FACES = ["west", "east", "south", "north", "floor", "ceiling"]
 MATERIALS = {"west": "brick", "east": "plaster", "south": "brick", "north": "plaster", "floor": "carpet", "ceiling": "board"}
@@ -86,12 +85,12 @@ def eyring_s(sides, absorption):
     return float(np.max(0.161 * x * y * z / (-total * np.log(1 - mean))))
 
 
-def simulate(method, sides, absorption, places, climate, rays, seed):
+def simulate(method, sides, absorption, places, climate, rays, scattering, seed):
     """Responses of all receivers, sample 0 at the emission."""
     table = lambda name: {"coeffs": absorption[name].tolist(), "center_freqs": CENTRES_HZ}
-    scattering = {"coeffs": [SCATTERING] * 6, "center_freqs": CENTRES_HZ}
     traced = method == "rays"
-    walls = {face: pra.Material(table(MATERIALS[face]), scattering if traced else None) for face in FACES}
+    scatters = {"coeffs": [scattering] * 6, "center_freqs": CENTRES_HZ} if scattering else None
+    walls = {face: pra.Material(table(MATERIALS[face]), scatters) for face in FACES}
     length_s = LENGTH * eyring_s(sides, absorption)
     # Its own formula for the speed of sound, 331.4 + 0.6 T + 0.0124 H, is up to 1 m/s above that of dry air: nobody planted that.
     speed = 331.3 * np.sqrt(1 + climate["temperature_c"] / 273.15)
@@ -166,8 +165,16 @@ def main():
     parser.add_argument("--effect", choices=EFFECTS, default="null")
     parser.add_argument("--receivers", type=int, default=8)
     parser.add_argument("--rays", type=int, default=100_000, help="of pyroomacoustics")
+    parser.add_argument(
+        "--scattering",
+        type=float,
+        default=0.0,
+        help="of all walls, with --method rays, stated as it is: this program means something else by it (README)",
+    )
     parser.add_argument("--out", type=pathlib.Path, required=True)
     arguments = parser.parse_args()
+    if arguments.scattering and arguments.method != "rays":
+        parser.error("--scattering needs --method rays")
 
     random = np.random.default_rng(arguments.seed)
     sides, absorption, places, climate = draw(random, arguments.receivers)
@@ -177,16 +184,22 @@ def main():
     stated = {name: np.clip(table + random.normal(0, TABLE_SD, 6), 0.01, 0.95) for name, table in absorption.items()}
     stated_places = [place + random.normal(0, PLACE_SD_M, 3) for place in places]
     responses, order, speed = simulate(
-        arguments.method, sides, true_absorption, true_places, true_climate, arguments.rays, arguments.seed
+        arguments.method,
+        sides,
+        true_absorption,
+        true_places,
+        true_climate,
+        arguments.rays,
+        arguments.scattering,
+        arguments.seed,
     )
     responses = recorded(responses, recorder, random)
 
     (arguments.out / "ir").mkdir(parents=True)
     for i, response in enumerate(responses, 1):
         soundfile.write(arguments.out / "ir" / f"s1_r{i}.wav", response.astype(np.float32), RATE_HZ, subtype="FLOAT")
-    scattering = SCATTERING if arguments.method == "rays" else 0.0
     (arguments.out / "room.obj").write_text(mesh(sides))
-    (arguments.out / "room.toml").write_text(room_file(stated, stated_places, climate, scattering))
+    (arguments.out / "room.toml").write_text(room_file(stated, stated_places, climate, arguments.scattering))
     truth = {
         "program": f"pyroomacoustics {pra.__version__}",
         "method": arguments.method,

@@ -10,7 +10,7 @@ use crate::infer::ray_dependence::unsettled;
 use crate::infer::search::{Search, State};
 use crate::infer::selection::Selection;
 use crate::likelihood::decay::WarmStart;
-use crate::report::diagnosis::{HeldOutGain, Verdict};
+use crate::report::diagnosis::Verdict;
 use sabine_acoustics::{Observer, report};
 use std::time::Instant;
 
@@ -204,15 +204,24 @@ fn least_confirmed(search: &Search<'_>, state: &State, predicted: &Predicted) ->
     };
     // A few positions leave a wide interval: a gain in the mean counts where the decays come nearer, too.
     // Two or three groups have no interval worth the name: that all of them gain counts as well.
-    let helps = |(gain, everywhere): (&HeldOutGain, bool)| {
-        let nearer = gain.db_rmse_after < MAX_RMSE_RATIO * gain.db_rmse_before;
+    let helps = |place: usize| {
+        let gain = &predicted.gains[place];
+        // No simulation predicts the decay of single modes: octaves that have few do not tell near from far.
+        let [before, after] = if is_of_decays_alone(&search.candidates[state.chosen[place]]) {
+            predicted.diffuse_rmse_db[place]
+        } else {
+            [gain.db_rmse_before, gain.db_rmse_after]
+        };
+        let nearer = after < MAX_RMSE_RATIO * before;
         // Likelier bins under decays that lie farther off: the cause stands for something else.
-        let farther = MAX_RMSE_RATIO * gain.db_rmse_after > gain.db_rmse_before;
-        ((gain.low > 0.0 || everywhere) && !farther) || (gain.nats_per_bin > 0.0 && nearer)
+        let farther = MAX_RMSE_RATIO * after > before;
+        let gains = gain.low > 0.0 || predicted.gains_everywhere[place];
+        (gains && !farther) || (gain.nats_per_bin > 0.0 && nearer)
     };
-    let gains = predicted.gains.iter().zip(predicted.gains_everywhere.iter().copied());
-    let doubtful = state.chosen.iter().zip(gains).filter(|(c, gain)| everywhere(c) && !helps(*gain));
-    doubtful.min_by(|a, b| a.1.0.nats_per_bin.total_cmp(&b.1.0.nats_per_bin)).map(|(c, _)| *c)
+    (0..predicted.gains.len())
+        .filter(|&place| everywhere(&state.chosen[place]) && !helps(place))
+        .min_by(|&a, &b| predicted.gains[a].nats_per_bin.total_cmp(&predicted.gains[b].nats_per_bin))
+        .map(|place| state.chosen[place])
 }
 
 #[cfg(test)]
@@ -222,6 +231,7 @@ mod tests {
     use crate::effects::TransducerResponse;
     use crate::hand_made::Tables;
     use crate::infer::candidates::cases;
+    use crate::report::diagnosis::HeldOutGain;
     use sabine_scene::{Levels, TimeZero};
 
     #[test]
@@ -244,6 +254,27 @@ mod tests {
             assert!(state.log_evidence() > without.log_evidence() + 3.0, "{louder}");
             let found = resting_on_modes(&search, &state).expect("fits");
             assert_eq!(found.is_some(), rests, "{louder}");
+        }
+    }
+
+    /// Of no bearing where few modes make the decay.
+    #[test]
+    fn decays_count_as_nearer_or_farther_where_there_are_many_modes() {
+        let baseline = Tables::new(Levels::Absolute, TimeZero::Emission).baseline(DiagnoseConfig::default());
+        let effects: Vec<Box<dyn Effect>> = vec![Box::new(TransducerResponse)];
+        let cases = cases(&effects, baseline.survey());
+        let search = Search::new(&baseline, &cases, 1, vec![true; 3]);
+        let state = search.state(&[0], None).expect("a fit");
+        let gain =
+            HeldOutGain { nats_per_bin: 0.1, low: 0.05, high: 0.15, db_rmse_before: 1.0, db_rmse_after: 1.1 };
+        for (diffuse_rmse_db, doubted) in [([0.8, 0.8], None), ([0.8, 0.85], Some(0))] {
+            let predicted = Predicted {
+                gains: vec![gain.clone()],
+                gains_everywhere: vec![true],
+                diffuse_rmse_db: vec![diffuse_rmse_db],
+                ..Predicted::default()
+            };
+            assert_eq!(least_confirmed(&search, &state, &predicted), doubted, "{diffuse_rmse_db:?}");
         }
     }
 }

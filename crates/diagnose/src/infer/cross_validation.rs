@@ -84,6 +84,8 @@ pub(crate) struct Predicted {
     pub gains: Vec<HeldOutGain>,
     /// Whether every group of positions that was left out gains by each cause.
     pub gains_everywhere: Vec<bool>,
+    /// Error of decay curves at positions left out without and with each cause, in dB, in the octaves above the Schroeder frequency.
+    pub diffuse_rmse_db: Vec<[f64; 2]>,
     pub decays: Vec<DecayCurves>,
 }
 
@@ -236,24 +238,32 @@ fn summary(baseline: &Baseline, causes: usize, folds: &Folds, splits: &[SplitGai
         nats_per_bin: [mean(&|s| s.named), mean(&|s| s.free)],
         nats_interval: [interval(&|s| s.named), interval(&|s| s.free)],
     };
+    let without = |i: usize| splits.iter().flat_map(move |s| &s.without_each[i]);
     let gains = (0..causes)
         .map(|i| {
             let [low, high] = interval(&|s| s.each[i]);
-            let before: Vec<Compared> =
-                splits.iter().flat_map(|s| s.without_each[i].iter().cloned()).collect();
             HeldOutGain {
                 nats_per_bin: mean(&|s| s.each[i]),
                 low,
                 high,
-                db_rmse_before: Errors::of(&before).db_rmse,
+                db_rmse_before: Errors::of(&without(i).cloned().collect::<Vec<_>>()).db_rmse,
                 db_rmse_after: errors[1].db_rmse,
             }
+        })
+        .collect();
+    let diffuse = |c: &&Compared| c.band >= baseline.survey().bands_of_modes;
+    let diffuse_rmse_db = (0..causes)
+        .map(|i| {
+            let before: Vec<Compared> = without(i).filter(diffuse).cloned().collect();
+            let after = splits.iter().flat_map(|s| &s.predicted[1]).filter(diffuse).cloned();
+            [before, after.collect()].map(|compared| Errors::of(&compared).db_rmse)
         })
         .collect();
     let curves = |s: &SplitGain| decay_curves(baseline, &s.predicted[0], &s.predicted[1], true);
     Predicted {
         held_out: Some(held_out),
         gains,
+        diffuse_rmse_db,
         gains_everywhere: (0..causes).map(|i| splits.iter().all(|s| s.each[i] > 0.0)).collect(),
         decays: splits.iter().flat_map(curves).collect(),
     }

@@ -17,6 +17,10 @@ use sabine_acoustics::{Observer, report};
 
 /// Causes whose evidence differs by less are not told apart, in nats: odds of 20 to 1.
 pub(crate) const RIVAL_NATS: f64 = 3.0;
+/// Cases of one effect whose evidence comes so near to that of the best are compared more closely, in nats ...
+const NEAR_NATS: f64 = 10.0;
+/// ... so many of them.
+const MOST_NEAR: usize = 6;
 /// Exchanges that are looked at in full: those that help the direct sounds most.
 const MAX_EXCHANGES: usize = 3;
 /// What an exchange must gain in the direct sounds to be looked at, in nats.
@@ -240,6 +244,51 @@ impl<'a> Search<'a> {
         Ok(rivals)
     }
 
+    /// The case of an effect for which the data speak most, and those that explain as much: another material, say, or another receiver.
+    /// Octaves below the Schroeder frequency have no say in it: what speaks there for one wall rather than another are its modes.
+    pub fn best_case(
+        &self,
+        state: &State,
+        scores: &[Score],
+        effect: &EffectScore,
+    ) -> Result<(usize, Vec<usize>), Error> {
+        let own = |s: &&Score| self.candidates[s.candidate].effect == effect.effect;
+        let top = scores.iter().filter(own).map(|s| s.nats).fold(f64::NEG_INFINITY, f64::max);
+        let mut near: Vec<&Score> = scores.iter().filter(own).filter(|s| s.nats > top - NEAR_NATS).collect();
+        near.sort_by(|a, b| b.nats.total_cmp(&a.nats));
+        near.truncate(MOST_NEAR);
+        if near.len() < 2 {
+            return Ok((effect.best, Vec::new()));
+        }
+        let of_decays =
+            near.iter().all(|s| self.candidates[s.candidate].case.observable() == Observable::Decay);
+        let evidence = |added: &[usize]| -> Result<f64, Error> {
+            let chosen = [&state.chosen, added].concat();
+            if of_decays && self.baseline.survey().bands_of_modes > 0 {
+                let cases = self.cases_of(&chosen, Observable::Decay);
+                if let Some(above) = self.baseline.evidence_above_modes(&cases, &self.used, state.before())? {
+                    return Ok(above);
+                }
+            }
+            Ok(self.state(&chosen, Some(state))?.log_evidence())
+        };
+        let mut found: Vec<(usize, f64)> = Vec::new();
+        for score in near {
+            found.push((score.candidate, evidence(&[score.candidate])?));
+        }
+        found.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let (best, most) = found[0];
+        let worth_a_name = self.threshold() + self.price(best);
+        let mut as_good = Vec::new();
+        for &(other, nats) in found[1..].iter().filter(|(_, nats)| most - nats < RIVAL_NATS) {
+            let both = evidence(&[best, other])?;
+            if both - most < worth_a_name && both - nats < worth_a_name {
+                as_good.push(other);
+            }
+        }
+        Ok((best, as_good))
+    }
+
     /// Drops chosen candidates that the others have made superfluous.
     pub fn backward(&self, mut state: State) -> Result<State, Error> {
         loop {
@@ -260,5 +309,53 @@ impl<'a> Search<'a> {
                 _ => return Ok(state),
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::DiagnoseConfig;
+    use crate::effect::Effect;
+    use crate::effects::SurfaceAbsorption;
+    use crate::hand_made::Tables;
+    use crate::infer::candidates::cases;
+    use sabine_scene::{Levels, TimeZero};
+
+    /// The better case for wrong absorption of carpet or plaster, and what explains as much, if each hit on the material takes so many
+    /// nepers more: in the octave below the Schroeder frequency, and in that above it.
+    fn better(below: (usize, f64), above: (usize, f64)) -> (Option<String>, Vec<String>) {
+        let mut tables = Tables::new(Levels::Absolute, TimeZero::Emission);
+        for (measured, states) in tables.measured.iter_mut().zip(&tables.states) {
+            for ((energies, state), (material, nepers)) in
+                measured.energies.iter_mut().zip(states).zip([below, above])
+            {
+                let group =
+                    |g: usize| state.group_energy[g] * (-nepers * state.group_hits[2 * g + material]).exp();
+                let bin = |k: usize| (state.groups[k]..state.groups[k + 1]).map(group).sum();
+                *energies = Some((0..state.ln_energy.len()).map(bin).collect());
+            }
+        }
+        let baseline = tables.baseline(DiagnoseConfig::default());
+        let effects: Vec<Box<dyn Effect>> = vec![Box::new(SurfaceAbsorption)];
+        let cases = cases(&effects, baseline.survey());
+        let search = Search::new(&baseline, &cases, 1, vec![true; 3]);
+        let state = search.state(&[], None).expect("a fit");
+        let scores = search.scores(&state, &()).expect("fits");
+        let effect = search.by_effect(&scores).remove(0);
+        let (best, others) = search.best_case(&state, &scores, &effect).expect("fits");
+        let subject = |c: usize| search.candidates[c].case.subject.clone();
+        (subject(best), others.into_iter().filter_map(subject).collect())
+    }
+
+    #[test]
+    fn modes_do_not_decide_which_wall_it_is() {
+        let (carpet, plaster) = (0, 1);
+        let subject = |s: &str| Some(s.to_owned());
+        // In all octaves together plaster leads by 8 nats.
+        assert_eq!(better((plaster, 1.5), (carpet, 2.0)), (subject("carpet"), Vec::new()));
+        // Carpet leads by 9 nats; above the modes so little speaks for plaster that it may be either.
+        assert_eq!(better((carpet, 1.5), (plaster, 0.6)), (subject("plaster"), vec!["carpet".to_owned()]));
+        assert_eq!(better((carpet, 1.5), (carpet, 1.0)), (subject("carpet"), Vec::new()));
     }
 }

@@ -22,6 +22,8 @@ pub(crate) struct Selection {
     pub last: Option<(Vec<usize>, Vec<EffectScore>)>,
     /// What half of the rays say more for a cause.
     pub more_with_half: Vec<MoreWithHalf>,
+    /// Each cause, and cases of the same effect that explained as much when it was named.
+    interchangeable: Vec<(usize, Vec<usize>)>,
 }
 
 impl Selection {
@@ -36,6 +38,11 @@ impl Selection {
     pub fn probability(&self, candidate: usize) -> f64 {
         self.probabilities.iter().find(|p| p.0 == candidate).map_or(0.0, |p| p.1)
     }
+
+    /// Cases of the same effect that explained as much as a cause when it was named.
+    pub fn interchangeable(&self, candidate: usize) -> &[usize] {
+        self.interchangeable.iter().find(|i| i.0 == candidate).map_or(&[], |i| &i.1)
+    }
 }
 
 /// Greedy naming, the scatter estimated again after each name, and a backward check.
@@ -48,12 +55,15 @@ pub(crate) fn select(
 ) -> Result<Selection, Error> {
     let mut named = Selection::default();
     while named.chosen.len() < baseline.config.most_causes {
-        let (ranked, rivals, threshold) = {
+        let (ranked, rivals, interchangeable, threshold) = {
             let search = Search::new(baseline, cases, effects, used.to_vec());
             let base = search.state(&[], None)?;
             let state = search.state(&named.chosen, Some(&base))?;
-            let ranked: Vec<EffectScore> = search
-                .by_effect(&search.scores(&state, observer)?)
+            let mut scores = search.scores(&state, observer)?;
+            // What a cause stands for as well is not named beside it.
+            scores.retain(|s| named.interchangeable.iter().all(|(_, others)| !others.contains(&s.candidate)));
+            let mut ranked: Vec<EffectScore> = search
+                .by_effect(&scores)
                 .into_iter()
                 .filter(|s| {
                     named.chosen.iter().all(|&c| {
@@ -63,8 +73,12 @@ pub(crate) fn select(
                 .collect();
             let threshold = search.threshold();
             let named_now = ranked.first().is_some_and(|best| best.nats >= threshold);
-            let rivals = if named_now { search.rivals(&state, &ranked)? } else { Vec::new() };
-            (ranked, rivals, threshold)
+            let (mut rivals, mut interchangeable) = (Vec::new(), Vec::new());
+            if named_now {
+                (ranked[0].best, interchangeable) = search.best_case(&state, &scores, &ranked[0])?;
+                rivals = search.rivals(&state, &ranked)?;
+            }
+            (ranked, rivals, interchangeable, threshold)
         };
         if named.first.is_empty() {
             named.first.clone_from(&ranked);
@@ -78,6 +92,7 @@ pub(crate) fn select(
             + (threshold - baseline.config.naming_nats - strongest).exp();
         named.probabilities.push((best.best, (best.nats - strongest).exp() / sum));
         named.chosen.push(best.best);
+        named.interchangeable.push((best.best, interchangeable));
         if !rivals.is_empty() {
             named.rivals = std::iter::once(best.id).chain(rivals.iter().map(|r| r.id)).collect();
             break;

@@ -35,20 +35,20 @@ impl BandPulse {
         let half = (REACH_BANDWIDTH_TIMES / (high - low) * rate).ceil() as usize;
         let mut pulse = vec![0.0f32; 2 * half + 1];
         pulse[half] = 1.0;
-        let filtered = FilterBank::new(bands, rate_hz)?.analyse(&pulse);
-        let edges_hz: Vec<f64> = (1..bands.len()).map(|b| bands.edges_hz(b).0).collect();
+        let bank = FilterBank::new(bands, rate_hz)?;
+        let filtered = bank.analyse(&pulse);
         Ok(filtered
             .values()
             .iter()
             .enumerate()
             .map(|(band, h)| {
                 let (low_hz, high_hz) = bands.edges_hz(band);
-                Self::new(h, rate, cell_s, &edges_hz, high_hz - low_hz)
+                Self::new(h, rate, cell_s, bank.shares(band).values().to_vec(), high_hz - low_hz)
             })
             .collect())
     }
 
-    fn new(pulse: &[f32], rate_hz: f64, cell_s: f64, edges_hz: &[f64], bandwidth_hz: f64) -> Self {
+    fn new(pulse: &[f32], rate_hz: f64, cell_s: f64, shares: Vec<f64>, bandwidth_hz: f64) -> Self {
         let h: Vec<f64> = pulse.iter().copied().map(f64::from).collect();
         let energy: f64 = h.iter().map(|x| x * x).sum();
         let mut sum = 0.0;
@@ -80,7 +80,6 @@ impl BandPulse {
                     .sum()
             })
             .collect();
-        let shares = octave_shares(h, rate_hz, edges_hz);
         Self { cumulative, half: reach, rate_hz, bandwidth_hz, energy, shares, squared, cell_correlation }
     }
 
@@ -114,25 +113,6 @@ impl BandPulse {
     pub fn reach_s(&self) -> f64 {
         self.half as f64 / self.rate_hz
     }
-}
-
-/// Energy of a pulse response between the edges of the octaves, as shares of the whole.
-fn octave_shares(mut pulse: Vec<f64>, rate_hz: f64, edges_hz: &[f64]) -> Vec<f64> {
-    // Enough zeros that the lowest octave has many lines.
-    pulse.resize((2 * pulse.len()).next_power_of_two(), 0.0);
-    let size = pulse.len() as f64;
-    let forward = realfft::RealFftPlanner::<f64>::new().plan_fft_forward(pulse.len());
-    let mut lines = forward.make_output_vec();
-    // The plan made the buffer: the lengths agree.
-    let _ = forward.process(&mut pulse, &mut lines);
-    let mut shares = vec![0.0; edges_hz.len() + 1];
-    for (i, line) in lines.iter().enumerate() {
-        let hz = i as f64 * rate_hz / size;
-        shares[edges_hz.partition_point(|&edge| edge <= hz)] += line.norm_sqr();
-    }
-    let sum: f64 = shares.iter().sum();
-    shares.iter_mut().for_each(|s| *s /= sum);
-    shares
 }
 
 #[cfg(test)]

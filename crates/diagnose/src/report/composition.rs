@@ -114,6 +114,11 @@ fn causes(
         Ok(Cause {
             effect: own.id.to_owned(),
             subject: own.case.subject.clone(),
+            other_subjects: found
+                .interchangeable(candidate)
+                .iter()
+                .filter_map(|&other| search.candidates[other].case.subject.clone())
+                .collect(),
             explanation: effects[own.effect].info().explanation.to_owned(),
             probability: found.probability(candidate),
             nats: without(search, state, candidate)?,

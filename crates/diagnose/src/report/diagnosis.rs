@@ -128,6 +128,10 @@ pub struct Cause {
     pub effect: String,
     /// What it concerns (a receiver, a material ...), where the effect has several cases.
     pub subject: Option<String>,
+    /// What it may concern as well: subjects whose evidence came within 3 nats of this one's when it was named, and that add nothing beside
+    /// it.
+    #[serde(default)]
+    pub other_subjects: Vec<String>,
     /// One sentence for people.
     pub explanation: String,
     /// Posterior probability against its absence and all other effects, when it was named.

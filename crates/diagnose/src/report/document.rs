@@ -34,6 +34,7 @@ impl<'a> ParameterEntry<'a> {
 struct CauseEntry<'a> {
     effect: &'a str,
     subject: Option<&'a str>,
+    other_subjects: &'a [String],
     explanation: &'a str,
     probability: f64,
     nats: f64,
@@ -48,6 +49,7 @@ impl<'a> CauseEntry<'a> {
         Self {
             effect: &cause.effect,
             subject: cause.subject.as_deref(),
+            other_subjects: &cause.other_subjects,
             explanation: &cause.explanation,
             probability: cause.probability,
             nats: cause.nats,
@@ -137,6 +139,7 @@ mod tests {
                 parameters: vec![parameter("latency")],
                 held_out_gain: None,
                 slight: false,
+                other_subjects: vec!["r3".into()],
             }],
             alternatives: Vec::new(),
             would_decide: Vec::new(),

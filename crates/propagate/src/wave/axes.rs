@@ -1,6 +1,6 @@
 //! The voxel grid: how many voxels, how large, and where.
 
-use crate::Error;
+use super::error::WaveError;
 use crate::vector::Vec3;
 use std::ops::Range;
 
@@ -31,11 +31,11 @@ impl Axes {
         spacing_m: f64,
         limit_hz: f64,
         budget_bytes: u64,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, WaveError> {
         let side_m: Vec3 = std::array::from_fn(|a| high_m[a] - low_m[a]);
         let shortest_m = side_m.into_iter().fold(f64::INFINITY, f64::min);
         if shortest_m < LEAST_VOXELS * spacing_m {
-            return Err(Error::ThinRoom {
+            return Err(WaveError::ThinRoom {
                 side_m: shortest_m,
                 spacing_m,
                 needed_hz: limit_hz * LEAST_VOXELS * spacing_m / shortest_m.max(1e-9),
@@ -46,7 +46,7 @@ impl Axes {
         let bytes = voxels * BYTES_PER_VOXEL as f64;
         let most = (budget_bytes as f64).min(MOST_VOXELS * BYTES_PER_VOXEL as f64);
         if bytes > most {
-            return Err(Error::GridTooLarge {
+            return Err(WaveError::GridTooLarge {
                 limit_hz,
                 voxels: voxels as u64,
                 bytes: bytes as u64,

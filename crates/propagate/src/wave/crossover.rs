@@ -1,5 +1,6 @@
 //! Waves below, paths above.
 
+use super::error::WaveError;
 use super::response::WaveResponse;
 use crate::Error;
 use crate::spectrum::Spectrum;
@@ -65,12 +66,12 @@ impl Crossover {
     /// Joins two responses between the same points.
     ///
     /// # Errors
-    /// [`Error::JoinedRates`] for different sample rates; [`Error::OutOfRange`] for waves that end below
+    /// [`WaveError::JoinedRates`] for different sample rates; [`Error::OutOfRange`] for waves that end below
     /// [`Crossover::limit_hz`], or before the paths do by more than 1 ms.
     pub fn join(&self, waves: &WaveResponse, paths: &ImpulseResponse) -> Result<JoinedResponse, Error> {
         let rate = paths.sample_rate_hz();
         if waves.sample_rate_hz != rate {
-            return Err(Error::JoinedRates { waves_hz: waves.sample_rate_hz, paths_hz: rate });
+            return Err(WaveError::JoinedRates { waves_hz: waves.sample_rate_hz, paths_hz: rate }.into());
         }
         let least_hz = self.limit_hz() * (1.0 - 1e-9);
         let range = "at least sqrt 2 times the crossover";

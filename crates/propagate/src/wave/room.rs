@@ -2,6 +2,7 @@
 
 use super::axes::Axes;
 use super::crossings::{Crossing, crossings};
+use super::error::WaveError;
 use crate::mesh_scene::MeshScene;
 use crate::vector::Vec3;
 use crate::walk::visible;
@@ -189,12 +190,9 @@ impl WaveRoom {
         let nearest = self.stencil(source.position_m, [false; 3]);
         let first = nearest.into_iter().filter(seen).max_by(|a, b| a.1.total_cmp(&b.1));
         let Some((first, _)) = first else {
-            return Err(Error::BetweenVoxels {
-                what: "source",
-                id: source.id.clone(),
-                position_m: source.position_m,
-                spacing_m: self.axes.spacing_m,
-            });
+            let (id, position_m) = (source.id.clone(), source.position_m);
+            let spacing_m = self.axes.spacing_m;
+            return Err(WaveError::BetweenVoxels { what: "source", id, position_m, spacing_m }.into());
         };
         let strides = self.axes.strides();
         let mut waiting = vec![first];
@@ -210,7 +208,7 @@ impl WaveRoom {
                         continue;
                     }
                     if self.axes.is_outer(next) {
-                        return Err(self.leak(scene, source, voxel)?);
+                        return Err(self.leak(scene, source, voxel)?.into());
                     }
                     self.marks[next] |= INSIDE;
                     waiting.push(next);
@@ -220,9 +218,9 @@ impl WaveRoom {
         Ok(())
     }
 
-    fn leak(&self, scene: &Scene, source: &Source, voxel: usize) -> Result<Error, Error> {
+    fn leak(&self, scene: &Scene, source: &Source, voxel: usize) -> Result<WaveError, Error> {
         let report = MeshReport::new(scene, &self.mesh, source.position_m)?;
-        Ok(Error::WavesLeak {
+        Ok(WaveError::WavesLeak {
             at_m: self.axes.centre_m(voxel),
             spacing_m: self.axes.spacing_m,
             open_edges: report.open_edges.len(),

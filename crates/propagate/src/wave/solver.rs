@@ -2,6 +2,7 @@
 
 use super::admittance::admittance_of_absorption;
 use super::band_runs::{BandRun, RunPlan};
+use super::error::WaveError;
 use super::leapfrog::Leapfrog;
 use super::point_weights::PointWeights;
 use super::response::WaveResponse;
@@ -149,9 +150,9 @@ impl WaveSolver {
     /// Cuts what surrounds a source into voxels, small enough for the limit in this air.
     ///
     /// # Errors
-    /// [`Error::NoSurface`] for a mesh without area, [`Error::ThinRoom`] for one that is thinner than four voxels,
-    /// [`Error::GridTooLarge`] (it says what would fit), [`Error::WavesLeak`] for a mesh that is not closed,
-    /// [`Error::BetweenVoxels`] for a source with no voxel in sight.
+    /// [`Error::NoSurface`] for a mesh without area, [`WaveError::ThinRoom`] for one that is thinner than four voxels,
+    /// [`WaveError::GridTooLarge`] (it says what would fit), [`WaveError::WavesLeak`] for a mesh that is not closed,
+    /// [`WaveError::BetweenVoxels`] for a source with no voxel in sight.
     pub fn prepare(&self, scene: &Scene, source: &Source, air: &Air) -> Result<WaveRoom, Error> {
         let WaveConfig { limit_hz, points_per_wavelength, memory_bytes, .. } = self.config;
         let spacing_m = air.speed_of_sound_m_s() / (limit_hz * points_per_wavelength);
@@ -162,8 +163,8 @@ impl WaveSolver {
     /// materials in the order of the scene's.
     ///
     /// # Errors
-    /// As [`check_placement`](crate::check_placement) for each receiver; [`Error::BetweenVoxels`] for a source or receiver that voxels do
-    /// not resolve or join to the room; [`Error::TooShortForModes`] for a duration below four periods of the lowest mode;
+    /// As [`check_placement`](crate::check_placement) for each receiver; [`WaveError::BetweenVoxels`] for a source or receiver that voxels do
+    /// not resolve or join to the room; [`WaveError::TooShortForModes`] for a duration below four periods of the lowest mode;
     /// [`Error::OutOfRange`] for a limit below the lowest mode; [`Error::Acoustics`] for materials that do not fit the
     /// scene, and `Cancelled`.
     pub fn solve(
@@ -279,7 +280,7 @@ impl WaveSolver {
         let needed_s = LEAST_PERIODS / lowest_hz;
         let duration_s = self.config.duration_s;
         if duration_s < needed_s {
-            return Err(Error::TooShortForModes { duration_s, needed_s, lowest_hz });
+            return Err(WaveError::TooShortForModes { duration_s, needed_s, lowest_hz }.into());
         }
         let range = "at least the lowest mode of the room, c / (2 longest side)";
         OutOfRange::check("limit_hz", self.config.limit_hz, lowest_hz, f64::INFINITY, range)?;

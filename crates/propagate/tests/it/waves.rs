@@ -3,7 +3,7 @@
 
 use sabine_acoustics::{Air, Bands, Error as AcousticsError, ImpulseResponse, Material, PerBand};
 use sabine_paths::{Conditions, Propagator};
-use sabine_propagate::wave::{Crossover, WaveConfig, WaveSolver};
+use sabine_propagate::wave::{Crossover, WaveConfig, WaveError, WaveSolver};
 use sabine_propagate::{Error, PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use sabine_scene::{Receiver, Scene, Source};
 use sabine_testkit::BoxModes;
@@ -395,7 +395,9 @@ fn rooms_that_voxels_cannot_hold_are_refused() {
 
     // Does not fit: what it names as fitting does.
     let large = WaveConfig { limit_hz: 2000.0, memory_bytes: 64 << 20, ..config.clone() };
-    let Error::GridTooLarge { fitting_hz, .. } = with(large.clone(), &scene) else { panic!("fits") };
+    let Error::Wave(WaveError::GridTooLarge { fitting_hz, .. }) = with(large.clone(), &scene) else {
+        panic!("fits")
+    };
     let prepared = |limit_hz: f64| {
         let solver = WaveSolver::new(WaveConfig { limit_hz, ..large.clone() }).unwrap();
         solver.prepare(&scene, &from, &Air::default()).map(|room| room.bytes())
@@ -406,23 +408,29 @@ fn rooms_that_voxels_cannot_hold_are_refused() {
     let open = scene.triangles().iter().copied().filter(|t| t.material != 5).collect();
     let open = Scene::new(scene.vertices().to_vec(), open, scene.materials().to_vec()).unwrap();
     let leak = with(config.clone(), &open);
-    assert!(matches!(&leak, Error::WavesLeak { open_edges: 4, example_m: Some(_), .. }), "{leak}");
+    assert!(
+        matches!(&leak, Error::Wave(WaveError::WavesLeak { open_edges: 4, example_m: Some(_), .. })),
+        "{leak}"
+    );
 
     let (flat, _) = box_of([5.0, 4.0, 0.2], [0.1; 6]);
     let solver = WaveSolver::new(config.clone()).unwrap();
     let thin = solver.prepare(&flat, &source([1.0, 1.0, 0.1]), &Air::default()).err().unwrap();
-    let Error::ThinRoom { needed_hz, .. } = thin else { panic!("{thin}") };
+    let Error::Wave(WaveError::ThinRoom { needed_hz, .. }) = thin else { panic!("{thin}") };
     let finer = WaveSolver::new(WaveConfig { limit_hz: needed_hz + 1.0, ..config.clone() }).unwrap();
     assert!(finer.prepare(&flat, &source([1.0, 1.0, 0.1]), &Air::default()).is_ok());
 
     let short = WaveConfig { duration_s: 0.05, ..config.clone() };
     assert!(
-        matches!(with(short, &scene), Error::TooShortForModes { needed_s, .. } if (0.11..0.13).contains(&needed_s))
+        matches!(with(short, &scene), Error::Wave(WaveError::TooShortForModes { needed_s, .. }) if (0.11..0.13).contains(&needed_s))
     );
 
     // A slit of 2 cm leads to the receiver's half of the room.
     let parted = parted_by_a_slit();
-    assert!(matches!(with(config.clone(), &parted), Error::BetweenVoxels { what: "receiver", .. }));
+    assert!(matches!(
+        with(config.clone(), &parted),
+        Error::Wave(WaveError::BetweenVoxels { what: "receiver", .. })
+    ));
 
     let stop = |_: &str, done: u64, _: u64| {
         if done > 500 { std::ops::ControlFlow::Break(()) } else { std::ops::ControlFlow::Continue(()) }

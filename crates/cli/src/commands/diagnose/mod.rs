@@ -116,7 +116,7 @@ fn print_findings(findings: &Findings, out: &Path) {
     for cause in &findings.causes {
         println!(
             "{} (probability {:.3}{})",
-            words::effect_of(&cause.effect, cause.subject.as_deref()),
+            words::named(cause),
             cause.probability,
             if cause.slight { ", slight" } else { "" }
         );

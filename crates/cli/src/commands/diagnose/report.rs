@@ -4,7 +4,8 @@ use super::bars::{self, Bar};
 use super::findings::Findings;
 use super::residual_map::{self, ResidualMap};
 use super::words::{
-    capital, effect, effect_of, headline, hertz, in_band, interval, meaning, number, parameter, sentence,
+    capital, effect, effect_of, headline, hertz, in_band, interval, meaning, named, number, parameter,
+    sentence,
 };
 use super::{held_out, look_alikes};
 use crate::chart::{Chart, Look, Scale, Series};
@@ -85,7 +86,7 @@ fn parameters(page: &mut Page, findings: &Findings) -> Result<()> {
         };
         page.markup(&format!(
             "<p><strong>{}</strong>. {} Probability among everything that was tried: {sure}.{}{}</p>",
-            escape(&effect_of(&cause.effect, cause.subject.as_deref())),
+            escape(&named(cause)),
             escape(&cause.explanation),
             escape(&gain_sentence(cause)),
             escape(&rays_sentence(cause)),

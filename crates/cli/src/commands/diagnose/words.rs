@@ -60,8 +60,10 @@ fn set(findings: &Findings) -> Vec<&str> {
     last.into_iter().chain(others).collect()
 }
 
-fn named(cause: &Cause) -> String {
-    effect_of(&cause.effect, cause.subject.as_deref())
+/// A cause and what it concerns, or may concern.
+pub fn named(cause: &Cause) -> String {
+    let subjects: Vec<&str> = cause.subject.iter().chain(&cause.other_subjects).map(String::as_str).collect();
+    effect_of(&cause.effect, (!subjects.is_empty()).then(|| subjects.join(" or ")).as_deref())
 }
 
 /// What the verdict means, sentence by sentence.
