@@ -244,21 +244,22 @@ impl<'a> Search<'a> {
         Ok(rivals)
     }
 
-    /// The case of an effect for which the data speak most, and those that explain as much: another material, say, or another receiver.
+    /// An effect in the case for which the data speak most, and the cases that explain as much: another material, say, or another receiver.
     /// Octaves below the Schroeder frequency have no say in it: what speaks there for one wall rather than another are its modes.
     pub fn best_case(
         &self,
         state: &State,
         scores: &[Score],
         effect: &EffectScore,
-    ) -> Result<(usize, Vec<usize>), Error> {
+    ) -> Result<(EffectScore, Vec<usize>), Error> {
         let own = |s: &&Score| self.candidates[s.candidate].effect == effect.effect;
         let top = scores.iter().filter(own).map(|s| s.nats).fold(f64::NEG_INFINITY, f64::max);
-        let mut near: Vec<&Score> = scores.iter().filter(own).filter(|s| s.nats > top - NEAR_NATS).collect();
+        let least = (top - NEAR_NATS).max(self.threshold() + self.price(effect.best));
+        let mut near: Vec<&Score> = scores.iter().filter(own).filter(|s| s.nats > least).collect();
         near.sort_by(|a, b| b.nats.total_cmp(&a.nats));
         near.truncate(MOST_NEAR);
         if near.len() < 2 {
-            return Ok((effect.best, Vec::new()));
+            return Ok((effect.clone(), Vec::new()));
         }
         let of_decays =
             near.iter().all(|s| self.candidates[s.candidate].case.observable() == Observable::Decay);
@@ -272,21 +273,21 @@ impl<'a> Search<'a> {
             }
             Ok(self.state(&chosen, Some(state))?.log_evidence())
         };
-        let mut found: Vec<(usize, f64)> = Vec::new();
+        let mut found: Vec<(&Score, f64)> = Vec::new();
         for score in near {
-            found.push((score.candidate, evidence(&[score.candidate])?));
+            found.push((score, evidence(&[score.candidate])?));
         }
         found.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let (best, most) = found[0];
+        let (&Score { candidate: best, d_prime, .. }, most) = found[0];
         let worth_a_name = self.threshold() + self.price(best);
         let mut as_good = Vec::new();
-        for &(other, nats) in found[1..].iter().filter(|(_, nats)| most - nats < RIVAL_NATS) {
-            let both = evidence(&[best, other])?;
+        for (other, nats) in found[1..].iter().filter(|(_, nats)| most - nats < RIVAL_NATS) {
+            let both = evidence(&[best, other.candidate])?;
             if both - most < worth_a_name && both - nats < worth_a_name {
-                as_good.push(other);
+                as_good.push(other.candidate);
             }
         }
-        Ok((best, as_good))
+        Ok((EffectScore { best, d_prime, ..effect.clone() }, as_good))
     }
 
     /// Drops chosen candidates that the others have made superfluous.
@@ -345,7 +346,7 @@ mod tests {
         let effect = search.by_effect(&scores).remove(0);
         let (best, others) = search.best_case(&state, &scores, &effect).expect("fits");
         let subject = |c: usize| search.candidates[c].case.subject.clone();
-        (subject(best), others.into_iter().filter_map(subject).collect())
+        (subject(best.best), others.into_iter().filter_map(subject).collect())
     }
 
     #[test]

@@ -75,7 +75,7 @@ pub(crate) fn select(
             let named_now = ranked.first().is_some_and(|best| best.nats >= threshold);
             let (mut rivals, mut interchangeable) = (Vec::new(), Vec::new());
             if named_now {
-                (ranked[0].best, interchangeable) = search.best_case(&state, &scores, &ranked[0])?;
+                (ranked[0], interchangeable) = search.best_case(&state, &scores, &ranked[0])?;
                 rivals = search.rivals(&state, &ranked)?;
             }
             (ranked, rivals, interchangeable, threshold)

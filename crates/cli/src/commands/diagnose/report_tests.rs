@@ -53,6 +53,14 @@ fn a_named_cause_is_told_with_its_figures() {
 }
 
 #[test]
+fn what_a_cause_may_concern_as_well_is_told() {
+    let cause = json!({ "effect": "surface_absorption", "subject": "carpet", "other_subjects": ["board"],
+        "explanation": "One material.", "probability": 0.99, "nats": 30.0, "parameters": [], "held_out_gain": null });
+    let page = html(&findings("explained", &json!({ "causes": [cause] }))).unwrap();
+    assert!(page.contains("Found: Absorption of one material is wrong (carpet or board)."), "{page}");
+}
+
+#[test]
 fn each_verdict_says_what_it_means() {
     let page = html(&findings("adequate", &json!({ "causes": [] }))).unwrap();
     assert!(page.contains("The simulation explains this measurement.") && !page.contains("What was found"));
