@@ -30,6 +30,9 @@ pub struct Parameter {
     pub prior_sd: f64,
     /// Least and greatest value.
     pub bounds: (f64, f64),
+    /// Whether the least value is as far as the model claims to go, as a floor of uncertainty is: reaching it does not say that more of
+    /// the effect may be there.
+    pub has_floor: bool,
     /// A value at which the effect is plain to see: where its signature is compared with those of others.
     pub typical: f64,
     /// The only band that it bears on, where there is one.
@@ -55,6 +58,7 @@ impl Parameter {
             neutral,
             prior_sd,
             bounds,
+            has_floor: false,
             typical: neutral,
             band: None,
             receiver: None,
@@ -66,6 +70,18 @@ impl Parameter {
     #[must_use]
     pub fn typically(self, typical: f64) -> Self {
         Self { typical, ..self }
+    }
+
+    /// The same, its least value being a floor.
+    #[must_use]
+    pub fn with_floor(self) -> Self {
+        Self { has_floor: true, ..self }
+    }
+
+    /// Whether a value lies at an end of the range beyond which more of the effect may be there.
+    pub(crate) fn may_go_on(&self, value: f64) -> bool {
+        let low = value <= self.bounds.0 && !self.has_floor;
+        (low || value >= self.bounds.1) && value != self.neutral
     }
 
     /// The same, for one band alone, whose nominal centre is added to the name.
@@ -159,4 +175,19 @@ pub trait Effect: Send + Sync {
 
     /// The cases in which it may occur: one for each receiver, material, response ..., or a single one. None if it cannot occur here.
     fn cases(&self, survey: &Survey) -> Vec<Case>;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_floor_is_no_end_of_a_range() {
+        let open = Parameter::new("share", "", 1.0, 0.5, (0.1, 2.0));
+        assert!(open.may_go_on(0.1) && open.may_go_on(2.0) && !open.may_go_on(1.5));
+        let floored = open.with_floor();
+        assert!(!floored.may_go_on(0.1) && floored.may_go_on(2.0));
+        // Nothing is found at the neutral value, wherever it lies.
+        assert!(!Parameter::new("level", "dB", -90.0, 30.0, (-90.0, 0.0)).may_go_on(-90.0));
+    }
 }

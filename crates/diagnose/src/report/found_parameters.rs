@@ -71,9 +71,7 @@ pub(crate) fn at_bounds(search: &Search<'_>, state: &State, candidate: usize) ->
     }
     let (maximum, first) = place_of(search, state, candidate);
     let told = case.parameters.iter().enumerate().filter(|(i, p)| {
-        let value = maximum.values[first + i];
-        let at_end = (value <= p.bounds.0 || value >= p.bounds.1) && value != p.neutral;
-        at_end && maximum.sd(first + i) < TOLD_SHARE * p.prior_sd
+        p.may_go_on(maximum.values[first + i]) && maximum.sd(first + i) < TOLD_SHARE * p.prior_sd
     });
     told.map(|(i, p)| format!("{} = {:.3}", p.name, maximum.values[first + i])).collect()
 }

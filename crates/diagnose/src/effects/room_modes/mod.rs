@@ -57,7 +57,7 @@ impl Effect for RoomModes {
         }
         let parameters = vec![
             Parameter::new("share_of_waves", "", 0.0, 0.7, (0.0, 1.2)).typically(1.0),
-            Parameter::new("left_to_chance", "", 1.0, 0.7, LEFT_TO_CHANCE).typically(0.5),
+            Parameter::new("left_to_chance", "", 1.0, 0.7, LEFT_TO_CHANCE).typically(0.5).with_floor(),
         ];
         let starts = vec![vec![0.9, 0.3], vec![0.4, 0.8]];
         vec![Case::decay(parameters, *self).starting(starts).changing(|fitted| {
