@@ -11,7 +11,7 @@ use crate::likelihood::decay::WarmStart;
 use crate::likelihood::polarity;
 use crate::report::diagnosis::{DecayCurves, HeldOut, HeldOutGain};
 use crate::statistics;
-use crate::survey::SurveyedResponse;
+use crate::survey::{Survey, SurveyedResponse};
 use rayon::prelude::*;
 use sabine_acoustics::{Observer, report};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -84,7 +84,8 @@ pub(crate) struct Predicted {
     pub gains: Vec<HeldOutGain>,
     /// Whether every group of positions that was left out gains by each cause.
     pub gains_everywhere: Vec<bool>,
-    /// Error of decay curves at positions left out without and with each cause, in dB, in the octaves above the Schroeder frequency.
+    /// Error of decay curves at positions left out without and with each cause, in dB, in the octaves above the Schroeder frequency; in all
+    /// where none lies above it.
     pub diffuse_rmse_db: Vec<[f64; 2]>,
     pub decays: Vec<DecayCurves>,
 }
@@ -217,6 +218,11 @@ fn density(
     Ok(Density { nats, values: energy.values })
 }
 
+/// The lowest octave above the Schroeder frequency; where there is none, the lowest of all, so that decays are compared in some.
+fn first_diffuse_band(survey: &Survey) -> usize {
+    if survey.bands_of_modes < survey.bands.len() { survey.bands_of_modes } else { 0 }
+}
+
 /// Gains, errors and curves over all splits.
 fn summary(baseline: &Baseline, causes: usize, folds: &Folds, splits: &[SplitGain]) -> Predicted {
     let bins: f64 = splits.iter().map(|s| s.bins).sum();
@@ -251,7 +257,8 @@ fn summary(baseline: &Baseline, causes: usize, folds: &Folds, splits: &[SplitGai
             }
         })
         .collect();
-    let diffuse = |c: &&Compared| c.band >= baseline.survey().bands_of_modes;
+    let first = first_diffuse_band(baseline.survey());
+    let diffuse = |c: &&Compared| c.band >= first;
     let diffuse_rmse_db = (0..causes)
         .map(|i| {
             let before: Vec<Compared> = without(i).filter(diffuse).cloned().collect();
@@ -303,6 +310,14 @@ mod tests {
     use crate::hand_made::{self, Tables};
     use crate::infer::candidates::cases;
     use sabine_scene::{Levels, TimeZero};
+
+    #[test]
+    fn a_room_of_modes_alone_is_compared_in_all_octaves() {
+        let mut survey = hand_made::survey(Levels::Common, TimeZero::Emission);
+        assert_eq!((survey.bands.len(), survey.bands_of_modes, first_diffuse_band(&survey)), (2, 1, 1));
+        survey.bands_of_modes = 2;
+        assert_eq!(first_diffuse_band(&survey), 0);
+    }
 
     #[test]
     fn every_receiver_that_is_fitted_is_left_out_once_and_never_used_meanwhile() {
