@@ -5,7 +5,7 @@ use sabine_propagate::TracerConfig;
 use sabine_scene::PositionSd;
 
 /// Specular paths in a cuboid that are predicted exactly.
-const CUBOID_PATHS: usize = 150_000;
+pub(crate) const CUBOID_PATHS: usize = 150_000;
 
 /// Settings of [`Diagnoser`](crate::Diagnoser).
 #[derive(Clone, Debug, PartialEq)]

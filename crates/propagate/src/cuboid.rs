@@ -13,6 +13,20 @@ const STRAIGHT: f64 = 1e-6;
 /// A face is whole if its area is that of the cuboid's to this share.
 const WHOLE: f64 = 1e-6;
 
+/// One image of a source in a cuboid: a specular path of any order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ImageSource {
+    /// Length of the path in metres.
+    pub length_m: f64,
+    /// Unit vector in which it leaves the source.
+    pub departure: [f64; 3],
+    /// Unit vector from the receiver towards where it comes from.
+    pub arrival: [f64; 3],
+    /// Reflections at each of the six faces, in the order of [`PreparedScene::cuboid_faces`](crate::PreparedScene::cuboid_faces).
+    pub reflections: [u32; 6],
+}
+
 /// Six whole faces at right angles, each of one material, and nothing else.
 #[derive(Clone, Debug)]
 pub(crate) struct Cuboid {
@@ -20,7 +34,7 @@ pub(crate) struct Cuboid {
     low_m: [f64; 3],
     high_m: [f64; 3],
     /// Of the faces low x, high x, low y, high y, low z, high z.
-    materials: [u32; 6],
+    pub materials: [u32; 6],
 }
 
 impl Cuboid {
@@ -73,6 +87,41 @@ impl Cuboid {
         Some(Self { axes, low_m, high_m, materials })
     }
 
+    /// Shows every image source that is no farther away than this, the source itself among them.
+    pub fn for_each_image(
+        &self,
+        source: Vec3,
+        receiver: Vec3,
+        max_length_m: f64,
+        mut visit: impl FnMut(&ImageSource),
+    ) {
+        let lattice = Lattice::new(self, source, receiver);
+        let reach = lattice.reach(max_length_m);
+        for i in -reach[0]..=reach[0] {
+            let x = lattice.along(0, i);
+            for j in -reach[1]..=reach[1] {
+                let flat = x * x + lattice.along(1, j).powi(2);
+                if flat > max_length_m * max_length_m {
+                    continue;
+                }
+                for k in -reach[2]..=reach[2] {
+                    let numbers = [i, j, k];
+                    let length_m = (flat + lattice.along(2, k).powi(2)).sqrt();
+                    if length_m <= max_length_m {
+                        let [departure, arrival] = lattice.directions(numbers).map(|v| self.in_room(v));
+                        let reflections = faces_of(numbers);
+                        visit(&ImageSource { length_m, departure, arrival, reflections });
+                    }
+                }
+            }
+        }
+    }
+
+    /// From coordinates along the axes to those of the room.
+    fn in_room(&self, v: Vec3) -> Vec3 {
+        std::array::from_fn(|i| (0..3).map(|k| v[k] * self.axes[k][i]).sum())
+    }
+
     /// Adds the direct path and specular paths of any order, none longer than the set looks for (Allen and Berkley, JASA 65,
     /// 1979): all of them if there are not more than about `most`, else a random choice that favours those that carry much energy in
     /// the octave in which they carry most, each with the weight of those that it stands for.
@@ -87,30 +136,8 @@ impl Cuboid {
     ) {
         paths.set_axes(self.axes);
         let max_length_m = paths.max_length_m();
-        let local = |p: Vec3| -> Vec3 { std::array::from_fn(|k| dot(self.axes[k], p)) };
-        let room =
-            |v: Vec3| -> Vec3 { std::array::from_fn(|i| (0..3).map(|k| v[k] * self.axes[k][i]).sum()) };
-        let (from, to) = (local(source), local(receiver));
-        // Image number n along an axis: its distance from the receiver, and its reflections at the low and high faces.
-        let along = |axis: usize, n: i64| {
-            let side = self.high_m[axis] - self.low_m[axis];
-            let inside = from[axis] - self.low_m[axis];
-            let seen = if n.rem_euclid(2) == 0 { inside } else { side - inside };
-            self.low_m[axis] + n as f64 * side + seen - to[axis]
-        };
-        let hits = |n: i64| {
-            let (more, fewer) = (n.unsigned_abs().div_ceil(2) as u32, n.unsigned_abs() as u32 / 2);
-            if n > 0 { (fewer, more) } else { (more, fewer) }
-        };
-        let faces_of = |numbers: [i64; 3]| {
-            let mut faces = [0u32; 6];
-            for (a, n) in numbers.into_iter().enumerate() {
-                (faces[2 * a], faces[2 * a + 1]) = hits(n);
-            }
-            faces
-        };
-        let reach: [i64; 3] =
-            std::array::from_fn(|k| (max_length_m / (self.high_m[k] - self.low_m[k])).ceil() as i64 + 1);
+        let lattice = Lattice::new(self, source, receiver);
+        let reach = lattice.reach(max_length_m);
         let left = self.ln_left(materials);
         // What the faces across an axis leave of each image along it, by octave: `[image][octave]`.
         let left_along: [Vec<Vec<f64>>; 3] = std::array::from_fn(|axis| {
@@ -124,15 +151,15 @@ impl Cuboid {
         let image = |axis: usize, n: i64| &left_along[axis][(n + reach[axis]) as usize];
         let mut found: Vec<(f32, [i64; 3])> = Vec::new();
         for i in -reach[0]..=reach[0] {
-            let x = along(0, i);
+            let x = lattice.along(0, i);
             for j in -reach[1]..=reach[1] {
-                let flat = x * x + along(1, j).powi(2);
+                let flat = x * x + lattice.along(1, j).powi(2);
                 if flat > max_length_m * max_length_m {
                     continue;
                 }
                 let in_plane: Vec<f64> = image(0, i).iter().zip(image(1, j)).map(|(x, y)| x + y).collect();
                 for k in -reach[2]..=reach[2] {
-                    let squared = flat + along(2, k).powi(2);
+                    let squared = flat + lattice.along(2, k).powi(2);
                     if squared > max_length_m * max_length_m {
                         continue;
                     }
@@ -157,20 +184,16 @@ impl Cuboid {
         found.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let mut chains: HashMap<[u32; 6], u32> = HashMap::from([([0; 6], PathSet::DIRECT)]);
         for (ln_energy, numbers) in found {
-            let to_image: Vec3 = std::array::from_fn(|k| along(k, numbers[k]));
-            let length_m = dot(to_image, to_image).sqrt();
-            let arrival = scale(to_image, 1.0 / length_m);
-            // Each reflection turns one component around.
-            let departure =
-                std::array::from_fn(|a| if numbers[a].rem_euclid(2) == 0 { -arrival[a] } else { arrival[a] });
+            let length_m = lattice.length_m(numbers);
+            let [departure, arrival] = lattice.directions(numbers);
             let chain = self.chain(paths, &mut chains, faces_of(numbers));
             paths.push(Contribution {
                 length_m,
                 log_weight: -2.0 * length_m.ln() - kept(ln_energy).ln(),
                 chain,
                 tail: PathSet::DIRECT,
-                departure: room(departure),
-                arrival: room(arrival),
+                departure: self.in_room(departure),
+                arrival: self.in_room(arrival),
                 batch: None,
             });
         }
@@ -214,6 +237,67 @@ impl Cuboid {
         }
         chain
     }
+}
+
+/// The images of a source in a cuboid as its axes number them: n along an axis has gone through |n| faces across it.
+struct Lattice {
+    low_m: [f64; 3],
+    side_m: [f64; 3],
+    from: Vec3,
+    to: Vec3,
+}
+
+impl Lattice {
+    fn new(cuboid: &Cuboid, source: Vec3, receiver: Vec3) -> Self {
+        let local = |p: Vec3| -> Vec3 { std::array::from_fn(|k| dot(cuboid.axes[k], p)) };
+        let side_m = std::array::from_fn(|k| cuboid.high_m[k] - cuboid.low_m[k]);
+        Self { low_m: cuboid.low_m, side_m, from: local(source), to: local(receiver) }
+    }
+
+    /// Largest number along each axis of an image that is no farther away than this.
+    fn reach(&self, max_length_m: f64) -> [i64; 3] {
+        self.side_m.map(|side| (max_length_m / side).ceil() as i64 + 1)
+    }
+
+    /// From the receiver to an image, along one axis.
+    fn along(&self, axis: usize, n: i64) -> f64 {
+        let side = self.side_m[axis];
+        let inside = self.from[axis] - self.low_m[axis];
+        let seen = if n.rem_euclid(2) == 0 { inside } else { side - inside };
+        self.low_m[axis] + n as f64 * side + seen - self.to[axis]
+    }
+
+    fn to_image(&self, numbers: [i64; 3]) -> Vec3 {
+        std::array::from_fn(|k| self.along(k, numbers[k]))
+    }
+
+    fn length_m(&self, numbers: [i64; 3]) -> f64 {
+        let to_image = self.to_image(numbers);
+        dot(to_image, to_image).sqrt()
+    }
+
+    /// Unit vectors in which the path leaves the source, and from the receiver towards the image.
+    fn directions(&self, numbers: [i64; 3]) -> [Vec3; 2] {
+        let arrival = scale(self.to_image(numbers), 1.0 / self.length_m(numbers));
+        // Each reflection turns one component around.
+        let turned = |a: usize| if numbers[a].rem_euclid(2) == 0 { -arrival[a] } else { arrival[a] };
+        [std::array::from_fn(turned), arrival]
+    }
+}
+
+/// Reflections at the low and the high face across each axis.
+fn faces_of(numbers: [i64; 3]) -> [u32; 6] {
+    let mut faces = [0u32; 6];
+    for (a, n) in numbers.into_iter().enumerate() {
+        (faces[2 * a], faces[2 * a + 1]) = hits(n);
+    }
+    faces
+}
+
+/// Reflections of image number n at the low and high faces across its axis.
+fn hits(n: i64) -> (u32, u32) {
+    let (more, fewer) = (n.unsigned_abs().div_ceil(2) as u32, n.unsigned_abs() as u32 / 2);
+    if n > 0 { (fewer, more) } else { (more, fewer) }
 }
 
 /// The factor by which amplitudes become chances of which about `most` come true, 1 being the largest chance.

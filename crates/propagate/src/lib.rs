@@ -144,6 +144,7 @@ mod wide_node;
 pub use ambisonic_renderer::AmbisonicRenderer;
 pub use ambisonic_response::AmbisonicResponse;
 pub use brute_force_scene::BruteForceScene;
+pub use cuboid::ImageSource;
 pub use edge_diffraction::DiffractingEdges;
 pub use error::Error;
 pub use head_responses::HeadResponses;

@@ -1,6 +1,6 @@
 //! A scene made ready for many traces.
 
-use crate::cuboid::Cuboid;
+use crate::cuboid::{Cuboid, ImageSource};
 use crate::edge_diffraction::DiffractingEdges;
 use crate::event_mixture::EventProbabilities;
 use crate::mesh_scene::MeshScene;
@@ -47,6 +47,27 @@ impl PreparedScene {
             mean_scattering: scattering_m2 / surface_m2,
             mesh,
         })
+    }
+
+    /// The material (index) of each of the six faces, where the mesh is a cuboid: six whole faces at right angles, each of one material, and
+    /// nothing else.
+    pub fn cuboid_faces(&self) -> Option<[u32; 6]> {
+        self.cuboid.as_ref().map(|cuboid| cuboid.materials)
+    }
+
+    /// Shows every image source of a cuboid that is no farther away than `max_length_m`, in a fixed order, the source itself among them
+    /// (Allen and Berkley, JASA 65, 1979); none where the mesh is no cuboid. Their number grows with the third power of the length:
+    /// 4/3 pi `max_length_m`^3 over the room's volume.
+    pub fn for_each_image(
+        &self,
+        source_m: [f64; 3],
+        receiver_m: [f64; 3],
+        max_length_m: f64,
+        visit: impl FnMut(&ImageSource),
+    ) {
+        if let Some(cuboid) = &self.cuboid {
+            cuboid.for_each_image(source_m, receiver_m, max_length_m, visit);
+        }
     }
 
     /// Looks for holes through which sound from this point escapes. `scene` must be the one that was prepared.

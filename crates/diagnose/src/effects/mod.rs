@@ -5,6 +5,7 @@ mod angle_dependent_absorption;
 mod background_noise;
 mod channel_fault;
 mod channel_response;
+mod coherent_reflections;
 mod coupled_volume;
 mod edge_diffraction;
 mod extra_reflector;
@@ -28,6 +29,7 @@ pub use angle_dependent_absorption::AngleDependentAbsorption;
 pub use background_noise::BackgroundNoise;
 pub use channel_fault::ChannelFault;
 pub use channel_response::ChannelResponse;
+pub use coherent_reflections::CoherentReflections;
 pub use coupled_volume::CoupledVolume;
 pub use edge_diffraction::MissingDiffraction;
 pub use extra_reflector::ExtraReflector;
@@ -73,6 +75,7 @@ pub fn catalogue() -> Vec<Box<dyn Effect>> {
         Box::new(RoomModes),
         Box::new(ReceiverDirectivity),
         Box::new(ChannelResponse),
+        Box::new(CoherentReflections),
     ]
 }
 

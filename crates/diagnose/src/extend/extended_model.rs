@@ -86,6 +86,9 @@ pub struct ExtendedModel {
     /// Sound bends around the edges of the mesh, as theory has it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub diffraction: bool,
+    /// Specular reflections add as pressures, to any order: image sources in a cuboid.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub coherent_reflections: bool,
     /// Flat surfaces that the mesh lacks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sheets: Vec<ThinPanel>,

@@ -1,5 +1,6 @@
 //! The room of an extended model: what a tracer needs to render it.
 
+use crate::config::CUBOID_PATHS;
 use crate::error::Error;
 use crate::extend::extended_model::{Dimensions, ExtendedModel};
 use crate::extend::recording_chain::RecordingChain;
@@ -33,6 +34,9 @@ pub struct ExtendedRoom {
     pub receivers: Vec<Receiver>,
     /// Whether sound bends around edges: for [`TracerConfig::diffraction`](sabine_propagate::TracerConfig::diffraction).
     pub diffraction: bool,
+    /// Image sources of a cuboid that are to be rendered as pulses, their pressures added: for
+    /// [`TracerConfig::cuboid_paths`](sabine_propagate::TracerConfig::cuboid_paths).
+    pub cuboid_paths: usize,
     /// Below this frequency in Hz responses are those of the wave equation.
     pub wave_below_hz: Option<f64>,
     /// Pattern and axis of each source; `None` is omnidirectional.
@@ -211,6 +215,7 @@ impl ExtendedModel {
             receivers.iter().map(|r| of_receiver(r).transpose()).collect::<Result<_, Fault>>()?;
         let chain = RecordingChain::new(self.clone(), own);
         let diffraction = self.diffraction;
+        let cuboid_paths = if self.coherent_reflections { CUBOID_PATHS } else { 0 };
         Ok(ExtendedRoom {
             scene,
             air,
@@ -218,6 +223,7 @@ impl ExtendedModel {
             sources,
             receivers,
             diffraction,
+            cuboid_paths,
             wave_below_hz: self.wave_below_hz,
             directivities,
             receiver_directivities,

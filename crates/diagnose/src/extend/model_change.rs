@@ -46,6 +46,8 @@ pub enum ModelChange {
     Panel(ThinPanel),
     /// Sound is diffracted at the edges of the mesh.
     Diffraction,
+    /// Specular reflections add as pressures.
+    CoherentReflections,
     /// Latency of all responses in seconds.
     Latency(f64),
     /// Position of a source or receiver, by name, in metres.
@@ -101,6 +103,7 @@ impl ExtendedModel {
             ModelChange::Dimensions(dimensions) => self.dimensions = Some(dimensions),
             ModelChange::Panel(panel) => self.sheets.push(panel),
             ModelChange::Diffraction => self.diffraction = true,
+            ModelChange::CoherentReflections => self.coherent_reflections = true,
             ModelChange::Latency(seconds) => self.latency_s = Some(seconds),
             ModelChange::Position { id, position_m } => {
                 self.position_m.insert(id, position_m);

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use sabine_acoustics::Air;
 use sabine_paths::{PathSet, Propagator};
-use sabine_propagate::{PathTracer, PreparedScene, TracerConfig};
+use sabine_propagate::{ImageSource, PathTracer, PreparedScene, TracerConfig};
 use sabine_scene::{Receiver, Scene, Source};
 use std::sync::Arc;
 
@@ -45,6 +45,18 @@ pub trait PreparedTracer: Send + Sync {
     /// # Errors
     /// For a source or receiver that cannot be traced.
     fn trace(&self, source: &Source, receiver: &Receiver, air: &Air) -> Result<PathSet, Error>;
+
+    /// The material (index) of each face if the scene is a cuboid whose image sources [`PreparedTracer::for_each_image`] shows. The default
+    /// knows of none.
+    fn cuboid_faces(&self) -> Option<[u32; 6]> {
+        None
+    }
+
+    /// Shows all image sources of a cuboid that are no farther away than this, each with its reflections at the faces. The default shows
+    /// none.
+    fn for_each_image(&self, ends_m: [[f64; 3]; 2], max_length_m: f64, visit: &mut dyn FnMut(&ImageSource)) {
+        let _ = (ends_m, max_length_m, visit);
+    }
 }
 
 /// The path tracer of `sabine-propagate`.
@@ -84,6 +96,19 @@ impl PreparedTracer for PreparedRays {
 
     fn trace(&self, source: &Source, receiver: &Receiver, air: &Air) -> Result<PathSet, Error> {
         Ok(self.tracer.trace_prepared(&self.prepared, source, receiver, air, &())?)
+    }
+
+    fn cuboid_faces(&self) -> Option<[u32; 6]> {
+        self.prepared.cuboid_faces()
+    }
+
+    fn for_each_image(
+        &self,
+        [source_m, receiver_m]: [[f64; 3]; 2],
+        max_length_m: f64,
+        visit: &mut dyn FnMut(&ImageSource),
+    ) {
+        self.prepared.for_each_image(source_m, receiver_m, max_length_m, visit);
     }
 }
 

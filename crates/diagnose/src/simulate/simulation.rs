@@ -124,6 +124,11 @@ impl Simulation {
         Ok(self.materials.iter().zip(&self.absorption).map(one).collect::<Result<_, _>>()?)
     }
 
+    /// The tracer of that mesh.
+    pub fn prepared(&self) -> &dyn PreparedTracer {
+        &*self.prepared
+    }
+
     /// The mesh as it is traced, at the size that was found.
     pub fn traced_scene(&self) -> &Scene {
         self.resized.as_ref().unwrap_or(&self.scene)

@@ -8,6 +8,7 @@ use crate::survey::{Survey, SurveyedResponse};
 use rayon::prelude::*;
 use sabine_acoustics::{Air, Material};
 use sabine_paths::{Conditions, PathSet};
+use sabine_propagate::ImageSource;
 use sabine_scene::{Receiver, Scene, Source};
 
 /// The traced room at the materials about which predictions are expanded.
@@ -42,6 +43,11 @@ impl TracedRoomView<'_> {
     /// A receiver (index) where it was found to stand.
     pub fn receiver(&self, index: usize) -> &Receiver {
         &self.simulation.receivers[index]
+    }
+
+    /// The material (index) of each of the six faces, where the mesh is a cuboid and the tracer knows its images.
+    pub fn cuboid_faces(&self) -> Option<[u32; 6]> {
+        self.simulation.prepared().cuboid_faces()
     }
 
     /// Number of pairs.
@@ -97,6 +103,19 @@ impl<'a> TracedPairView<'a> {
     /// Its paths.
     pub fn paths(&self) -> &'a PathSet {
         self.pair.paths()
+    }
+
+    /// Whether source and receiver see each other.
+    pub fn has_direct(&self) -> bool {
+        self.pair.has_direct()
+    }
+
+    /// Shows all image sources no farther away than this, where [`TracedRoomView::cuboid_faces`] has the faces.
+    pub fn for_each_image(&self, max_length_m: f64, visit: &mut dyn FnMut(&ImageSource)) {
+        let response = self.response();
+        let ends_m =
+            [self.room.source(response.source).position_m, self.room.receiver(response.receiver).position_m];
+        self.room.simulation.prepared().for_each_image(ends_m, max_length_m, visit);
     }
 
     /// Paths around edges of the mesh, where source and receiver do not see each other; no part of [`TracedPairView::paths`].

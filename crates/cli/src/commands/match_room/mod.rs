@@ -71,12 +71,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut out = OutputFolder::create(&arguments.out)?;
     let channel = arguments.channel.unwrap_or_default();
     let (mut room, room_name) = arguments.room.read(&mut demo)?;
-    let mut diffraction = false;
+    let (mut diffraction, mut cuboid_paths) = (false, 0);
     let mut wave_below_hz = arguments.wave_below;
     if let Some(model) = &arguments.model {
         let extended = ExtendedModel::read(model)?.room(&room)?;
         wave_below_hz = wave_below_hz.or(extended.wave_below_hz);
-        diffraction = extended.diffraction;
+        (diffraction, cuboid_paths) = (extended.diffraction, extended.cuboid_paths);
         room = extended.measured_room(&room)?;
     }
     let (source, receiver) = arguments.place.of(&room)?;
@@ -92,6 +92,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let mut config = MatchConfig { seed: arguments.seed, wave_below_hz, ..MatchConfig::default() };
     config.tracer.diffraction |= diffraction;
+    config.tracer.cuboid_paths = config.tracer.cuboid_paths.max(cuboid_paths);
     if let Some(rays) = arguments.rays {
         config.tracer.rays = rays;
     }

@@ -162,8 +162,16 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let below = below_hz.map(|hz| WaveRoomBelow::new(hz, arguments.rate, &room, source)).transpose()?;
     let bar = Bar::new();
     let start = Instant::now();
-    let bends = arguments.diffraction || extended.as_ref().is_some_and(|model| model.diffraction);
-    let (paths, parameters) = trace(arguments, bends, &room, source, receiver, &conditions, &bar)?;
+    let tracer = TracerConfig {
+        rays: arguments.rays,
+        image_order: arguments.order,
+        seed: arguments.seed,
+        diffraction: arguments.diffraction || extended.as_ref().is_some_and(|model| model.diffraction),
+        cuboid_paths: extended.as_ref().map_or(0, |model| model.cuboid_paths),
+        allow_leaks: arguments.allow_leaks,
+        ..TracerConfig::default()
+    };
+    let (paths, parameters) = trace(arguments.duration, &tracer, &room, source, receiver, &conditions, &bar)?;
     let trace_s = start.elapsed().as_secs_f64();
     bar.finish();
     let start = Instant::now();
@@ -241,8 +249,8 @@ fn pattern(pattern: Pattern) -> Result<Option<Directivity>, sabine::acoustics::E
 
 /// Traces for as long as asked, or until T30 can be read in every octave.
 fn trace(
-    arguments: &Arguments,
-    diffraction: bool,
+    asked_s: Option<f64>,
+    tracer: &TracerConfig,
     room: &MeasuredRoom,
     source: &Source,
     receiver: &Receiver,
@@ -251,23 +259,14 @@ fn trace(
 ) -> Result<(PathSet, PathParameters), Failure> {
     let expected = DiffuseRoom::of_scene(room.scene(), &room.air(), room.bands())?;
     let longest_s = expected.values().iter().map(DiffuseRoom::eyring_t60_s).fold(0.0, f64::max);
-    let mut duration_s =
-        arguments.duration.unwrap_or((DURATION_FACTOR * longest_s).clamp(DURATION_S.0, DURATION_S.1));
+    let mut duration_s = asked_s.unwrap_or((DURATION_FACTOR * longest_s).clamp(DURATION_S.0, DURATION_S.1));
     loop {
-        let config = TracerConfig {
-            rays: arguments.rays,
-            image_order: arguments.order,
-            duration_s,
-            seed: arguments.seed,
-            diffraction,
-            allow_leaks: arguments.allow_leaks,
-            ..TracerConfig::default()
-        };
+        let config = TracerConfig { duration_s, ..tracer.clone() };
         let paths = PathTracer::new(config)?.trace(room.scene(), source, receiver, &room.air(), bar)?;
         let parameters = PathParameters::read(&paths, conditions)?;
         let cut =
             parameters.t30_s.values().iter().any(|t30| matches!(t30, Err(NoReading::DynamicRange { .. })));
-        if !cut || arguments.duration.is_some() || duration_s >= DURATION_S.1 {
+        if !cut || asked_s.is_some() || duration_s >= DURATION_S.1 {
             return Ok((paths, parameters));
         }
         duration_s = (2.0 * duration_s).min(DURATION_S.1);
