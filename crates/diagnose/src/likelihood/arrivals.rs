@@ -332,7 +332,10 @@ fn offered(model: &mut ArrivalModel<'_>, neutral: &[f64]) -> Vec<(Vec<f64>, usiz
         let mut ranked: Vec<(f64, &Vec<f64>)> =
             starts.iter().map(|x| (model.log_likelihood(x, None), x)).collect();
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-        found.extend(ranked.into_iter().take(count).map(|(_, x)| (x.clone(), width)));
+        // From what is less probable than the neutral values nothing is reached that these would not reach.
+        let least = model.log_likelihood(neutral, None);
+        let better = ranked.into_iter().take(count).filter(|(likelihood, _)| *likelihood > least);
+        found.extend(better.map(|(_, x)| (x.clone(), width)));
     }
     model.width_s = None;
     found

@@ -238,9 +238,9 @@ fn connected(scene: &Scene, members: &[usize]) -> Vec<Vec<usize>> {
     // Those of which one has a corner on the other: where a face ends at the middle of another's side.
     for (index, &triangle) in members.iter().enumerate() {
         let own = corners(scene, triangle);
-        for other in 0..members.len() {
+        for (other, &their_triangle) in members.iter().enumerate() {
             if root(&mut parent, index) != root(&mut parent, other) {
-                let theirs = corners(scene, members[other]);
+                let theirs = corners(scene, their_triangle);
                 if theirs.iter().any(|c| lies_on(own, *c)) {
                     join(&mut parent, index, other);
                 }

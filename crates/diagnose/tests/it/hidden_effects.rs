@@ -105,7 +105,7 @@ fn a_face_that_stands_elsewhere_is_found(seed: u64, face: usize, offset_m: f64) 
     let [surface] = &found.model.surfaces[..] else { panic!("{:?}", found.model.surfaces) };
     let axis = face / 2;
     let mut normal = [0.0; 3];
-    normal[axis] = if face % 2 == 0 { -1.0 } else { 1.0 };
+    normal[axis] = if face.is_multiple_of(2) { -1.0 } else { 1.0 };
     assert!((0..3).all(|k| (surface.normal[k] - normal[k]).abs() < 1e-6), "{surface:?}");
     assert!(surface.tilt_deg.iter().all(|t| t.abs() < 0.5), "{surface:?}");
     // Rendered: the extended model's mesh ends where the true box does.

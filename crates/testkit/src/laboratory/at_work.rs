@@ -107,7 +107,7 @@ fn displace(truth: &mut Truth, face: usize, offset_m: f64) -> Result<(), Error> 
     let axis = face / 2;
     truth.size_m[axis] += offset_m;
     let places = truth.sources.iter_mut().map(|s| &mut s.position_m).chain(&mut truth.receivers_m);
-    let (low, side) = (face % 2 == 0, truth.size_m[axis]);
+    let (low, side) = (face.is_multiple_of(2), truth.size_m[axis]);
     for place in places {
         if low {
             place[axis] += offset_m;

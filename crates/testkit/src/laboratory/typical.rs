@@ -198,7 +198,8 @@ fn truncation(r: &mut Pcg64Mcg, truth: &Truth, decay_s: f64, strength: f64) -> H
 fn surface_displacement(r: &mut Pcg64Mcg, truth: &Truth, strength: f64) -> Hidden {
     let face = r.random_range(0..6);
     let (axis, side) = (face / 2, truth.size_m[face / 2]);
-    let before_m = |place: &[f64; 3]| if face % 2 == 0 { place[axis] } else { side - place[axis] };
+    let is_low = face.is_multiple_of(2);
+    let before_m = |place: &[f64; 3]| if is_low { place[axis] } else { side - place[axis] };
     let sources = truth.sources.iter().map(|s| before_m(&s.position_m));
     let nearest_m = sources.chain(truth.receivers_m.iter().map(before_m)).fold(f64::INFINITY, f64::min);
     let offset_m = (strength * sign(r) * (0.2 + 0.25 * unit(r))).clamp(0.15 - nearest_m, 1.0);

@@ -87,7 +87,7 @@ fn a_displaced_face_leaves_everything_else_in_its_place() {
         let hidden = [Hidden::SurfaceDisplacement { face, offset_m: 0.3 }];
         let truth = lab.truth(&hidden).unwrap();
         for (i, (found, stated)) in faces(&lab.true_scene(&hidden).unwrap()).iter().zip(&before).enumerate() {
-            let outwards = if i % 2 == 0 { -0.3 } else { 0.3 };
+            let outwards = if i.is_multiple_of(2) { -0.3 } else { 0.3 };
             assert_close("face (m)", *found, stated + if i == face { outwards } else { 0.0 }, 1e-12, 0.0);
         }
         for k in 0..3 {
