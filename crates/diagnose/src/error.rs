@@ -1,5 +1,6 @@
 //! What can go wrong in a diagnosis.
 
+use crate::extend::moved_mesh::DisplacementError;
 use sabine_acoustics::OutOfRange;
 
 /// Errors of this crate.
@@ -57,6 +58,9 @@ pub enum Error {
         #[source]
         source: Box<toml::de::Error>,
     },
+    /// Displaced surfaces cannot stand where an extended model has them.
+    #[error("extended model: surfaces: {0}")]
+    Displacement(#[from] DisplacementError),
     /// An extended model does not fit the room, or holds a value out of range.
     #[error("extended model: {field}: {source}")]
     InModel {

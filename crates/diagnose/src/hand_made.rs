@@ -13,6 +13,7 @@ use crate::observe::time_bins::Bins;
 use crate::simulate::simulation::Simulation;
 use crate::simulate::tables::Tables as Prepared;
 use crate::simulate::traced_pair::{Arrival, BandState};
+use crate::survey::surfaces::{Surface, axes_of};
 use crate::survey::{Place, Survey, SurveyedResponse};
 use sabine_acoustics::{Air, Bands, Material, PerBand};
 use sabine_scene::{Levels, Measurement, TimeZero};
@@ -62,6 +63,7 @@ pub(crate) fn survey(levels: Levels, time_zero: TimeZero) -> Survey {
         box_m: [[0.0; 3], [5.0, 4.0, 2.5]],
         declared_scattering: 0.1,
         planes: Vec::new(),
+        surfaces: surfaces(),
         material_areas_m2: vec![20.0, 65.0],
         diffracted: Vec::new(),
         bands_of_modes: 1,
@@ -191,8 +193,28 @@ impl Tables {
             measured: &self.measured,
             arrivals: &self.arrivals,
             speed_m_s: &self.speed_m_s,
+            displaced: &[],
         }
     }
+}
+
+/// The surfaces that the reflections meet: floor, ceiling and two walls.
+fn surfaces() -> Vec<Surface> {
+    let one = |(axis, at): (usize, f64)| {
+        let mut normal = [0.0; 3];
+        normal[axis] = if at > 0.0 { 1.0 } else { -1.0 };
+        let mut centre_m = [2.5, 2.0, 1.25];
+        centre_m[axis] = at;
+        Surface {
+            axes: axes_of(normal),
+            centre_m,
+            area_m2: 10.0,
+            materials: vec![axis % 2],
+            reflections: 3,
+            range_m: [-0.5, 0.8],
+        }
+    };
+    [(2, 0.0), (2, 2.5), (0, 0.0), (1, 4.0)].map(one).to_vec()
 }
 
 /// The direct sound and the first reflections at floor, ceiling and two walls.
@@ -200,7 +222,8 @@ fn arrivals(survey: &Survey, response: &SurveyedResponse) -> Vec<Arrival> {
     let source = survey.sources[response.source].position_m;
     let receiver = survey.receivers[response.receiver].position_m;
     let mut found = Vec::new();
-    for (axis, wall) in [(0, None), (2, Some(0.0)), (2, Some(2.5)), (0, Some(0.0)), (1, Some(4.0))] {
+    let walls = [(0, None), (2, Some(0.0)), (2, Some(2.5)), (0, Some(0.0)), (1, Some(4.0))];
+    for (number, (axis, wall)) in walls.into_iter().enumerate() {
         let mut image = source;
         if let Some(wall) = wall {
             image[axis] = 2.0 * wall - source[axis];
@@ -212,7 +235,8 @@ fn arrivals(survey: &Survey, response: &SurveyedResponse) -> Vec<Arrival> {
         if wall.is_some() {
             departure[axis] = -departure[axis];
         }
-        found.push(Arrival { length_m, departure, arrival, energy: 1.0 / (length_m * length_m) });
+        let surfaces = number.checked_sub(1).into_iter().collect();
+        found.push(Arrival { length_m, departure, arrival, energy: 1.0 / (length_m * length_m), surfaces });
     }
     found.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
     found

@@ -96,9 +96,11 @@ pub use effect::{
 };
 pub use effects::*;
 pub use error::Error;
+pub use extend::displaced_surface::DisplacedSurface;
 pub use extend::extended_model::{CoupledDecay, Dimensions, ExtendedModel, GainOverTime, ThinPanel};
 pub use extend::extended_room::ExtendedRoom;
 pub use extend::model_change::ModelChange;
+pub use extend::moved_mesh::DisplacementError;
 pub use likelihood::multilateration::{UnassignedPeak, UnassignedPeaks};
 pub use observe::pre_arrival::PreArrival;
 pub use report::diagnosis::{
@@ -110,4 +112,5 @@ pub use simulate::tables::{Tables, Unprepared};
 pub use simulate::traced_views::{TracedPairView, TracedRoomView};
 pub use simulate::views::{ArrivalView, BandView};
 pub use survey::planes::Plane;
+pub use survey::surfaces::Surface;
 pub use survey::{Place, Survey, SurveyedResponse};

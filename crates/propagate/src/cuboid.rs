@@ -366,6 +366,37 @@ mod tests {
     }
 
     #[test]
+    fn images_are_the_specular_paths() {
+        let scene = scene(0.3);
+        let cuboid = Cuboid::find(&Surfaces::new(&scene).unwrap()).unwrap();
+        let (from, to) = ([0.4, 2.0, 1.2], [0.9, 3.5, 1.7]);
+        let mut paths = PathSet::new(6, 40.0);
+        cuboid.add_paths(&mut paths, from, to, 100_000, scene.materials(), 1);
+        let hits = paths.hit_counts();
+        let mut expected: Vec<(i64, Vec<u32>)> = (0..paths.len())
+            .map(|i| {
+                let own = &hits[paths.chains()[i] as usize * 6..][..6];
+                let millimetres = (f64::from(paths.lengths_m()[i]) * 1e3).round() as i64;
+                (millimetres, own.iter().map(|&n| u32::from(n)).collect())
+            })
+            .collect();
+        let mut found = Vec::new();
+        cuboid.for_each_image(from, to, 40.0, |image| {
+            let mut own = vec![0; 6];
+            image.reflections.iter().zip(cuboid.materials).for_each(|(n, m)| own[m as usize] += n);
+            found.push(((image.length_m * 1e3).round() as i64, own));
+        });
+        expected.sort();
+        found.sort();
+        assert_eq!(found.len(), expected.len());
+        for (a, b) in found.iter().zip(&expected) {
+            assert!((a.0 - b.0).abs() <= 1, "{a:?} {b:?}");
+        }
+        let reflections = |all: &[(i64, Vec<u32>)]| all.iter().map(|x| x.1.iter().sum::<u32>()).sum::<u32>();
+        assert_eq!(reflections(&found), reflections(&expected));
+    }
+
+    #[test]
     fn what_is_no_cuboid_is_left_alone() {
         let whole = scene(0.0);
         let part = Scene::new(

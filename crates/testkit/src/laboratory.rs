@@ -180,7 +180,8 @@ impl Laboratory {
         Ok(truth)
     }
 
-    /// The true mesh and materials with these effects at work: what a simulation would have to know.
+    /// The true mesh and materials with these effects at work, in the coordinates of the declared room: what a simulation would have to
+    /// know.
     ///
     /// # Errors
     /// As [`Laboratory::truth`].
@@ -194,11 +195,9 @@ impl Laboratory {
                 Material::new(column(&m.absorption)?, column(&m.scattering)?)
             })
             .collect::<Result<_, Error>>()?;
-        let vertices = self
-            .scene
-            .vertices()
-            .iter()
-            .map(|v| std::array::from_fn(|k| v[k] * truth.size_m[k] / self.truth.size_m[k]));
+        let vertices = self.scene.vertices().iter().map(|v| {
+            std::array::from_fn(|k| truth.origin_m[k] + v[k] * truth.size_m[k] / self.truth.size_m[k])
+        });
         let scene = self.scene.with_materials(materials)?;
         Scene::new(vertices.collect(), scene.triangles().to_vec(), scene.materials().to_vec())
     }

@@ -1,6 +1,7 @@
 //! What a case does to a prediction.
 
 use crate::effect::reflection_gate::ReflectionGate;
+use crate::extend::displaced_surface::DisplacedSurface;
 use crate::likelihood::multilateration::UnassignedPeaks;
 use crate::observe::pre_arrival::PreArrival;
 use crate::report::diagnosis::FoundParameter;
@@ -73,6 +74,12 @@ pub trait ReflectionEvidence {
 pub trait ArrivalTerm: Send + Sync {
     /// Seconds by which an arrival comes later.
     fn delay_s(&self, values: &[f64], arrival: &ArrivalView<'_>) -> f64;
+
+    /// The surface (index into [`Survey::surfaces`]) that it moves, and how, if it does nothing else: where several terms move surfaces,
+    /// the delay is that of the path in all mirrors as they stand, for which their own delays are no sum. None by default.
+    fn displaces(&self, _values: &[f64]) -> Option<(usize, DisplacedSurface)> {
+        None
+    }
 }
 
 /// A reflection that the mesh does not have. Its fit starts from the peaks that nothing predicted explains.

@@ -20,6 +20,7 @@ mod scattering;
 mod sound_speed;
 mod source_directivity;
 mod surface_absorption;
+mod surface_displacement;
 mod time_zero;
 mod transducer_response;
 mod truncation;
@@ -44,6 +45,7 @@ pub use scattering::Scattering;
 pub use sound_speed::SoundSpeed;
 pub use source_directivity::SourceDirectivity;
 pub use surface_absorption::SurfaceAbsorption;
+pub use surface_displacement::SurfaceDisplacement;
 pub use time_zero::TimeZeroOffset;
 pub use transducer_response::TransducerResponse;
 pub use truncation::Truncation;
@@ -76,6 +78,7 @@ pub fn catalogue() -> Vec<Box<dyn Effect>> {
         Box::new(ReceiverDirectivity),
         Box::new(ChannelResponse),
         Box::new(CoherentReflections),
+        Box::new(SurfaceDisplacement),
     ]
 }
 

@@ -1,5 +1,6 @@
 //! The room with its named causes at work, as a file from which sound can be rendered.
 
+use crate::extend::displaced_surface::DisplacedSurface;
 use sabine_scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -65,6 +66,9 @@ pub struct ExtendedModel {
     /// Scale of the room along each axis about the middle of its box, and shift in metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dimensions: Option<Dimensions>,
+    /// Surfaces of the mesh that stand elsewhere; each at most once. They are moved before the room is scaled.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub surfaces: Vec<DisplacedSurface>,
     /// Where sources and receivers stand that are not where the room file says, by name, in metres.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub position_m: BTreeMap<String, [f64; 3]>,
@@ -180,10 +184,10 @@ impl Dimensions {
         Self { scale, shift_m }
     }
 
-    /// A scene of this size.
-    pub(crate) fn applied(&self, scene: &Scene) -> Result<Scene, sabine_acoustics::Error> {
+    /// A scene of this size: scaled about the middle of the box of the room as stated.
+    pub(crate) fn applied(&self, stated: &Scene, scene: &Scene) -> Result<Scene, sabine_acoustics::Error> {
         let corner = |fold: fn(f64, f64) -> f64, from: f64, k: usize| {
-            scene.vertices().iter().map(|v| v[k]).fold(from, fold)
+            stated.vertices().iter().map(|v| v[k]).fold(from, fold)
         };
         let middle: [f64; 3] = std::array::from_fn(|k| {
             0.5 * (corner(f64::min, f64::INFINITY, k) + corner(f64::max, f64::NEG_INFINITY, k))

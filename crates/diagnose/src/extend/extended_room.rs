@@ -2,8 +2,12 @@
 
 use crate::config::CUBOID_PATHS;
 use crate::error::Error;
-use crate::extend::extended_model::{Dimensions, ExtendedModel};
+use crate::extend::displaced_surface::DisplacedSurface;
+use crate::extend::extended_model::{Dimensions, ExtendedModel, ThinPanel};
+use crate::extend::moved_mesh::{check_places, displaced};
 use crate::extend::recording_chain::RecordingChain;
+use crate::survey::planes::dot;
+use crate::survey::surfaces::{minus, unit};
 use sabine_acoustics::{
     Air, Bands, Directivity, Error as Cause, ImpulseResponse, Material, Orientation, OutOfRange, PerBand,
     write_atomically,
@@ -13,6 +17,9 @@ use sabine_scene::{MeasuredRoom, NamedMaterial, Receiver, Scene, Source, Triangl
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::Path;
+
+/// A sheet whose corners are no farther from a surface than this lies on it, in metres.
+const ON_SURFACE_M: f64 = 0.02;
 
 /// A field and what is wrong with it.
 type Fault = (String, Cause);
@@ -149,15 +156,23 @@ impl ExtendedModel {
     /// The room as the model has it. Octaves that the model lacks take the nearest one's values.
     ///
     /// # Errors
+    /// [`Error::Displacement`] for surfaces that cannot stand where the model has them;
     /// [`Error::InModel`] naming the field, for a name that the room does not have, a list that is not as long as `centres_hz`, a
     /// value out of range, or a source whose axis neither the model nor the room file states.
     pub fn room(&self, room: &MeasuredRoom) -> Result<ExtendedRoom, Error> {
-        self.build(room).map_err(|(field, source)| Error::InModel { field, source: Box::new(source) })
+        let in_model = |(field, source): Fault| Error::InModel { field, source: Box::new(source) };
+        let own = self.check().map_err(in_model)?;
+        self.check_names(room).map_err(in_model)?;
+        let moved = displaced(room.scene(), &self.surfaces)?;
+        let built = self.build(room, own, &moved).map_err(in_model)?;
+        if !self.surfaces.is_empty() {
+            check_places(room.scene(), &moved, &built.sources, &built.receivers)?;
+        }
+        Ok(built)
     }
 
-    fn build(&self, room: &MeasuredRoom) -> Result<ExtendedRoom, Fault> {
-        let own = self.check()?;
-        self.check_names(room)?;
+    /// The room of a mesh whose surfaces stand where the model has them.
+    fn build(&self, room: &MeasuredRoom, own: Bands, moved: &Scene) -> Result<ExtendedRoom, Fault> {
         let bands = room.bands();
         let on_room = |values: &Vec<f64>| PerBand::new(own, values.clone()).map(|v| v.resampled(bands));
         let materials = room
@@ -176,7 +191,7 @@ impl ExtendedModel {
             })
             .collect::<Result<Vec<_>, Cause>>()
             .map_err(|e| ("absorption".to_owned(), e))?;
-        let scene = self.scene(room.scene(), materials).map_err(|e| ("dimensions".to_owned(), e))?;
+        let scene = self.scene(room.scene(), moved, materials).map_err(|e| ("dimensions".to_owned(), e))?;
         let stated = room.air();
         let humidity = self.relative_humidity_percent.unwrap_or(stated.relative_humidity_percent());
         let attenuation = Air::new(stated.temperature_c(), humidity, stated.pressure_kpa())
@@ -231,10 +246,24 @@ impl ExtendedModel {
         })
     }
 
-    fn scene(&self, stated: &Scene, materials: Vec<Material>) -> Result<Scene, Cause> {
-        let scene = self.with_sheets(stated.with_materials(materials)?)?;
+    fn scene(&self, stated: &Scene, moved: &Scene, materials: Vec<Material>) -> Result<Scene, Cause> {
+        let scene = self.with_sheets(moved.with_materials(materials)?)?;
         let Some(change) = &self.dimensions else { return Ok(scene) };
-        change.applied(&scene)
+        change.applied(stated, &scene)
+    }
+
+    /// Corners of a sheet. One that lies on a surface (a hole just before its wall) stands where that surface stands.
+    fn corners_of(&self, sheet: &ThinPanel) -> [[f64; 3]; 4] {
+        let lies_on = |surface: &&DisplacedSurface| {
+            let normal = unit(surface.normal);
+            sheet.corners_m.iter().all(|c| dot(normal, minus(*c, surface.point_m)).abs() < ON_SURFACE_M)
+        };
+        let Some(surface) = self.surfaces.iter().find(lies_on) else { return sheet.corners_m };
+        let normal = unit(surface.normal);
+        sheet.corners_m.map(|c| {
+            let farther_m = surface.farther_m(c);
+            std::array::from_fn(|k| c[k] + farther_m * normal[k])
+        })
     }
 
     /// The scene with the sheets in it, each of a material of its own.
@@ -247,7 +276,7 @@ impl ExtendedModel {
         let mut materials = scene.materials().to_vec();
         for (number, sheet) in self.sheets.iter().enumerate() {
             let (first, material) = (vertices.len() as u32, materials.len() as u32);
-            vertices.extend(sheet.corners_m);
+            vertices.extend(self.corners_of(sheet));
             for corners in [[0, 1, 2], [0, 2, 3]] {
                 triangles.push(Triangle { vertices: corners.map(|c| first + c), material });
             }
@@ -307,6 +336,13 @@ impl ExtendedModel {
         }
         for (name, &gain) in &self.response_gain_db {
             check.each(&format!("response_gain_db.{name}"), &[gain], (-200.0, 200.0), "within 200 dB")?;
+        }
+        for surface in &self.surfaces {
+            check.each("surfaces.point_m", &surface.point_m, (-1e5, 1e5), "a finite coordinate")?;
+            let length = dot(surface.normal, surface.normal).sqrt();
+            check.each("surfaces.normal", &[length], (0.99, 1.01), "a vector of length 1")?;
+            check.each("surfaces.offset_m", &[surface.offset_m], (-2.0, 2.0), "within 2 m")?;
+            check.each("surfaces.tilt_deg", &surface.tilt_deg, (-20.0, 20.0), "within 20 degrees")?;
         }
         for sheet in &self.sheets {
             let corners = sheet.corners_m.as_flattened();

@@ -1,7 +1,9 @@
 //! The model with the named causes in it, and its rendering.
 
+pub(crate) mod displaced_surface;
 pub(crate) mod extended_model;
 pub(crate) mod extended_room;
 pub(crate) mod extension;
 pub(crate) mod model_change;
+pub(crate) mod moved_mesh;
 pub(crate) mod recording_chain;

@@ -1,5 +1,6 @@
 //! A change of the model: what a named cause does to the room and to the recording.
 
+use crate::extend::displaced_surface::{DisplacedSurface, put};
 use crate::extend::extended_model::{CoupledDecay, Dimensions, ExtendedModel, GainOverTime, ThinPanel};
 use std::collections::BTreeMap;
 
@@ -42,6 +43,8 @@ pub enum ModelChange {
     Clock(f64),
     /// Size of the room.
     Dimensions(Dimensions),
+    /// A surface of the mesh stands elsewhere. Several make a room together, whatever their order; of one surface the last counts.
+    SurfaceDisplacement(DisplacedSurface),
     /// A flat surface that the mesh lacks.
     Panel(ThinPanel),
     /// Sound is diffracted at the edges of the mesh.
@@ -79,6 +82,16 @@ pub enum ModelChange {
     GainOverTime(GainOverTime),
 }
 
+impl ModelChange {
+    /// Whether the paths are others with it: the room is traced again.
+    pub(crate) fn moves_paths(&self) -> bool {
+        matches!(
+            self,
+            Self::Position { .. } | Self::Temperature(_) | Self::Dimensions(_) | Self::SurfaceDisplacement(_)
+        )
+    }
+}
+
 impl ExtendedModel {
     /// Takes a change into the model.
     pub fn apply(&mut self, change: ModelChange) {
@@ -101,6 +114,7 @@ impl ExtendedModel {
             ModelChange::Truncation(end_and_fade_s) => self.truncation = Some(end_and_fade_s),
             ModelChange::Clock(ppm) => self.clock_ppm = Some(ppm),
             ModelChange::Dimensions(dimensions) => self.dimensions = Some(dimensions),
+            ModelChange::SurfaceDisplacement(surface) => put(&mut self.surfaces, surface),
             ModelChange::Panel(panel) => self.sheets.push(panel),
             ModelChange::Diffraction => self.diffraction = true,
             ModelChange::CoherentReflections => self.coherent_reflections = true,

@@ -83,7 +83,7 @@ impl Baseline {
             seconds: BTreeMap::from([("trace", started.elapsed().as_secs_f64())]),
         };
         baseline.simulation.expand(&baseline.observations, false)?;
-        baseline.simulation.predict_arrivals()?;
+        baseline.simulation.predict_arrivals(&mut baseline.observations.survey)?;
         baseline.fit(observer)?;
         Ok(baseline)
     }
@@ -132,9 +132,21 @@ impl Baseline {
         Ok(refused)
     }
 
-    /// Takes a change of the model into the simulation, and expands it again where paths moved.
+    /// Takes a change of the model into the simulation, and expands it again where paths moved. Surfaces that cannot stand where they were
+    /// found stay where they are, and a note says so.
     pub fn retrace(&mut self, change: &ModelChange, cases: &[CatalogueCase]) -> Result<(), Error> {
-        if self.simulation.apply(change, &self.observations.survey)? { self.expand(cases) } else { Ok(()) }
+        match self.simulation.apply(change, &self.observations.survey) {
+            Ok(true) => self.expand(cases),
+            Ok(false) => Ok(()),
+            Err(Error::Displacement(reason)) => {
+                self.observations.notes.push(format!(
+                    "A surface cannot stand where arrival times say that it stands ({reason}): decays are predicted as if it stood where \
+                     the mesh has it."
+                ));
+                Ok(())
+            }
+            Err(other) => Err(other),
+        }
     }
 
     /// Predicts energies and tables again from the traced paths.
@@ -213,6 +225,7 @@ impl Baseline {
             measured: &self.observations.measured,
             arrivals: &self.simulation.arrivals,
             speed_m_s: &self.simulation.speed_m_s,
+            displaced: &self.simulation.displaced,
         }
     }
 

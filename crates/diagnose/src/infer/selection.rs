@@ -3,10 +3,11 @@
 use crate::effect::{Case, Observable};
 use crate::error::Error;
 use crate::extend::extension::changes;
+use crate::extend::model_change::ModelChange;
 use crate::infer::baseline::Baseline;
 use crate::infer::candidates::{CatalogueCase, EffectScore};
 use crate::infer::ray_dependence::MoreWithHalf;
-use crate::infer::search::Search;
+use crate::infer::search::{Search, State};
 use sabine_acoustics::Observer;
 
 /// What the search found.
@@ -72,6 +73,7 @@ pub(crate) fn select(
                 })
                 .collect();
             let threshold = search.threshold();
+            put_first_what_moves_paths(&search, &state, &mut ranked)?;
             let named_now = ranked.first().is_some_and(|best| best.nats >= threshold);
             let (mut rivals, mut interchangeable) = (Vec::new(), Vec::new());
             if named_now {
@@ -82,13 +84,17 @@ pub(crate) fn select(
         };
         if named.first.is_empty() {
             named.first.clone_from(&ranked);
+            named.first.sort_by(|a, b| b.nats.total_cmp(&a.nats));
         }
         let Some(best) = ranked.first().filter(|b| b.nats >= threshold) else {
             named.last = Some((named.chosen.clone(), ranked));
             break;
         };
         let strongest = best.nats.max(0.0);
-        let sum: f64 = ranked.iter().map(|r| (r.nats - strongest).exp()).sum::<f64>()
+        // One that was put first competes with those that bear on the same data.
+        let of_decays = |r: &&EffectScore| cases[r.best].case.observable() == Observable::Decay;
+        let competes = |r: &&EffectScore| of_decays(&best) || !of_decays(r) || r.nats <= best.nats;
+        let sum: f64 = ranked.iter().filter(competes).map(|r| (r.nats - strongest).exp()).sum::<f64>()
             + (threshold - baseline.config.naming_nats - strongest).exp();
         named.probabilities.push((best.best, (best.nats - strongest).exp() / sum));
         named.chosen.push(best.best);
@@ -125,6 +131,27 @@ pub(crate) fn select(
     }
     named.chosen = state.chosen;
     Ok(named)
+}
+
+/// Puts a cause that moves paths before those of decays alone, if it is worth a name by arrival times. Arrival times do not depend on what
+/// decays; decays are predicted along the paths, and in a room whose walls stand elsewhere they speak for causes that are none.
+fn put_first_what_moves_paths(
+    search: &Search<'_>,
+    state: &State,
+    ranked: &mut Vec<EffectScore>,
+) -> Result<(), Error> {
+    let observable = |r: &EffectScore| search.candidates[r.best].case.observable();
+    let Some(place) = ranked.iter().position(|r| observable(r) != Observable::Decay) else { return Ok(()) };
+    let first = &ranked[place];
+    if place == 0 || first.nats < search.threshold() || observable(first) != Observable::Arrivals {
+        return Ok(());
+    }
+    let with_it = search.with(state, first.best)?;
+    if changes(search, &with_it, first.best).iter().any(ModelChange::moves_paths) {
+        let first = ranked.remove(place);
+        ranked.insert(0, first);
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ mod unassigned_peaks;
 
 use crate::effect::Case;
 use crate::error::Error;
+use crate::extend::displaced_surface::DisplacedSurface;
 use crate::likelihood::laplace::{LaplaceFit, Model, Prior, Slopes, maximise};
 use crate::likelihood::parameters::{ArrivalLayout, ModelTerm, ModelTerms};
 use crate::observe::observed_response::{Measured, PEAK_FLOOR_DB, PEAKS_S};
@@ -33,8 +34,8 @@ const MISREAD_SHARE: f64 = 0.02;
 const WIDTHS_S: [f64; 3] = [4e-4, 1.2e-4, 0.0];
 /// Standard deviations from which a normal density counts as nothing: 5e-32 of its top.
 const FAR_SD: f64 = 12.0;
-/// Of the starts that an effect offers, those that are followed.
-const MAX_STARTS: usize = 3;
+/// Of the starts that an effect offers, those that are followed from the widest of these on, and from the next one on.
+const MAX_STARTS: [usize; 2] = [3, 2];
 /// Latency of a recording whose time zero means nothing.
 const FREE_LATENCY_S: f64 = 1.0;
 /// Time zero where the file says that it is the emission: half a sample or so.
@@ -46,6 +47,8 @@ pub(crate) struct ArrivalData<'a> {
     /// Predicted arrivals of each pair, the shortest first; empty where the direct line is blocked.
     pub arrivals: &'a [Vec<Arrival>],
     pub speed_m_s: &'a [f64],
+    /// Surfaces that stand elsewhere in the paths as they were traced last; the arrivals are those of the room as stated.
+    pub displaced: &'a [(usize, DisplacedSurface)],
 }
 
 pub(crate) struct ArrivalModel<'a> {
@@ -87,11 +90,24 @@ impl<'a> ArrivalModel<'a> {
     }
 
     fn effect_delay_s(&self, values: &[f64], view: &ArrivalView<'_>) -> f64 {
-        let delay_s = |p: &ModelTerm<'_>| p.case.arrival_term().map(|term| term.delay_s(p.own(values), view));
-        self.terms.iter().filter_map(delay_s).sum()
+        let delay_s = |p: &ModelTerm<'_>| {
+            let term = p.case.arrival_term().filter(|term| term.displaces(p.own(values)).is_none())?;
+            Some(term.delay_s(p.own(values), view))
+        };
+        let displaced = self.displaced(values, None);
+        self.terms.iter().filter_map(delay_s).sum::<f64>() + view.delay_by_displaced_s(&displaced)
     }
 
-    fn view(&self, pair: usize, arrival: &Arrival) -> ArrivalView<'_> {
+    /// All surfaces that the terms move; `instead` are other values of one term (its number).
+    fn displaced(&self, values: &[f64], instead: Option<(usize, &[f64])>) -> Vec<(usize, DisplacedSurface)> {
+        let one = |(number, placed): (usize, &ModelTerm<'_>)| {
+            let own = instead.filter(|(n, _)| *n == number).map_or(placed.own(values), |(_, own)| own);
+            placed.case.arrival_term()?.displaces(own)
+        };
+        self.terms.iter().enumerate().filter_map(one).collect()
+    }
+
+    fn view<'v>(&'v self, pair: usize, arrival: &'v Arrival) -> ArrivalView<'v> {
         ArrivalView {
             survey: self.data.survey,
             pair,
@@ -99,6 +115,7 @@ impl<'a> ArrivalModel<'a> {
             speed_m_s: self.data.speed_m_s[pair],
             departure: arrival.departure,
             arrival: arrival.arrival,
+            surfaces: &arrival.surfaces,
         }
     }
 
@@ -131,15 +148,23 @@ impl<'a> ArrivalModel<'a> {
         }
         found.push((self.layout.latency(self.assignment[pair]), 1.0));
         let view = self.view(pair, arrival);
-        for placed in &self.terms {
+        for (number, placed) in self.terms.iter().enumerate() {
             let Some(term) = placed.case.arrival_term() else { continue };
             let mut own = placed.own(values).to_vec();
+            let displaces = term.displaces(&own).map(|(surface, _)| surface);
+            if displaces.is_some_and(|surface| !arrival.surfaces.contains(&surface)) {
+                continue;
+            }
             for i in 0..own.len() {
                 let (index, value) = (placed.first + i, own[i]);
                 let step = 1e-4 * self.priors[index].sd;
                 let mut at = |moved: f64| {
                     own[i] = moved;
-                    term.delay_s(&own, &view)
+                    if displaces.is_some() {
+                        view.delay_by_displaced_s(&self.displaced(values, Some((number, &own))))
+                    } else {
+                        term.delay_s(&own, &view)
+                    }
                 };
                 let (later, earlier) = (at(value + step), at(value - step));
                 own[i] = value;
@@ -147,6 +172,12 @@ impl<'a> ArrivalModel<'a> {
             }
         }
         found
+    }
+
+    /// The same, for tests of effects.
+    #[cfg(test)]
+    pub fn arrival_s(&self, values: &[f64], pair: usize, arrival: &Arrival) -> f64 {
+        self.time_s(values, pair, arrival)
     }
 
     fn pair_likelihood(&self, values: &[f64], pair: usize, mut slopes: Option<&mut Slopes>) -> f64 {
@@ -263,12 +294,12 @@ pub(crate) fn fit(
     // others away.
     let direct = maximise(&model, &start, "arrival times")?.values;
     let mut firsts = offered(&mut model, &start);
-    firsts.extend([direct, start]);
-    for first in firsts {
+    firsts.extend([(direct, 0), (start, 0)]);
+    for (first, widest) in firsts {
         let mut x = first;
         let mut found = None;
-        for width_s in WIDTHS_S {
-            model.width_s = Some(width_s);
+        for width_s in &WIDTHS_S[widest..] {
+            model.width_s = Some(*width_s);
             let top = maximise(&model, &x, "arrival times")?;
             x = top.values.clone();
             found = Some(top);
@@ -281,10 +312,10 @@ pub(crate) fn fit(
     best.map(|b| (b, places)).ok_or(Error::Singular { what: "arrival times" })
 }
 
-/// The most promising of the values that the effects offer to start from: reflections that lie several of their distances off find no
-/// partners from the neutral values.
-fn offered(model: &mut ArrivalModel<'_>, neutral: &[f64]) -> Vec<Vec<f64>> {
-    model.width_s = Some(WIDTHS_S[0]);
+/// The most promising of the values that the effects offer to start from, and the width ([`WIDTHS_S`]) with which each is followed:
+/// reflections that lie several of their distances off find no partners from the neutral values. Where reflections are dense, the widest
+/// hardly tells one start from another; the next one does, where starts are so close that one is near the truth.
+fn offered(model: &mut ArrivalModel<'_>, neutral: &[f64]) -> Vec<(Vec<f64>, usize)> {
     let mut starts: Vec<Vec<f64>> = Vec::new();
     for placed in &model.terms {
         let options = &placed.case.starts;
@@ -295,11 +326,19 @@ fn offered(model: &mut ArrivalModel<'_>, neutral: &[f64]) -> Vec<Vec<f64>> {
             x
         }));
     }
-    let mut ranked: Vec<(f64, Vec<f64>)> =
-        starts.into_iter().map(|x| (model.log_likelihood(&x, None), x)).collect();
-    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut found: Vec<(Vec<f64>, usize)> = Vec::new();
+    for (width, count) in MAX_STARTS.into_iter().enumerate() {
+        model.width_s = Some(WIDTHS_S[width]);
+        let mut ranked: Vec<(f64, &Vec<f64>)> =
+            starts.iter().map(|x| (model.log_likelihood(x, None), x)).collect();
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+        // From what is less probable than the neutral values nothing is reached that these would not reach.
+        let least = model.log_likelihood(neutral, None);
+        let better = ranked.into_iter().take(count).filter(|(likelihood, _)| *likelihood > least);
+        found.extend(better.map(|(_, x)| (x.clone(), width)));
+    }
     model.width_s = None;
-    ranked.into_iter().take(MAX_STARTS).map(|(_, x)| x).collect()
+    found
 }
 
 impl Measured {
@@ -322,14 +361,22 @@ pub(crate) fn at_fit<'a>(
 mod tests {
     use super::*;
     use crate::effect::Effect;
-    use crate::effects::{PositionError, RoomDimensions, SamplingClock, SoundSpeed, TimeZeroOffset};
+    use crate::effects::{
+        PositionError, RoomDimensions, SamplingClock, SoundSpeed, SurfaceDisplacement, TimeZeroOffset,
+    };
     use crate::hand_made::Tables;
     use sabine_scene::Levels;
 
     #[test]
     fn the_gradient_is_that_of_central_differences() {
-        let effects: [&dyn Effect; 5] =
-            [&PositionError, &RoomDimensions, &SamplingClock, &SoundSpeed, &TimeZeroOffset];
+        let effects: [&dyn Effect; 6] = [
+            &PositionError,
+            &RoomDimensions,
+            &SamplingClock,
+            &SoundSpeed,
+            &SurfaceDisplacement,
+            &TimeZeroOffset,
+        ];
         for time_zero in [TimeZero::Emission, TimeZero::Common, TimeZero::PerResponse] {
             let tables = Tables::new(Levels::Common, time_zero);
             let data = tables.arrival_data();

@@ -6,6 +6,7 @@ use crate::observe::observed_response::Measured;
 use crate::observe::pre_arrival::PreArrival;
 use crate::statistics::median;
 use crate::survey::planes::planes;
+use crate::survey::surfaces::Surfaces;
 use crate::survey::{Place, Survey, SurveyedResponse};
 use sabine_acoustics::{ImpulseResponse, Material, Observer, report};
 use sabine_scene::{MeasuredRoom, Receiver, Source, TimeZero};
@@ -169,6 +170,7 @@ fn survey_of(room: &MeasuredRoom, position_sd_m: f64) -> Survey {
     let receiver = |r: &Receiver| place(&r.id, r.position_m, r.axis, known.receiver_m(&r.id));
     Survey {
         planes,
+        surfaces: Surfaces::of(room.scene()).described(room.scene()),
         material_areas_m2,
         diffracted: Vec::new(),
         bands: room.bands(),

@@ -3,6 +3,7 @@
 pub(crate) mod edges;
 pub(crate) mod hit_groups;
 pub(crate) mod local_reaction;
+pub(crate) mod met_surfaces;
 pub(crate) mod monte_carlo_modes;
 pub(crate) mod path_chances;
 pub(crate) mod reflection_reweighting;

@@ -4,9 +4,13 @@ mod retracing;
 
 use crate::config::DiagnoseConfig;
 use crate::error::Error;
+use crate::extend::displaced_surface::DisplacedSurface;
+use crate::extend::extended_model::Dimensions;
+use crate::extend::moved_mesh::find_ranges;
 use crate::observe::observations::Observations;
 use crate::observe::observed_response::PEAKS_S;
 use crate::simulate::edges::Edges;
+use crate::simulate::met_surfaces::MetSurfaces;
 use crate::simulate::monte_carlo_modes;
 #[cfg(test)]
 use crate::simulate::scene_tracer::Rays;
@@ -15,7 +19,9 @@ use crate::simulate::tables::Tables;
 use crate::simulate::traced_pair::{Arrival, BandState, IsolatedReflection, TracedPair};
 use crate::simulate::traced_room::{trace, traced_s, traced_scene, traced_until_s};
 #[cfg(test)]
-use crate::survey::{Place, Survey};
+use crate::survey::Place;
+use crate::survey::Survey;
+use crate::survey::surfaces::{Surfaces, count_reflections};
 use rayon::prelude::*;
 use sabine_acoustics::{Material, Observer, PerBand};
 use sabine_scene::{MeasuredRoom, Receiver, Scene, Source};
@@ -57,8 +63,16 @@ pub(crate) struct Simulation {
     warmer_k: f64,
     /// What is traced: the mesh, with scattering spread over the bands.
     scene: Scene,
-    /// The same at the size that was found.
+    /// The same at the size, and with its surfaces in the places, that were found.
     resized: Option<Scene>,
+    /// The size that was found.
+    dimensions: Option<Dimensions>,
+    /// Surfaces that were found to stand elsewhere, by their number.
+    pub displaced: Vec<(usize, DisplacedSurface)>,
+    /// The surfaces of the mesh as stated.
+    surfaces: Arc<Surfaces>,
+    /// Which of them the paths meet in the mesh as it is traced.
+    met: Arc<MetSurfaces>,
     tracer: Arc<dyn SceneTracer>,
     prepared: Box<dyn PreparedTracer>,
     edges: Option<Edges>,
@@ -84,6 +98,7 @@ impl Simulation {
         let prepared = tracer.prepare(&scene, traced_until_s)?;
         prepared.check(source_m)?;
         let edges = Edges::find(&scene)?;
+        let surfaces = Arc::new(Surfaces::of(&scene));
         let places = (room.sources(), room.receivers());
         let pairs = trace(places, survey, &materials, (&*prepared, edges.as_ref()), observer)?;
         let clamped = |m: &Material| {
@@ -106,8 +121,12 @@ impl Simulation {
             traced_s,
             traced_until_s,
             warmer_k: 0.0,
+            met: Arc::new(MetSurfaces::new(&scene, &surfaces)?),
+            surfaces,
             scene,
             resized: None,
+            dimensions: None,
+            displaced: Vec::new(),
             tracer: Arc::clone(tracer),
             prepared,
             edges,
@@ -140,8 +159,17 @@ impl Simulation {
         let one = |pair: &TracedPair| pair.expand(&materials, &observations.pulses, self.traced_s);
         self.states = self.pairs.par_iter().map(one).collect::<Result<_, _>>()?;
         if reflections {
-            let one = |pair: &TracedPair| pair.isolated_reflections(&materials, PEAKS_S);
-            self.isolated_reflections = self.pairs.par_iter().map(one).collect::<Result<_, _>>()?;
+            let one = |(index, pair): (usize, &TracedPair)| -> Result<_, Error> {
+                let (mut found, states) = pair.isolated_reflections(&materials, PEAKS_S)?;
+                let places_m = self.places_m(&observations.survey, index);
+                for r in &mut found {
+                    let met = self.met.of(places_m, r.length_m, [r.departure, r.arrival]);
+                    r.surfaces = met.unwrap_or_default();
+                }
+                Ok((found, states))
+            };
+            self.isolated_reflections =
+                self.pairs.par_iter().enumerate().map(one).collect::<Result<_, _>>()?;
         }
         self.ends =
             self.states.iter().map(|s| s.iter().map(|b| range_end(b, self.range_db)).collect()).collect();
@@ -164,14 +192,32 @@ impl Simulation {
         Ok(())
     }
 
-    /// Predicts the arrivals of all pairs; none where the direct line is blocked.
-    pub fn predict_arrivals(&mut self) -> Result<(), Error> {
+    /// Predicts the arrivals of all pairs; none where the direct line is blocked. The survey learns which surfaces they meet, and how far
+    /// these can be moved.
+    pub fn predict_arrivals(&mut self, survey: &mut Survey) -> Result<(), Error> {
         let materials = self.expanded_materials()?;
-        for pair in &self.pairs {
-            let found = pair.arrivals(&materials, PEAKS_S * ARRIVALS_MARGIN)?;
-            self.arrivals.push(if pair.has_direct() { found } else { Vec::new() });
-        }
+        let one = |(index, pair): (usize, &TracedPair)| -> Result<Vec<Arrival>, Error> {
+            if !pair.has_direct() {
+                return Ok(Vec::new());
+            }
+            let mut found = pair.arrivals(&materials, PEAKS_S * ARRIVALS_MARGIN)?;
+            let places_m = self.places_m(survey, index);
+            for a in &mut found {
+                a.surfaces = self.met.of(places_m, a.length_m, [a.departure, a.arrival]).unwrap_or_default();
+            }
+            Ok(found)
+        };
+        self.arrivals = self.pairs.par_iter().enumerate().map(one).collect::<Result<_, _>>()?;
+        let paths = self.arrivals.iter().flatten().map(|a| (a.departure, &a.surfaces[..]));
+        count_reflections(&mut survey.surfaces, paths);
+        find_ranges(&self.scene, &self.surfaces, survey);
         Ok(())
+    }
+
+    /// Where the source and the receiver of a pair stand.
+    fn places_m(&self, survey: &Survey, pair: usize) -> [[f64; 3]; 2] {
+        let response = &survey.responses[pair];
+        [self.sources[response.source].position_m, self.receivers[response.receiver].position_m]
     }
 }
 
@@ -209,9 +255,13 @@ impl Simulation {
             traced_until_s: 0.3,
             warmer_k: 0.0,
             prepared: tracer.prepare(&scene, 0.3)?,
+            met: Arc::new(MetSurfaces::new(&scene, &Surfaces::of(&scene))?),
+            surfaces: Arc::new(Surfaces::of(&scene)),
             tracer,
             scene,
             resized: None,
+            dimensions: None,
+            displaced: Vec::new(),
             edges: None,
             sources: survey.sources.iter().map(source).collect::<Result<_, _>>()?,
             receivers: survey.receivers.iter().map(receiver).collect::<Result<_, _>>()?,

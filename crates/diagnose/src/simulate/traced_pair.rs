@@ -31,13 +31,15 @@ const ISOLATED: u16 = u16::MAX;
 const NOTHING: f64 = 1e-12;
 
 /// A path that was found exactly.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Arrival {
     pub length_m: f64,
     pub departure: [f64; 3],
     pub arrival: [f64; 3],
     /// Energy in the mean over the bands.
     pub energy: f64,
+    /// Surfaces (indices) that it meets, from the source on; none where it could not be followed.
+    pub surfaces: Vec<usize>,
 }
 
 /// Paths of one pair with what does not change from fit to fit.
@@ -192,7 +194,7 @@ impl TracedPair {
         (self.cells, self.isolated) = in_cells(&self.paths, &self.times_s);
     }
 
-    /// The exact paths, the shortest first.
+    /// The exact paths, the shortest first. Which surfaces they meet is not filled in.
     pub fn arrivals(&self, materials: &[Material], within_s: f64) -> Result<Vec<Arrival>, Error> {
         let energies = self.paths.energies(&Conditions::new(materials, &self.air))?;
         let mut found: Vec<Arrival> = (0..self.paths.len())
@@ -202,6 +204,7 @@ impl TracedPair {
                 departure: self.paths.departure(i),
                 arrival: self.paths.arrival(i),
                 energy: energies.iter().map(|e| f64::from(e[i])).sum::<f64>() / energies.len() as f64,
+                surfaces: Vec::new(),
             })
             .collect();
         found.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));

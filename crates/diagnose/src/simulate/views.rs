@@ -1,5 +1,6 @@
 //! What an effect is shown of a prediction.
 
+use crate::extend::displaced_surface::{DisplacedSurface, longer_m};
 use crate::simulate::reflection_reweighting::HitChanges;
 use crate::simulate::tables::Tables;
 use crate::simulate::traced_pair::BandState;
@@ -133,6 +134,7 @@ pub struct ArrivalView<'a> {
     pub(crate) speed_m_s: f64,
     pub(crate) departure: [f64; 3],
     pub(crate) arrival: [f64; 3],
+    pub(crate) surfaces: &'a [usize],
 }
 
 impl ArrivalView<'_> {
@@ -169,5 +171,17 @@ impl ArrivalView<'_> {
     /// Unit vector from the receiver towards where the path comes from.
     pub fn arrival(&self) -> [f64; 3] {
         self.arrival
+    }
+
+    /// The surfaces (indices into [`Survey::surfaces`]) that mirror it, from the source on. Empty for the direct sound, and for a path that
+    /// meets surfaces so near to their edges that it cannot be followed.
+    pub fn surfaces(&self) -> &[usize] {
+        self.surfaces
+    }
+
+    /// Seconds by which it comes later if surfaces (indices into [`Survey::surfaces`]) stand elsewhere: exact for a specular path, whose
+    /// source has its image in the mirrors as they stand. Zero where it meets none of them.
+    pub fn delay_by_displaced_s(&self, displaced: &[(usize, DisplacedSurface)]) -> f64 {
+        longer_m(self.survey, self.pair(), self.surfaces, displaced) / self.speed_m_s
     }
 }

@@ -1,8 +1,10 @@
 //! What was measured, as effects see it.
 
 pub(crate) mod planes;
+pub(crate) mod surfaces;
 
 use crate::survey::planes::Plane;
+use crate::survey::surfaces::Surface;
 use sabine_acoustics::{Air, Bands};
 use sabine_scene::Measurement;
 
@@ -54,6 +56,7 @@ pub struct Survey {
     pub(crate) box_m: [[f64; 3]; 2],
     pub(crate) declared_scattering: f64,
     pub(crate) planes: Vec<Plane>,
+    pub(crate) surfaces: Vec<Surface>,
     pub(crate) material_areas_m2: Vec<f64>,
     pub(crate) diffracted: Vec<usize>,
     /// Lowest bands for which there is a wave solution.
@@ -106,9 +109,14 @@ impl Survey {
         self.box_m
     }
 
-    /// The largest flat surfaces of the mesh.
+    /// The largest flat surfaces of the mesh, each of one material.
     pub fn planes(&self) -> &[Plane] {
         &self.planes
+    }
+
+    /// All planar surfaces of the mesh, whatever they are made of, in the order of their first triangles.
+    pub fn surfaces(&self) -> &[Surface] {
+        &self.surfaces
     }
 
     /// Responses (indices) whose source and receiver do not see each other, with an edge of the mesh between them.

@@ -3,8 +3,8 @@
 use sabine_scene::Scene;
 
 /// Triangles whose normals differ by less (one less their cosine), and whose planes by less than this in metres, lie in one plane.
-const TILT: f64 = 1e-4;
-const STEP_M: f64 = 5e-3;
+pub(crate) const TILT: f64 = 1e-4;
+pub(crate) const STEP_M: f64 = 5e-3;
 /// Surfaces smaller than this are left out, in square metres.
 const MIN_M2: f64 = 1.0;
 /// Surfaces at most, the largest.
@@ -43,11 +43,11 @@ impl Plane {
     }
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|k| a[k] * b[k]).sum()
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 

@@ -94,6 +94,49 @@ fn a_room_of_other_size_is_found() {
     }
 }
 
+fn a_face_that_stands_elsewhere_is_found(seed: u64, face: usize, offset_m: f64) {
+    let lab = lab(seed);
+    let hidden = [Hidden::SurfaceDisplacement { face, offset_m }];
+    let found = diagnose(&lab, &hidden);
+    let cause = only_cause(&found, "surface_displacement");
+    let offset = &cause.parameters[0];
+    assert!(offset.name == "offset" && (offset.value - offset_m).abs() < 0.01, "{offset:?} {offset_m}");
+    // The face that was moved, and no tilt to speak of.
+    let [surface] = &found.model.surfaces[..] else { panic!("{:?}", found.model.surfaces) };
+    let axis = face / 2;
+    let mut normal = [0.0; 3];
+    normal[axis] = if face.is_multiple_of(2) { -1.0 } else { 1.0 };
+    assert!((0..3).all(|k| (surface.normal[k] - normal[k]).abs() < 1e-6), "{surface:?}");
+    assert!(surface.tilt_deg.iter().all(|t| t.abs() < 0.5), "{surface:?}");
+    // Rendered: the extended model's mesh ends where the true box does.
+    let folder = tempfile::tempdir().unwrap();
+    let room = lab.write(&hidden, &folder.path().join("room"), None).unwrap();
+    let end = |vertices: &[[f64; 3]]| {
+        let along = vertices.iter().map(|v| normal[axis] * v[axis]);
+        along.fold(f64::NEG_INFINITY, f64::max)
+    };
+    let extended = found.model.room(&room).unwrap();
+    let truth = lab.true_scene(&hidden).unwrap();
+    let (rendered, true_m) = (end(extended.scene.vertices()), end(truth.vertices()));
+    assert!((rendered - true_m).abs() < 0.02, "{rendered} {true_m}");
+    let path = folder.path().join("extended_model.toml");
+    found.model.write(&path).unwrap();
+    assert_eq!(ExtendedModel::read(&path).unwrap(), found.model);
+}
+
+#[test]
+fn a_wall_that_stands_elsewhere_is_found() {
+    a_face_that_stands_elsewhere_is_found(551, 2, 0.35);
+}
+
+#[test]
+#[ignore = "nightly: minutes, and a lighter one is not ignored"]
+fn walls_floors_and_ceilings_that_stand_elsewhere_are_found() {
+    for (seed, face, offset_m) in [(552, 1, -0.3), (553, 5, 0.25), (554, 4, -0.2), (555, 3, 0.45)] {
+        a_face_that_stands_elsewhere_is_found(seed, face, offset_m);
+    }
+}
+
 #[test]
 fn a_cut_end_is_found() {
     let lab = lab(515);

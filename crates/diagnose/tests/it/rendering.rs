@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
 use sabine_acoustics::{Bands, FilterBank, ImpulseResponse, SampleFormat, Signal, encode_wav};
-use sabine_diagnose::{Error, ExtendedModel, ExtendedRoom};
+use sabine_diagnose::{DisplacementError, Error, ExtendedModel, ExtendedRoom};
 use sabine_paths::{Conditions, Propagator};
 use sabine_propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use sabine_scene::MeasuredRoom;
@@ -366,4 +366,75 @@ fn a_channel_has_its_own_octaves() {
     let (_folder, path) = in_file("response_band_gain_db.nobody = [0, 0, 0, 0, 0, 0, 0]");
     let error = ExtendedModel::read(path).unwrap().room(&fixture()).unwrap_err().to_string();
     assert!(error.contains("response_band_gain_db") && error.contains("nobody"), "{error}");
+}
+
+const END_WALL: &str =
+    "[[surfaces]]\npoint_m = [POINT]\nnormal = [NORMAL]\noffset_m = OFFSET\ntilt_deg = [0.0, TILT]\n";
+
+/// The fixture's wall at its greatest x, displaced.
+fn end_wall(offset_m: f64, tilt_deg: f64) -> (String, f64) {
+    let room = fixture();
+    let far = room.scene().vertices().iter().map(|v| v[0]).fold(f64::NEG_INFINITY, f64::max);
+    let corners: Vec<&[f64; 3]> =
+        room.scene().vertices().iter().filter(|v| (v[0] - far).abs() < 1e-9).collect();
+    let middle = |k: usize| corners.iter().map(|c| c[k]).sum::<f64>() / corners.len() as f64;
+    let text = END_WALL
+        .replace("POINT", &format!("{far}, {}, {}", middle(1), middle(2)))
+        .replace("NORMAL", "1.0, 0.0, 0.0")
+        .replace("OFFSET", &format!("{offset_m:?}"))
+        .replace("TILT", &format!("{tilt_deg:?}"));
+    (text, far)
+}
+
+fn farthest_x(room: &ExtendedRoom) -> f64 {
+    room.scene.vertices().iter().map(|v| v[0]).fold(f64::NEG_INFINITY, f64::max)
+}
+
+#[test]
+fn a_displaced_surface_comes_out_of_its_file_where_it_stands() {
+    let (text, far) = end_wall(0.3, 0.0);
+    let room = extended(&text);
+    assert!((farthest_x(&room) - far - 0.3).abs() < 1e-9);
+    // Back to a file and in again.
+    let (_folder, path) = in_file(&text);
+    let model = ExtendedModel::read(&path).unwrap();
+    model.write(&path).unwrap();
+    assert_eq!(ExtendedModel::read(&path).unwrap(), model);
+    // It leans: the upper edge is farther out, the lower one less.
+    let (text, _) = end_wall(0.3, 2.0);
+    assert!(farthest_x(&extended(&text)) > far + 0.31);
+    // A sheet on the wall stands where the wall stands; one elsewhere stays.
+    let x = far - 0.005;
+    let sheet = |x: f64| {
+        format!(
+            "[[sheets]]\nabsorption = 1.0\ncorners_m = [[{x}, 1.0, 1.0], [{x}, 2.0, 1.0], [{x}, 2.0, 2.0], [{x}, 1.0, 2.0]]\n"
+        )
+    };
+    let (text, _) = end_wall(0.3, 0.0);
+    let with_sheets = extended(&format!("{text}{}{}", sheet(x), sheet(far - 1.0)));
+    let first = with_sheets.scene.vertices().len() - 8;
+    assert!((with_sheets.scene.vertices()[first][0] - x - 0.3).abs() < 1e-9);
+    assert!((with_sheets.scene.vertices()[first + 4][0] - far + 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_surface_that_cannot_stand_there_is_refused_by_name() {
+    let refused = |text: &str| {
+        let (_folder, path) = in_file(text);
+        ExtendedModel::read(path).and_then(|model| model.room(&fixture())).unwrap_err()
+    };
+    let (text, _) = end_wall(0.1, 0.0);
+    let elsewhere = text.replace("normal = [1.0, 0.0, 0.0]", "normal = [0.0, 0.6, 0.8]");
+    let error = refused(&elsewhere);
+    assert!(matches!(error, Error::Displacement(DisplacementError::NoSurface { .. })), "{error}");
+    let error = refused(&format!("{text}{text}"));
+    assert!(matches!(error, Error::Displacement(DisplacementError::Twice { .. })), "{error}");
+    for (from, to, field) in [
+        ("offset_m = 0.1", "offset_m = 3.0", "surfaces.offset_m"),
+        ("normal = [1.0, 0.0, 0.0]", "normal = [2.0, 0.0, 0.0]", "surfaces.normal"),
+        ("tilt_deg = [0.0, 0.0]", "tilt_deg = [0.0, 45.0]", "surfaces.tilt_deg"),
+    ] {
+        let error = refused(&text.replace(from, to)).to_string();
+        assert!(error.contains(field), "{error}");
+    }
 }

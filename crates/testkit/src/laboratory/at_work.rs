@@ -60,6 +60,7 @@ impl Hidden {
             Self::RoomDimensions { scale } => {
                 truth.size_m.iter_mut().zip(scale).for_each(|(l, s)| *l *= s);
             }
+            Self::SurfaceDisplacement { face, offset_m } => displace(truth, *face, *offset_m)?,
             Self::PositionError { end, index, offset_m } => {
                 let position = match end {
                     End::Source => &mut truth.sources[*index].position_m,
@@ -94,6 +95,36 @@ impl Hidden {
         truth.effects.push(self.clone());
         Ok(())
     }
+}
+
+/// Moves a face of the box out. The corner at which coordinates begin goes with it, so that places count from elsewhere.
+fn displace(truth: &mut Truth, face: usize, offset_m: f64) -> Result<(), Error> {
+    const NEAREST_M: f64 = 0.05;
+    if face >= 6 {
+        return Err(Error::Index { what: "face", index: face, count: 6 });
+    }
+    OutOfRange::check("offset of a face (m)", offset_m, -1.0, 1.0, "within 1 m")?;
+    let axis = face / 2;
+    truth.size_m[axis] += offset_m;
+    let places = truth.sources.iter_mut().map(|s| &mut s.position_m).chain(&mut truth.receivers_m);
+    let (low, side) = (face.is_multiple_of(2), truth.size_m[axis]);
+    for place in places {
+        if low {
+            place[axis] += offset_m;
+        }
+        let range = "at least 5 cm before it";
+        OutOfRange::check(
+            "place before a displaced face (m)",
+            place[axis],
+            NEAREST_M,
+            side - NEAREST_M,
+            range,
+        )?;
+    }
+    if low {
+        truth.origin_m[axis] -= offset_m;
+    }
+    Ok(())
 }
 
 /// Refuses an effect that does not fit the room; those that are not here say so themselves ([`Hidden::apply`]).

@@ -80,6 +80,13 @@ pub enum Hidden {
         /// True over declared length of each axis, 0.8 to 1.25.
         scale: [f64; 3],
     },
+    /// One face of the box stands elsewhere; the other five stay where they are, and so does all that stands in the room.
+    SurfaceDisplacement {
+        /// Face of the box: x = 0, x = length, y = 0, y = width, floor, ceiling.
+        face: usize,
+        /// How much farther out it stands, in metres, -1 to 1; no place may come nearer to it than 5 cm.
+        offset_m: f64,
+    },
     /// One place is not where it is said to be.
     PositionError {
         /// Whether a source or a receiver.
@@ -235,7 +242,7 @@ pub struct Gap {
 
 impl Hidden {
     /// Identifiers of the catalogue's effects.
-    pub const CATALOGUE: [&'static str; 21] = [
+    pub const CATALOGUE: [&'static str; 22] = [
         "transducer_response",
         "air_absorption",
         "source_directivity",
@@ -257,6 +264,7 @@ impl Hidden {
         "room_modes",
         "receiver_directivity",
         "channel_response",
+        "surface_displacement",
     ];
     /// Names of the effects that no catalogue holds.
     pub const OUTSIDE: [&'static str; 3] = ["gain_drift", "dropouts", "foreign_chirp"];
@@ -281,6 +289,7 @@ impl Hidden {
             Self::SoundSpeed { .. } => "sound_speed",
             Self::SamplingClock { .. } => "sampling_clock",
             Self::RoomDimensions { .. } => "room_dimensions",
+            Self::SurfaceDisplacement { .. } => "surface_displacement",
             Self::PositionError { .. } => "position_error",
             Self::TimeZero { .. } => "time_zero",
             Self::ChannelFault { .. } => "channel_fault",

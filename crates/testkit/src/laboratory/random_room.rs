@@ -83,6 +83,7 @@ pub(crate) fn draw(config: &LabConfig) -> Result<(Declared, Truth), Error> {
             positive_reflections: config.positive_reflections,
             bands_hz: config.bands.iter_hz().collect(),
             size_m,
+            origin_m: [0.0; 3],
             faces,
             temperature_c,
             relative_humidity_percent,

@@ -18,8 +18,11 @@ pub struct Truth {
     pub positive_reflections: bool,
     /// Nominal centres of the octaves in Hz.
     pub bands_hz: Vec<f64>,
-    /// Length, width and height in metres, one corner at the origin.
+    /// Length, width and height in metres, one corner at the origin of all coordinates here.
     pub size_m: [f64; 3],
+    /// Where that corner is in the coordinates of the declared room, in metres: elsewhere than at its origin where a face was displaced.
+    #[serde(default)]
+    pub origin_m: [f64; 3],
     /// Material of each face: x = 0, x = length, y = 0, y = width, floor, ceiling.
     pub faces: [usize; 6],
     /// Temperature in degrees Celsius.

@@ -75,11 +75,13 @@ fn draw(id: &str, strength: f64, lab: &Laboratory, seed: u64, r: &mut Pcg64Mcg) 
             let mut axes = [0, 1, 2];
             axes.shuffle(r);
             let mut scale = [1.0; 3];
-            for axis in axes.into_iter().take(r.random_range(1..=2)) {
+            // One axis alone would be one displaced face.
+            for axis in axes.into_iter().take(r.random_range(2..=3)) {
                 scale[axis] = 1.0 + strength * sign(r) * (0.02 + 0.01 * unit(r));
             }
             Hidden::RoomDimensions { scale }
         }
+        "surface_displacement" => surface_displacement(r, truth, strength),
         "position_error" => position_error(r, truth, strength),
         "time_zero" => Hidden::TimeZero { latency_s: 5e-3 * strength },
         "channel_fault" => {
@@ -190,6 +192,18 @@ fn truncation(r: &mut Pcg64Mcg, truth: &Truth, decay_s: f64, strength: f64) -> H
     let fade_s = if strength == 0.0 { 0.0 } else { (0.01 + 0.03 * unit(r)).min(0.3 * end_s) };
     // Nothing is left to end after the last sample.
     Hidden::Truncation { end_s: if strength == 0.0 { end_s + 1.0 } else { end_s }, fade_s }
+}
+
+/// A face that stands 0.2 to 0.45 m farther out or in at strength 1, and no nearer to any place than 15 cm.
+fn surface_displacement(r: &mut Pcg64Mcg, truth: &Truth, strength: f64) -> Hidden {
+    let face = r.random_range(0..6);
+    let (axis, side) = (face / 2, truth.size_m[face / 2]);
+    let is_low = face.is_multiple_of(2);
+    let before_m = |place: &[f64; 3]| if is_low { place[axis] } else { side - place[axis] };
+    let sources = truth.sources.iter().map(|s| before_m(&s.position_m));
+    let nearest_m = sources.chain(truth.receivers_m.iter().map(before_m)).fold(f64::INFINITY, f64::min);
+    let offset_m = (strength * sign(r) * (0.2 + 0.25 * unit(r))).clamp(0.15 - nearest_m, 1.0);
+    Hidden::SurfaceDisplacement { face, offset_m }
 }
 
 /// In any direction; at strength 1 no place comes nearer to a wall than 0.3 m.

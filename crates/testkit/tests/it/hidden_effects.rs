@@ -54,6 +54,8 @@ fn arrivals_are_those_of_the_true_room() {
     let lab = one_octave(5, 6, 48_000);
     check_first_arrivals(&lab, &[]);
     check_first_arrivals(&lab, &[Hidden::RoomDimensions { scale: [1.03, 1.0, 0.98] }]);
+    check_first_arrivals(&lab, &[Hidden::SurfaceDisplacement { face: 2, offset_m: 0.41 }]);
+    check_first_arrivals(&lab, &[Hidden::SurfaceDisplacement { face: 5, offset_m: -0.2 }]);
     check_first_arrivals(&lab, &[Hidden::SoundSpeed { temperature_offset_k: 8.0 }]);
     let offset_m = [0.2, -0.15, 0.1];
     check_first_arrivals(&lab, &[Hidden::PositionError { end: End::Receiver, index: 2, offset_m }]);
@@ -65,6 +67,41 @@ fn arrivals_are_those_of_the_true_room() {
         let shift = moved.sources[0].position_m[k] - lab.sources()[0].position_m[k];
         assert_close("offset (m)", shift, offset, 1e-12, 0.0);
     }
+}
+
+/// Five faces and all places stay where they are, and the sixth stands where it was put.
+#[test]
+fn a_displaced_face_leaves_everything_else_in_its_place() {
+    let lab = one_octave(5, 6, 48_000);
+    let declared = lab.truth(&[]).unwrap();
+    let faces = |scene: &sabine_scene::Scene| -> Vec<f64> {
+        let along = |k: usize| scene.vertices().iter().map(move |v| v[k]);
+        (0..3)
+            .flat_map(|k| {
+                [along(k).fold(f64::INFINITY, f64::min), along(k).fold(f64::NEG_INFINITY, f64::max)]
+            })
+            .collect()
+    };
+    let before = faces(lab.scene());
+    for face in 0..6 {
+        let hidden = [Hidden::SurfaceDisplacement { face, offset_m: 0.3 }];
+        let truth = lab.truth(&hidden).unwrap();
+        for (i, (found, stated)) in faces(&lab.true_scene(&hidden).unwrap()).iter().zip(&before).enumerate() {
+            let outwards = if i.is_multiple_of(2) { -0.3 } else { 0.3 };
+            assert_close("face (m)", *found, stated + if i == face { outwards } else { 0.0 }, 1e-12, 0.0);
+        }
+        for k in 0..3 {
+            let place = |t: &sabine_testkit::Truth| {
+                [t.sources[0].position_m[k] + t.origin_m[k], t.receivers_m[2][k] + t.origin_m[k]]
+            };
+            let (now, then) = (place(&truth), place(&declared));
+            assert_close("source (m)", now[0], then[0], 1e-12, 0.0);
+            assert_close("receiver (m)", now[1], then[1], 1e-12, 0.0);
+        }
+    }
+    // No place may be behind it.
+    assert!(lab.truth(&[Hidden::SurfaceDisplacement { face: 0, offset_m: -1.0 }]).is_err());
+    assert!(lab.truth(&[Hidden::SurfaceDisplacement { face: 6, offset_m: 0.1 }]).is_err());
 }
 
 /// 20 000 ppm, so that the direct sound moves by whole samples.

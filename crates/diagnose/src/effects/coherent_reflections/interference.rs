@@ -265,3 +265,30 @@ fn add_pulse(signal: &mut [f64], at: f64, amplitude: f64) {
     ];
     four.iter_mut().zip(weights).for_each(|(sample, weight)| *sample += weight * amplitude);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pulse_between_samples_is_a_delay_below_a_fifth_of_the_sample_rate() {
+        for (at, frequency) in [(20.0, 0.1), (20.3, 0.1), (20.5, 0.05), (20.77, 0.12)] {
+            let mut signal = vec![0.0; 41];
+            add_pulse(&mut signal, at, 2.0);
+            let turn = std::f64::consts::TAU * frequency;
+            let (mut real, mut imaginary) = (0.0, 0.0);
+            for (n, x) in signal.iter().enumerate() {
+                real += x * (turn * (n as f64 - at)).cos();
+                imaginary -= x * (turn * (n as f64 - at)).sin();
+            }
+            assert!(
+                (real - 2.0).abs() < 0.04 && imaginary.abs() < 0.02,
+                "{at} {frequency}: {real} {imaginary}"
+            );
+        }
+        // Nothing beyond the ends.
+        let mut short = vec![0.0; 4];
+        [0.5, 2.5, 9.0].into_iter().for_each(|at| add_pulse(&mut short, at, 1.0));
+        assert_eq!(short, [0.0; 4]);
+    }
+}

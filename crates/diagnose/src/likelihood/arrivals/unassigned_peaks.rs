@@ -44,6 +44,7 @@ impl<'a> ArrivalModel<'a> {
                 departure: added.departure,
                 arrival: added.arrival,
                 energy: 0.0,
+                surfaces: Vec::new(),
             };
             let time_s = self.time_s(values, pair, &arrival);
             let mut slopes = self.time_slopes(values, pair, &arrival);
@@ -115,15 +116,18 @@ impl<'a> ArrivalModel<'a> {
             speed_m_s,
             departure: single.departure,
             arrival: single.arrival,
+            surfaces: &single.surfaces,
         };
         let moved: Vec<Nuisance> =
             self.terms.iter().flat_map(|p| &p.case.relaxes).map(|(nuisance, _)| *nuisance).collect();
-        let mut later_s = 0.0;
+        // Surfaces that stand elsewhere are in the ways as far as these were traced anew.
+        let displaced = self.displaced(values, None);
+        let mut later_s =
+            view.delay_by_displaced_s(&displaced) - view.delay_by_displaced_s(self.data.displaced);
         for placed in &self.terms {
             let own = placed.own(values);
-            if let Some(term) =
-                placed.case.arrival_term().filter(|_| !is_warmer(placed.case, own, self.data.survey))
-            {
+            let term = placed.case.arrival_term().filter(|term| term.displaces(own).is_none());
+            if let Some(term) = term.filter(|_| !is_warmer(placed.case, own, self.data.survey)) {
                 later_s += term.delay_s(own, &view);
             }
         }

@@ -1,10 +1,14 @@
-//! Re-tracing after a position, the air or the dimensions change, and with other rays.
+//! Re-tracing after a position, the air, the dimensions or a surface change, and with other rays.
 
 use super::Simulation;
 use crate::effect::Nuisance;
 use crate::error::Error;
+use crate::extend::displaced_surface::DisplacedSurface;
+use crate::extend::extended_model::Dimensions;
 use crate::extend::model_change::ModelChange;
+use crate::extend::moved_mesh::{DisplacementError, check_places, displaced_among};
 use crate::simulate::edges::Edges;
+use crate::simulate::met_surfaces::MetSurfaces;
 use crate::simulate::scene_tracer::SceneTracer;
 use crate::simulate::traced_pair::TracedPair;
 use crate::simulate::traced_room::trace;
@@ -35,17 +39,43 @@ impl Simulation {
                 (0..self.pairs.len()).try_for_each(|pair| self.set_air(pair, survey))?;
             }
             ModelChange::Dimensions(dimensions) => {
-                let resized = dimensions.applied(&self.scene)?;
-                self.prepared = self.tracer.prepare(&resized, self.traced_until_s)?;
-                self.edges = Edges::find(&resized)?;
-                self.resized = Some(resized);
-                for source in 0..self.sources.len() {
-                    self.retrace(Nuisance::SourcePosition(source), survey)?;
-                }
+                self.reshape(Some(dimensions.clone()), self.displaced.clone(), survey)?;
+            }
+            ModelChange::SurfaceDisplacement(surface) => {
+                let mut displaced = self.displaced.clone();
+                displaced.retain(|(_, other)| !other.is_same_surface(surface));
+                let number = survey.surfaces.iter().position(|s| s.centre_m == surface.point_m);
+                let unknown = || DisplacementError::NoSurface { point_m: surface.point_m };
+                displaced.push((number.ok_or_else(unknown)?, surface.clone()));
+                self.reshape(self.dimensions.clone(), displaced, survey)?;
             }
             _ => return Ok(false),
         }
         Ok(true)
+    }
+
+    /// Traces all pairs in the room at another size, with surfaces in other places. Nothing changes if there is no such room.
+    fn reshape(
+        &mut self,
+        dimensions: Option<Dimensions>,
+        numbered: Vec<(usize, DisplacedSurface)>,
+        survey: &Survey,
+    ) -> Result<(), Error> {
+        let all: Vec<DisplacedSurface> = numbered.iter().map(|(_, surface)| surface.clone()).collect();
+        let moved = displaced_among(&self.scene, &self.surfaces, &all)?;
+        if !all.is_empty() {
+            check_places(&self.scene, &moved, &self.sources, &self.receivers)?;
+        }
+        let resized = match &dimensions {
+            Some(dimensions) => dimensions.applied(&self.scene, &moved)?,
+            None => moved,
+        };
+        self.met = Arc::new(MetSurfaces::new(&resized, &self.surfaces)?);
+        self.prepared = self.tracer.prepare(&resized, self.traced_until_s)?;
+        self.edges = Edges::find(&resized)?;
+        self.resized = Some(resized);
+        (self.dimensions, self.displaced) = (dimensions, numbered);
+        (0..self.sources.len()).try_for_each(|source| self.retrace(Nuisance::SourcePosition(source), survey))
     }
 
     /// The same room as it stands, traced by another tracer; nothing is expanded yet.
@@ -74,6 +104,10 @@ impl Simulation {
             reference: Vec::new(),
             scene: self.scene.clone(),
             resized: self.resized.clone(),
+            dimensions: self.dimensions.clone(),
+            displaced: self.displaced.clone(),
+            surfaces: Arc::clone(&self.surfaces),
+            met: Arc::clone(&self.met),
             tracer: Arc::clone(tracer),
             prepared,
             edges,

@@ -7,7 +7,7 @@ use sabine_acoustics::{Error, Material};
 use sabine_paths::Conditions;
 
 /// An early path that was found exactly.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct IsolatedReflection {
     pub length_m: f64,
     pub after_direct_s: f64,
@@ -15,6 +15,8 @@ pub(crate) struct IsolatedReflection {
     pub arrival: [f64; 3],
     /// Reflections.
     pub order: usize,
+    /// Surfaces (indices) that it meets, from the source on; none where it could not be followed.
+    pub surfaces: Vec<usize>,
 }
 
 fn products([x, y, z]: [f64; 3]) -> [f64; 6] {
@@ -22,7 +24,8 @@ fn products([x, y, z]: [f64; 3]) -> [f64; 6] {
 }
 
 impl TracedPair {
-    /// The early exact paths, the shortest first, each as a bin of its own in the state of each band.
+    /// The early exact paths, the shortest first, each as a bin of its own in the state of each band. Which surfaces they meet is not
+    /// filled in.
     pub fn isolated_reflections(
         &self,
         materials: &[Material],
@@ -42,6 +45,7 @@ impl TracedPair {
                 departure: self.paths.departure(i),
                 arrival: self.paths.arrival(i),
                 order: order(i),
+                surfaces: Vec::new(),
             })
             .collect();
         let energies = self.paths.energies(&Conditions::new(materials, &self.air))?;

@@ -58,7 +58,9 @@ fn extra(measurement: NextMeasurement, lab: &LabConfig, set: &[String]) -> Extra
         NextMeasurement::LongerWithSilence => Extra::Without(vec!["background_noise"]),
         NextMeasurement::TurnedSource => Extra::More(LabConfig { turned: true, ..lab.clone() }),
         NextMeasurement::Loopback => Extra::Without(vec!["time_zero"]),
-        NextMeasurement::Distances => Extra::Without(vec!["position_error", "room_dimensions"]),
+        NextMeasurement::Distances => {
+            Extra::Without(vec!["position_error", "room_dimensions", "surface_displacement"])
+        }
         NextMeasurement::ExchangedChannel => Extra::Without(vec!["channel_fault"]),
         NextMeasurement::Quieter => Extra::Without(vec!["nonlinear_distortion"]),
         NextMeasurement::PatchClosed => Extra::Without(vec!["open_patch"]),

@@ -108,7 +108,22 @@ impl Task {
         let started = std::time::Instant::now();
         let found = self.diagnose(&lab, &hidden, folder)?;
         let seconds = started.elapsed().as_secs_f64();
-        let outcome = outcome(&found, &hidden);
+        let outcome = match (outcome(&found, &hidden), &hidden[..]) {
+            (Outcome::Right, [Hidden::SurfaceDisplacement { face, .. }])
+                if !is_of_face(&found, &lab, *face) =>
+            {
+                Outcome::Wrong
+            }
+            (outcome, _) => outcome,
+        };
+        for cause in found.causes.iter().filter(|c| c.effect == "surface_displacement") {
+            let values = cause.parameters.iter();
+            let values: Vec<String> = values
+                .map(|p| format!("{} {:.3} [{:.3}, {:.3}] {}", p.name, p.value, p.low, p.high, p.unit))
+                .collect();
+            let subject = cause.subject.as_deref().unwrap_or_default();
+            eprintln!("  {subject}: {}; hidden: {:?}", values.join(", "), hidden);
+        }
         if outcome != Outcome::Right {
             found.notes.iter().for_each(|note| eprintln!("  {note}"));
             for test in found.lack_of_fit.tests.iter().filter(|t| t.p_value < 0.01) {
@@ -202,6 +217,18 @@ fn outcome(found: &Diagnosis, hidden: &[Hidden]) -> Outcome {
     }
 }
 
+/// Whether the only surface that stands elsewhere is a face of the box.
+fn is_of_face(found: &Diagnosis, lab: &Laboratory, face: usize) -> bool {
+    let (axis, truth) = (face / 2, lab.truth(&[]));
+    let at = |size_m: [f64; 3]| if face.is_multiple_of(2) { 0.0 } else { size_m[axis] };
+    match (&found.model.surfaces[..], truth) {
+        ([one], Ok(truth)) => {
+            one.normal[axis].abs() > 0.999 && (one.point_m[axis] - at(truth.size_m)).abs() < 1e-3
+        }
+        _ => false,
+    }
+}
+
 /// The truth of those parameters of an effect that the laboratory and the catalogue define alike.
 fn true_parameters(hidden: &Hidden, lab: &Laboratory) -> Result<Vec<(String, f64)>, AnyError> {
     let bands = lab.truth(&[])?.bands()?;
@@ -228,6 +255,11 @@ fn true_parameters(hidden: &Hidden, lab: &Laboratory) -> Result<Vec<(String, f64
         }
         Hidden::SamplingClock { ppm } => vec![("deviation".into(), *ppm)],
         Hidden::RoomDimensions { scale } => by_axis("scale", scale.map(|s| 100.0 * (s - 1.0))),
+        Hidden::SurfaceDisplacement { face, offset_m } => {
+            let tilts = ["x", "y", "z"].iter().enumerate().filter(|(axis, _)| *axis != face / 2);
+            let tilts = tilts.map(|(_, axis)| (format!("tilt_{axis}"), 0.0));
+            tilts.chain([("offset".to_owned(), *offset_m)]).collect()
+        }
         Hidden::PositionError { offset_m, .. } => by_axis("offset", *offset_m),
         Hidden::TimeZero { latency_s } => vec![("latency".into(), 1000.0 * latency_s)],
         Hidden::NonlinearDistortion { sweep_s, from_hz, to_hz, quadratic, cubic, .. } => {
