@@ -108,7 +108,7 @@ impl Task {
         let started = std::time::Instant::now();
         let found = self.diagnose(&lab, &hidden, folder)?;
         let seconds = started.elapsed().as_secs_f64();
-        let outcome = match (outcome(&found, &hidden), &hidden[..]) {
+        let outcome = match (outcome(&found, &hidden, self.positive_reflections), &hidden[..]) {
             (Outcome::Right, [Hidden::SurfaceDisplacement { face, .. }])
                 if !is_of_face(&found, &lab, *face) =>
             {
@@ -194,8 +194,10 @@ fn answer(found: &Diagnosis) -> String {
     }
 }
 
-fn outcome(found: &Diagnosis, hidden: &[Hidden]) -> Outcome {
+fn outcome(found: &Diagnosis, hidden: &[Hidden], positive_reflections: bool) -> Outcome {
     let mut truth: Vec<&str> = hidden.iter().map(Hidden::id).collect();
+    // Where reflections keep their sign the simulation is wrong in that, whatever else is hidden.
+    truth.extend(positive_reflections.then_some("coherent_reflections"));
     truth.sort_unstable();
     let named = named(found);
     let outside = truth.contains(&"outside");
