@@ -15,7 +15,12 @@ fn check_first_arrivals(lab: &Laboratory, effects: &[Hidden]) {
     let (speed, exponent) = (air.speed_of_sound_m_s(), air.energy_exponent_per_m(bands).values()[0]);
     let mut checked = 0;
     for (index, found) in samples(lab, effects).iter().enumerate() {
-        let (source, receiver) = true_places(&truth, index);
+        let (mut source, mut receiver) = true_places(&truth, index);
+        // In the coordinates of the declared room, as the scene is.
+        for k in 0..3 {
+            source.position_m[k] += truth.origin_m[k];
+            receiver.position_m[k] += truth.origin_m[k];
+        }
         let images = ShoeboxImages::new(0.03).unwrap().images(&scene, &source, &receiver, &air).unwrap();
         let at = |i: usize| images[i].length_m / speed * f64::from(lab.config().sample_rate_hz);
         for (i, image) in images.iter().enumerate().take(10) {
@@ -100,7 +105,21 @@ fn a_displaced_face_leaves_everything_else_in_its_place() {
         }
     }
     // No place may be behind it.
-    assert!(lab.truth(&[Hidden::SurfaceDisplacement { face: 0, offset_m: -1.0 }]).is_err());
+    let refused: Vec<bool> = (0..6)
+        .map(|face: usize| {
+            let axis = face / 2;
+            let low = face.is_multiple_of(2);
+            let before =
+                |place: [f64; 3]| if low { place[axis] } else { declared.size_m[axis] - place[axis] };
+            let nearest = (declared.receivers_m.iter().map(|place| before(*place)))
+                .chain([before(declared.sources[0].position_m)])
+                .fold(f64::INFINITY, f64::min);
+            let at = |offset_m: f64| lab.truth(&[Hidden::SurfaceDisplacement { face, offset_m }]);
+            assert!(at(0.06 - nearest.min(1.0)).is_ok(), "face {face}, nearest {nearest} m");
+            nearest < 1.0 && at(0.04 - nearest).is_err()
+        })
+        .collect();
+    assert!(refused.contains(&true), "no place is within a metre of any face");
     assert!(lab.truth(&[Hidden::SurfaceDisplacement { face: 6, offset_m: 0.1 }]).is_err());
 }
 
