@@ -23,30 +23,107 @@ NOISE_DB = -63.0  # energy of the recorder's white noise over a response, relati
 MARGIN_M = 0.6  # places to walls
 APART_M = 0.8
 MAX_IMAGE_ORDER = 130  # 3 million images
-FACES = ["west", "east", "south", "north", "floor", "ceiling"]
-MATERIALS = {"west": "brick", "east": "plaster", "south": "brick", "north": "plaster", "floor": "carpet", "ceiling": "board"}
+MATERIALS = {
+    "west": "brick",
+    "east": "plaster",
+    "south": "brick",
+    "north": "plaster",
+    "inner_east": "plaster",  # of an L: where the corner that is cut out begins
+    "inner_north": "plaster",
+    "floor": "carpet",
+    "ceiling": "board",
+}
 SHAPES = {"brick": [0, 0, 0, 0, 0, 0], "plaster": [3, 1, 0, -1, -1, 0], "carpet": [-4, -2, 0, 2, 3, 4], "board": [2, 1, 0, 0, 1, 1]}
-EFFECTS = ["null", "position", "surface", "temperature", "latency", "gain"]
+EFFECTS = ["null", "position", "surface", "temperature", "latency", "gain", "wall"]
+BEFORE_M = 0.35  # a displaced wall stays this far from all places
 
 
-def draw(random, receivers):
-    """A room: sides, tables, places, climate."""
+class Prism:
+    """A floor polygon with sides along x and y, counter-clockwise, and a height."""
+
+    def __init__(self, polygon, names, low, high):
+        self.polygon, self.names, self.low, self.high = np.array(polygon, dtype=float), names, low, high
+
+    @staticmethod
+    def of(sides, cut):
+        """A box, or an L: a box whose corner of the greatest x and y is cut out, at these two shares of its sides."""
+        x, y, z = sides
+        if cut is None:
+            return Prism([[0, 0], [x, 0], [x, y], [0, y]], ["south", "east", "north", "west"], 0.0, z)
+        at_x, at_y = cut[0] * x, cut[1] * y
+        names = ["south", "east", "inner_north", "inner_east", "north", "west"]
+        return Prism([[0, 0], [x, 0], [x, at_y], [at_x, at_y], [at_x, y], [0, y]], names, 0.0, z)
+
+    def is_box(self):
+        return len(self.polygon) == 4
+
+    def edges(self):
+        return list(zip(self.names, self.polygon, np.roll(self.polygon, -1, axis=0)))
+
+    def faces(self):
+        """Of each face: name, outward normal, area."""
+        height = self.high - self.low
+        found = []
+        for name, one, other in self.edges():
+            along = other - one
+            length = np.linalg.norm(along)
+            found.append((name, np.array([along[1], -along[0], 0.0]) / length, length * height))
+        x, y = self.polygon.T
+        area = 0.5 * abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+        return found + [("floor", np.array([0, 0, -1.0]), area), ("ceiling", np.array([0, 0, 1.0]), area)]
+
+    def volume(self):
+        return self.faces()[-1][2] * (self.high - self.low)
+
+    def moved(self, face, offset):
+        """The same with a face farther out."""
+        found = Prism(self.polygon.copy(), self.names, self.low, self.high)
+        if face == "floor":
+            found.low -= offset
+        elif face == "ceiling":
+            found.high += offset
+        else:
+            index = self.names.index(face)
+            normal = dict((name, normal) for name, normal, _ in self.faces())[face][:2]
+            for corner in (index, (index + 1) % len(self.polygon)):
+                found.polygon[corner] += offset * normal
+        return found
+
+    def clearance(self, place):
+        """Distance of a place from the nearest wall; negative outside."""
+        inside = False
+        nearest = min(place[2] - self.low, self.high - place[2])
+        for _, one, other in self.edges():
+            along = other - one
+            share = np.clip(np.dot(place[:2] - one, along) / np.dot(along, along), 0, 1)
+            nearest = min(nearest, float(np.linalg.norm(place[:2] - one - share * along)))
+            if (one[1] > place[1]) != (other[1] > place[1]):
+                crossing = one[0] + (place[1] - one[1]) / (other[1] - one[1]) * along[0]
+                inside ^= bool(crossing > place[0])
+        return nearest if inside else -abs(nearest)
+
+
+def draw(random, receivers, with_cut):
+    """A room: its shape, tables, places, climate."""
     sides = [random.uniform(4.0, 7.5), random.uniform(3.5, 6.0), random.uniform(2.4, 3.3)]
     level = {name: random.uniform(0.15, 0.4) for name in SHAPES}
     absorption = {
         name: np.clip(level[name] * 10 ** (0.05 * np.array(SHAPES[name]) + random.normal(0, 0.06, 6)), 0.03, 0.7)
         for name in SHAPES
     }
+    if with_cut:
+        sides[:2] = [random.uniform(6.0, 9.0), random.uniform(5.0, 8.0)]
+    prism = Prism.of(sides, random.uniform(0.4, 0.65, 2) if with_cut else None)
     places = []
     while len(places) < receivers + 1:
         place = np.array([random.uniform(MARGIN_M, side - MARGIN_M) for side in sides])
-        if all(np.linalg.norm(place - other) > APART_M for other in places):
+        if prism.clearance(place) >= 0.99 * MARGIN_M and all(np.linalg.norm(place - other) > APART_M for other in places):
             places.append(place)
     climate = {"temperature_c": random.uniform(16, 26), "relative_humidity_percent": random.uniform(30, 65)}
-    return sides, absorption, places, climate
+    return prism, absorption, places, climate
 
 
-def planted(effect, random, absorption, places, climate):
+def planted(effect, random, prism, absorption, places, climate):
     """What is true in place of what the file will say, and what of it is hidden."""
     absorption = {name: table.copy() for name, table in absorption.items()}
     places = [place.copy() for place in places]
@@ -73,47 +150,58 @@ def planted(effect, random, absorption, places, climate):
         index = int(random.integers(1, len(places)))
         recorder["gain_db"][index - 1] = 5.0
         hidden = {"receiver": f"r{index}", "gain_db": 5.0}
-    return absorption, places, climate, recorder, hidden
+    elif effect == "wall":
+        stated = prism
+        while prism is stated or any(prism.clearance(place) < BEFORE_M for place in places):
+            face, normal, _ = stated.faces()[int(random.integers(len(stated.faces())))]
+            offset = float(random.uniform(0.2, 0.45) * random.choice([-1, 1]))
+            prism = stated.moved(face, offset)
+        hidden = {"face": face, "outward_normal": normal.tolist(), "offset_m": offset}
+    return prism, absorption, places, climate, recorder, hidden
 
 
-def eyring_s(sides, absorption):
+def eyring_s(prism, absorption):
     """Longest reverberation time of the octaves, without air."""
-    x, y, z = sides
-    areas = dict(zip(FACES, [y * z, y * z, x * z, x * z, x * y, x * y]))
-    total = sum(areas.values())
-    mean = sum(area * absorption[MATERIALS[face]] for face, area in areas.items()) / total
-    return float(np.max(0.161 * x * y * z / (-total * np.log(1 - mean))))
+    total = sum(area for _, _, area in prism.faces())
+    mean = sum(area * absorption[MATERIALS[face]] for face, _, area in prism.faces()) / total
+    return float(np.max(0.161 * prism.volume() / (-total * np.log(1 - mean))))
 
 
-def simulate(method, sides, absorption, places, climate, rays, scattering, seed):
+def simulate(method, prism, absorption, places, climate, rays, scattering, seed):
     """Responses of all receivers, sample 0 at the emission."""
     table = lambda name: {"coeffs": absorption[name].tolist(), "center_freqs": CENTRES_HZ}
     traced = method == "rays"
     scatters = {"coeffs": [scattering] * 6, "center_freqs": CENTRES_HZ} if scattering else None
-    walls = {face: pra.Material(table(MATERIALS[face]), scatters) for face in FACES}
-    length_s = LENGTH * eyring_s(sides, absorption)
+    walls = {face: pra.Material(table(MATERIALS[face]), scatters) for face, _, _ in prism.faces()}
+    length_s = LENGTH * eyring_s(prism, absorption)
     # Its own formula for the speed of sound, 331.4 + 0.6 T + 0.0124 H, is up to 1 m/s above that of dry air: nobody planted that.
     speed = 331.3 * np.sqrt(1 + climate["temperature_c"] / 273.15)
     # Every image that is heard in time, or what takes the place of rays early on.
+    corner = np.array([*prism.polygon.min(axis=0), prism.low])
+    sides = np.array([*prism.polygon.max(axis=0), prism.high]) - corner
     order = 3 if traced else int(np.ceil(length_s * speed / min(sides)))
     if order > MAX_IMAGE_ORDER:
         raise SystemExit(f"images of order {order} would be needed: take another seed")
-    room = pra.ShoeBox(
-        sides,
+    settings = dict(
         fs=RATE_HZ,
         max_order=order,
-        materials=walls,
         temperature=climate["temperature_c"],
         humidity=climate["relative_humidity_percent"],
         air_absorption=True,
         ray_tracing=traced,
     )
+    if prism.is_box():
+        room = pra.ShoeBox(sides, materials=walls, **settings)
+    else:
+        own = [walls[name] for name in prism.names]
+        room = pra.Room.from_corners((prism.polygon - corner[:2]).T, materials=own, **settings)
+        room.extrude(sides[2], materials={"floor": walls["floor"], "ceiling": walls["ceiling"]})
     room.set_sound_speed(speed)
     if traced:
         np.random.seed(seed)  # the phases of its late part
         room.set_ray_tracing(n_rays=rays, receiver_radius=0.3, hist_bin_size=0.004, time_thres=length_s)
-    room.add_source(places[0])
-    room.add_microphone_array(np.array(places[1:]).T)
+    room.add_source(places[0] - corner)
+    room.add_microphone_array((np.array(places[1:]) - corner).T)
     room.compute_rir()
     # Its fractional delays are filters of this length: what comes before sample 0 of the emission is theirs.
     lead = pra.constants.get("frac_delay_length") // 2
@@ -132,12 +220,19 @@ def recorded(responses, recorder, random):
     return [response + noise * random.normal(size=len(response)) for response in kept]
 
 
-def mesh(sides):
-    x, y, z = sides
-    corners = [[0, 0, 0], [x, 0, 0], [0, y, 0], [x, y, 0], [0, 0, z], [x, 0, z], [0, y, z], [x, y, z]]
-    faces = {"west": "1 5 7 3", "east": "2 4 8 6", "south": "1 2 6 5", "north": "3 7 8 4", "floor": "1 3 4 2", "ceiling": "5 6 8 7"}
-    lines = ["v {:.6f} {:.6f} {:.6f}".format(*corner) for corner in corners]
-    return "\n".join(lines + [f"usemtl {MATERIALS[face]}\nf {faces[face]}" for face in FACES]) + "\n"
+def mesh(prism):
+    """As OBJ; floor and ceiling of an L as two convex faces each."""
+    count = len(prism.polygon)
+    lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for z in (prism.low, prism.high) for x, y in prism.polygon]
+    faces = {"floor": [[1, 4, 3, 2]] if count == 4 else [[1, 6, 5, 4], [1, 4, 3, 2]]}
+    faces["ceiling"] = [[corner + count for corner in reversed(face)] for face in faces["floor"]]
+    for i, name in enumerate(prism.names):
+        after = (i + 1) % count
+        faces[name] = [[i + 1, after + 1, after + 1 + count, i + 1 + count]]
+    for name, own in faces.items():
+        lines.append(f"usemtl {MATERIALS[name]}")
+        lines += ["f " + " ".join(map(str, face)) for face in own]
+    return "\n".join(lines) + "\n"
 
 
 def room_file(absorption, places, climate, scattering):
@@ -163,6 +258,7 @@ def main():
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--method", choices=["images", "rays"], required=True)
     parser.add_argument("--effect", choices=EFFECTS, default="null")
+    parser.add_argument("--shape", choices=["box", "l"], default="box", help="l needs --method rays")
     parser.add_argument("--receivers", type=int, default=8)
     parser.add_argument("--rays", type=int, default=100_000, help="of pyroomacoustics")
     parser.add_argument(
@@ -175,17 +271,19 @@ def main():
     arguments = parser.parse_args()
     if arguments.scattering and arguments.method != "rays":
         parser.error("--scattering needs --method rays")
+    if arguments.shape == "l" and arguments.method != "rays":
+        parser.error("--shape l needs --method rays: images of every order are those of a box")
 
     random = np.random.default_rng(arguments.seed)
-    sides, absorption, places, climate = draw(random, arguments.receivers)
-    true = planted(arguments.effect, random, absorption, places, climate)
-    true_absorption, true_places, true_climate, recorder, hidden = true
+    prism, absorption, places, climate = draw(random, arguments.receivers, arguments.shape == "l")
+    true = planted(arguments.effect, random, prism, absorption, places, climate)
+    true_prism, true_absorption, true_places, true_climate, recorder, hidden = true
     # Nobody knows tables and places exactly: the file is off, the truth is what was drawn.
     stated = {name: np.clip(table + random.normal(0, TABLE_SD, 6), 0.01, 0.95) for name, table in absorption.items()}
     stated_places = [place + random.normal(0, PLACE_SD_M, 3) for place in places]
     responses, order, speed = simulate(
         arguments.method,
-        sides,
+        true_prism,
         true_absorption,
         true_places,
         true_climate,
@@ -198,7 +296,7 @@ def main():
     (arguments.out / "ir").mkdir(parents=True)
     for i, response in enumerate(responses, 1):
         soundfile.write(arguments.out / "ir" / f"s1_r{i}.wav", response.astype(np.float32), RATE_HZ, subtype="FLOAT")
-    (arguments.out / "room.obj").write_text(mesh(sides))
+    (arguments.out / "room.obj").write_text(mesh(prism))
     (arguments.out / "room.toml").write_text(room_file(stated, stated_places, climate, arguments.scattering))
     truth = {
         "program": f"pyroomacoustics {pra.__version__}",
@@ -209,7 +307,8 @@ def main():
         "image_order": order,
         "speed_of_sound_m_s": speed,
         "rays": arguments.rays if arguments.method == "rays" else 0,
-        "sides_m": list(sides),
+        "floor_m": true_prism.polygon.tolist(),
+        "heights_m": [true_prism.low, true_prism.high],
         "absorption": {name: table.tolist() for name, table in true_absorption.items()},
         "source_m": true_places[0].tolist(),
         "receivers_m": [place.tolist() for place in true_places[1:]],

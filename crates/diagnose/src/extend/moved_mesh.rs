@@ -4,7 +4,8 @@ use crate::extend::displaced_surface::DisplacedSurface;
 use crate::survey::Survey;
 use crate::survey::planes::{STEP_M, TILT, dot};
 use crate::survey::surfaces::{
-    Corners, Surface, Surfaces, WELD_M, corners, largest, lies_on, minus, nearest_on, normal_of, unit,
+    Bounds, Corners, Surface, Surfaces, WELD_M, are_near, bounds_of, corners, largest, lies_on, minus,
+    nearest_on, normal_of, unit,
 };
 use nalgebra::{DMatrix, DVector};
 use sabine_propagate::{Error as Misplaced, MeshScene, check_placement};
@@ -93,7 +94,7 @@ pub(crate) fn displaced_among(
     let vertices = moved_vertices(scene, surfaces, &moved)?;
     let found = Scene::new(vertices, scene.triangles().to_vec(), scene.materials().to_vec())?;
     check_faces(scene, &found, surfaces, &moved)?;
-    check_crossings(scene, &found)?;
+    check_crossings(scene, &found, surfaces)?;
     Ok(found)
 }
 
@@ -123,15 +124,17 @@ fn moved_vertices(
     surfaces: &Surfaces,
     moved: &[Option<&DisplacedSurface>],
 ) -> Result<Vec<[f64; 3]>, DisplacementError> {
-    let is_moved = |t: usize| surfaces.of_triangle[t].is_some_and(|s| moved[s].is_some());
+    let all_moved = (0..moved.len()).filter(|&s| moved[s].is_some());
     let of_moved: Vec<Corners> =
-        (0..scene.triangles().len()).filter(|&t| is_moved(t)).map(|t| corners(scene, t)).collect();
+        all_moved.flat_map(|s| surfaces.triangles(s)).map(|t| corners(scene, t)).collect();
+    let around = bounds_of(of_moved.iter().flatten().copied());
+    let bounds = surfaces.bounds(scene);
     // Vertices in one place are moved once.
     let mut done: Vec<([f64; 3], [f64; 3])> = Vec::new();
     let mut found = scene.vertices().to_vec();
     for vertex in &mut found {
         let place = *vertex;
-        if !of_moved.iter().any(|own| lies_on(*own, place)) {
+        if !are_near(&around, &at(place)) || !of_moved.iter().any(|own| lies_on(*own, place)) {
             continue;
         }
         let is_here = |(at, _): &&([f64; 3], [f64; 3])| {
@@ -141,7 +144,7 @@ fn moved_vertices(
         let way = match done.iter().find(is_here) {
             Some((_, way)) => *way,
             None => {
-                let way = way_of(scene, surfaces, moved, place)?;
+                let way = way_of(scene, (surfaces, &bounds), moved, place)?;
                 done.push((place, way));
                 way
             }
@@ -151,20 +154,21 @@ fn moved_vertices(
     Ok(found)
 }
 
+/// A box that is a point.
+fn at(place: [f64; 3]) -> Bounds {
+    place.map(|c| [c, c])
+}
+
 /// The shortest way that keeps a corner in all planes that meet there.
 fn way_of(
     scene: &Scene,
-    surfaces: &Surfaces,
+    (surfaces, bounds): (&Surfaces, &[Bounds]),
     moved: &[Option<&DisplacedSurface>],
     place: [f64; 3],
 ) -> Result<[f64; 3], DisplacementError> {
-    let mut here: Vec<usize> = Vec::new();
-    for (triangle, surface) in surfaces.of_triangle.iter().enumerate() {
-        let Some(surface) = *surface else { continue };
-        if !here.contains(&surface) && lies_on(corners(scene, triangle), place) {
-            here.push(surface);
-        }
-    }
+    let is_on = |surface: usize| surfaces.triangles(surface).any(|t| lies_on(corners(scene, t), place));
+    let here: Vec<usize> =
+        (0..bounds.len()).filter(|&s| are_near(&bounds[s], &at(place)) && is_on(s)).collect();
     let mut normals = DMatrix::zeros(here.len(), 3);
     let mut shifts = DVector::zeros(here.len());
     for (row, &surface) in here.iter().enumerate() {
@@ -223,17 +227,19 @@ fn corners_moved(stated: &Scene, found: &Scene, triangle: usize) -> bool {
 }
 
 /// Refuses faces of which an edge goes through another face, or through which another's edge goes, where none did.
-fn check_crossings(stated: &Scene, found: &Scene) -> Result<(), DisplacementError> {
-    let count = stated.triangles().len();
-    let moved: Vec<usize> = (0..count).filter(|&t| corners_moved(stated, found, t)).collect();
-    let now: Vec<Corners> = (0..count).map(|t| corners(found, t)).collect();
-    for &one in &moved {
-        for (other, theirs) in now.iter().enumerate().filter(|(other, _)| *other != one) {
-            if !are_near(now[one], *theirs) {
+fn check_crossings(stated: &Scene, found: &Scene, surfaces: &Surfaces) -> Result<(), DisplacementError> {
+    let bounds = surfaces.bounds(found);
+    for one in (0..surfaces.of_triangle.len()).filter(|&t| corners_moved(stated, found, t)) {
+        let own = corners(found, one);
+        let around = bounds_of(own.into_iter());
+        let near = (0..bounds.len()).filter(|&s| are_near(&bounds[s], &around));
+        for other in near.flat_map(|s| surfaces.triangles(s)).filter(|&other| other != one) {
+            let theirs = corners(found, other);
+            if !are_near(&bounds_of(theirs.into_iter()), &around) {
                 continue;
             }
             let crosses = |a: Corners, b: Corners| goes_through(a, b) || goes_through(b, a);
-            if crosses(now[one], *theirs) && !crosses(corners(stated, one), corners(stated, other)) {
+            if crosses(own, theirs) && !crosses(corners(stated, one), corners(stated, other)) {
                 return Err(DisplacementError::Pierced { triangle: one });
             }
         }
@@ -287,18 +293,6 @@ pub(crate) fn find_ranges(scene: &Scene, surfaces: &Surfaces, survey: &mut Surve
         };
         survey.surfaces[number].range_m = [-feasible(inwards_m, -1.0), feasible(FARTHEST_M, 1.0)];
     }
-}
-
-/// Whether the boxes around two triangles meet.
-fn are_near(a: Corners, b: Corners) -> bool {
-    let range = |t: Corners, k: usize| {
-        let along = t.map(|c| c[k]);
-        (along[0].min(along[1]).min(along[2]), along[0].max(along[1]).max(along[2]))
-    };
-    (0..3).all(|k| {
-        let ((a_low, a_high), (b_low, b_high)) = (range(a, k), range(b, k));
-        a_low <= b_high + WELD_M && b_low <= a_high + WELD_M
-    })
 }
 
 /// Whether an edge of one triangle goes through the inside of another.

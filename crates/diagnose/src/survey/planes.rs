@@ -1,6 +1,7 @@
 //! The flat surfaces of a mesh.
 
 use sabine_scene::Scene;
+use std::collections::HashMap;
 
 /// Triangles whose normals differ by less (one less their cosine), and whose planes by less than this in metres, lie in one plane.
 pub(crate) const TILT: f64 = 1e-4;
@@ -51,9 +52,39 @@ pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+/// Planes by the direction of their normals, so that a mesh of a million faces is not held against every plane found before.
+#[derive(Default)]
+pub(crate) struct ByNormal {
+    cells: HashMap<[i32; 3], Vec<usize>>,
+}
+
+impl ByNormal {
+    /// Side of a cell: normals that [`TILT`] takes for one are in the same cell or the next.
+    const CELL: f64 = 0.015;
+
+    fn cell(normal: [f64; 3]) -> [i32; 3] {
+        normal.map(|c| (c / Self::CELL).floor() as i32)
+    }
+
+    pub fn insert(&mut self, normal: [f64; 3], index: usize) {
+        self.cells.entry(Self::cell(normal)).or_default().push(index);
+    }
+
+    /// The least index that fits, of planes whose normals are nearly this one or its opposite.
+    pub fn first(&self, normal: [f64; 3], fits: impl Fn(usize) -> bool) -> Option<usize> {
+        let around = |centre: [i32; 3]| {
+            (0..27).map(move |n| [centre[0] + n % 3 - 1, centre[1] + n / 3 % 3 - 1, centre[2] + n / 9 - 1])
+        };
+        let both = [normal, normal.map(|c| -c)];
+        let near = both.into_iter().flat_map(|n| around(Self::cell(n)));
+        near.filter_map(|cell| self.cells.get(&cell)?.iter().copied().find(|&i| fits(i))).min()
+    }
+}
+
 /// The largest flat surfaces, and the area of each material in square metres.
 pub(crate) fn planes(scene: &Scene) -> (Vec<Plane>, Vec<f64>) {
     let mut found: Vec<Plane> = Vec::new();
+    let mut by_normal = ByNormal::default();
     let mut areas = vec![0.0; scene.materials().len()];
     for triangle in scene.triangles() {
         let [a, b, c] = triangle.vertices.map(|v| scene.vertices()[v as usize]);
@@ -66,7 +97,8 @@ pub(crate) fn planes(scene: &Scene) -> (Vec<Plane>, Vec<f64>) {
             continue;
         }
         let normal = normal.map(|n| n / length);
-        let known = found.iter().position(|p| {
+        let known = by_normal.first(normal, |index| {
+            let p = &found[index];
             p.material == material
                 && dot(p.axes[0], normal).abs() > 1.0 - TILT
                 && [a, b, c].iter().all(|&corner| p.distance_m(corner) < STEP_M)
@@ -78,6 +110,7 @@ pub(crate) fn planes(scene: &Scene) -> (Vec<Plane>, Vec<f64>) {
                 std::array::from_fn(|k| f64::from(u8::from(k == least)) - normal[least] * normal[k]);
             let size = dot(along, along).sqrt();
             let along = along.map(|x| x / size);
+            by_normal.insert(normal, found.len());
             found.push(Plane {
                 axes: [normal, along, cross(normal, along)],
                 offset_m: dot(normal, a),
@@ -107,6 +140,27 @@ mod tests {
     #![allow(clippy::unwrap_used)] // a panic is how a test fails
     use super::*;
     use sabine_acoustics::{Bands, Material};
+
+    #[test]
+    fn planes_are_found_by_their_normals_as_by_looking_at_all() {
+        // Directions over the whole sphere, by the golden angle, and others a little off, of either sign.
+        let direction = |i: usize| -> [f64; 3] {
+            let z = 1.0 - 2.0 * (i as f64 + 0.5) / 2000.0;
+            let (sin, cos) = (2.399_963 * i as f64).sin_cos();
+            let r = (1.0 - z * z).sqrt();
+            [r * cos, r * sin, z]
+        };
+        let mut by_normal = ByNormal::default();
+        (0..2000).for_each(|i| by_normal.insert(direction(i), i));
+        for i in 0..2000 {
+            let other = direction((7 * i + 3) % 2000);
+            let off: [f64; 3] = std::array::from_fn(|k| direction(i)[k] + 0.02 * other[k]);
+            let sign = if i % 2 == 0 { 1.0 } else { -1.0 };
+            let normal = off.map(|c| sign * c / dot(off, off).sqrt());
+            let fits = |k: usize| dot(direction(k), normal).abs() > 1.0 - TILT;
+            assert_eq!(by_normal.first(normal, fits), (0..2000).find(|&k| fits(k)), "{i}");
+        }
+    }
 
     #[test]
     fn a_box_has_six_planes_of_the_right_size() {

@@ -1,6 +1,6 @@
 //! The planar surfaces of a mesh, whatever they are made of: what stands, and is moved, as a whole.
 
-use crate::survey::planes::{STEP_M, TILT, cross, dot};
+use crate::survey::planes::{ByNormal, STEP_M, TILT, cross, dot};
 use sabine_scene::Scene;
 use std::collections::BTreeMap;
 
@@ -121,6 +121,23 @@ pub(crate) struct Surfaces {
     pub of_triangle: Vec<Option<usize>>,
     /// Unit normal (that of the first triangle) and a point of each plane.
     pub planes: Vec<([f64; 3], [f64; 3])>,
+    /// Triangles of each surface.
+    members: Vec<Vec<usize>>,
+}
+
+/// Least and greatest coordinates, in metres.
+pub(crate) type Bounds = [[f64; 2]; 3];
+
+/// Those of some points.
+pub(crate) fn bounds_of(points: impl Iterator<Item = [f64; 3]>) -> Bounds {
+    points.fold([[f64::INFINITY, f64::NEG_INFINITY]; 3], |all, p| {
+        std::array::from_fn(|k| [all[k][0].min(p[k]), all[k][1].max(p[k])])
+    })
+}
+
+/// Whether two boxes meet, within [`WELD_M`].
+pub(crate) fn are_near(a: &Bounds, b: &Bounds) -> bool {
+    (0..3).all(|k| a[k][0] <= b[k][1] + WELD_M && b[k][0] <= a[k][1] + WELD_M)
 }
 
 pub(crate) fn corners(scene: &Scene, triangle: usize) -> Corners {
@@ -138,6 +155,7 @@ impl Surfaces {
         let count = scene.triangles().len();
         // Planes first, then what hangs together within each.
         let mut planes: Vec<([f64; 3], [f64; 3], Vec<usize>)> = Vec::new();
+        let mut by_normal = ByNormal::default();
         for triangle in 0..count {
             let own = corners(scene, triangle);
             let normal = normal_of(own);
@@ -145,13 +163,17 @@ impl Surfaces {
                 continue;
             }
             let normal = unit(normal);
-            let lies_in = |(plane, point, _): &&mut ([f64; 3], [f64; 3], Vec<usize>)| {
-                dot(*plane, normal).abs() > 1.0 - TILT
-                    && own.iter().all(|c| dot(*plane, minus(*c, *point)).abs() < STEP_M)
+            let lies_in = |index: usize| {
+                let (plane, point) = (planes[index].0, planes[index].1);
+                dot(plane, normal).abs() > 1.0 - TILT
+                    && own.iter().all(|c| dot(plane, minus(*c, point)).abs() < STEP_M)
             };
-            match planes.iter_mut().find(lies_in) {
-                Some((_, _, members)) => members.push(triangle),
-                None => planes.push((normal, own[0], vec![triangle])),
+            match by_normal.first(normal, lies_in) {
+                Some(index) => planes[index].2.push(triangle),
+                None => {
+                    by_normal.insert(normal, planes.len());
+                    planes.push((normal, own[0], vec![triangle]));
+                }
             }
         }
         let mut found: Vec<Vec<usize>> =
@@ -161,14 +183,20 @@ impl Surfaces {
         for (surface, members) in found.iter().enumerate() {
             members.iter().for_each(|&t| of_triangle[t] = Some(surface));
         }
-        let mut all = Self { of_triangle, planes: Vec::new() };
-        all.planes = (0..found.len()).map(|surface| all.plane(scene, surface)).collect();
+        let mut all = Self { of_triangle, planes: Vec::new(), members: found };
+        all.planes = (0..all.members.len()).map(|surface| all.plane(scene, surface)).collect();
         all
     }
 
     /// Triangles of a surface.
     pub fn triangles(&self, surface: usize) -> impl Iterator<Item = usize> + '_ {
-        (0..self.of_triangle.len()).filter(move |&t| self.of_triangle[t] == Some(surface))
+        self.members[surface].iter().copied()
+    }
+
+    /// The box around each surface, in a mesh with the same triangles.
+    pub fn bounds(&self, scene: &Scene) -> Vec<Bounds> {
+        let around = |members: &Vec<usize>| bounds_of(members.iter().flat_map(|&t| corners(scene, t)));
+        self.members.iter().map(around).collect()
     }
 
     /// The plane of a surface in a mesh with the same triangles: the mean of its normals, and the centre of its area.
@@ -236,20 +264,34 @@ fn connected(scene: &Scene, members: &[usize]) -> Vec<Vec<usize>> {
         }
     }
     // Those of which one has a corner on the other: where a face ends at the middle of another's side.
-    for (index, &triangle) in members.iter().enumerate() {
-        let own = corners(scene, triangle);
-        for (other, &their_triangle) in members.iter().enumerate() {
-            if root(&mut parent, index) != root(&mut parent, other) {
-                let theirs = corners(scene, their_triangle);
-                if theirs.iter().any(|c| lies_on(own, *c)) {
-                    join(&mut parent, index, other);
-                }
+    let groups = in_groups(&mut parent);
+    let around =
+        |group: &Vec<usize>| bounds_of(group.iter().flat_map(|&index| corners(scene, members[index])));
+    let bounds: Vec<Bounds> = groups.iter().map(around).collect();
+    for (one, group) in groups.iter().enumerate() {
+        for (other, theirs) in groups.iter().enumerate() {
+            let is_joined = |parent: &mut Vec<usize>| root(parent, group[0]) == root(parent, theirs[0]);
+            if one == other || !are_near(&bounds[one], &bounds[other]) || is_joined(&mut parent) {
+                continue;
+            }
+            let touches = group.iter().any(|&index| {
+                let own = corners(scene, members[index]);
+                theirs.iter().any(|&t| corners(scene, members[t]).iter().any(|c| lies_on(own, *c)))
+            });
+            if touches {
+                join(&mut parent, group[0], theirs[0]);
             }
         }
     }
+    let joined = in_groups(&mut parent).into_iter();
+    joined.map(|group| group.into_iter().map(|index| members[index]).collect()).collect()
+}
+
+/// Indices by their roots.
+fn in_groups(parent: &mut [usize]) -> Vec<Vec<usize>> {
     let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for (index, &triangle) in members.iter().enumerate() {
-        groups.entry(root(&mut parent, index)).or_default().push(triangle);
+    for index in 0..parent.len() {
+        groups.entry(root(parent, index)).or_default().push(index);
     }
     groups.into_values().collect()
 }
