@@ -102,13 +102,14 @@ impl Diagnoser {
 
         let started = Instant::now();
         baseline.calibrate_scatter(&[], &used)?;
+        let arrival_fits = Arc::default();
         let first_dispersion = baseline.dispersion.clone();
-        let mut found = select(&mut baseline, &cases, self.effects.len(), &used, observer)?;
+        let mut found = select(&mut baseline, &cases, self.effects.len(), (&used, &arrival_fits), observer)?;
         let other_rays = (&*self.tracer, observer);
         found.more_with_half = more_with_half(&mut baseline, &cases, &found.chosen, &used, other_rays)?;
         baseline.seconds.insert("search", started.elapsed().as_secs_f64());
 
-        let search = Search::new(&baseline, &cases, self.effects.len(), used);
+        let search = Search::new(&baseline, &cases, self.effects.len(), used).knowing(&arrival_fits);
         let confirmed = confirm(&search, &mut found, &held, observer)?;
         compose(&self.effects, &search, &found, confirmed, &first_dispersion, observer)
     }

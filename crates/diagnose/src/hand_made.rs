@@ -47,6 +47,7 @@ pub(crate) fn survey(levels: Levels, time_zero: TimeZero) -> Survey {
                 air,
                 duration_s: 0.4,
                 direct_s: far / air.speed_of_sound_m_s(),
+                sounds_until_s: 0.4,
                 recorded_at: None,
             }
         })
@@ -267,5 +268,6 @@ fn measured(survey: &Survey, pair: usize, states: &[BandState], arrivals: &[Arri
         lead_in: Vec::new(),
         sample_rate_hz: 48_000,
         duration_s: 0.4,
+        sounds_until_s: 0.4,
     }
 }

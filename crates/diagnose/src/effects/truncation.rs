@@ -5,6 +5,7 @@ use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, DecayTerm, Effect, Parameter, Stage};
 use crate::extend::model_change::ModelChange;
 use crate::simulate::views::BandView;
+use crate::statistics::median;
 use crate::survey::Survey;
 
 /// The end of all responses in the time of the file, after a raised-cosine fade; nothing follows.
@@ -20,6 +21,8 @@ const LEFT: f64 = 1e-9;
 /// Points within a bin at which the fade is averaged.
 const POINTS: usize = 4;
 
+/// How much later than it ends a response may seem to: the frames in which it is held against its end.
+const FRAME_S: f64 = 0.02;
 /// Distance of the ends from which a fit starts, in seconds.
 const START_S: f64 = 0.02;
 
@@ -35,12 +38,16 @@ impl Effect for Truncation {
 
     fn cases(&self, survey: &Survey) -> Vec<Case> {
         let longest_s = longest_s(survey);
+        // What sounds on has not ended. Half of the responses decide: a door may slam in any of them.
+        let sounds_until_s = median(survey.responses().iter().map(|r| r.sounds_until_s).collect());
+        let earliest_s = (sounds_until_s - FRAME_S).max(0.02).min(longest_s);
         let parameters = vec![
-            Parameter::new("end", "s", 1.2 * longest_s, 0.6 * longest_s, (0.02, 2.0 * longest_s))
+            Parameter::new("end", "s", 1.2 * longest_s, 0.6 * longest_s, (earliest_s, 2.0 * longest_s))
                 .typically(0.4 * longest_s),
             Parameter::new("fade", "s", 0.03, 0.05, (0.002, 0.5)),
         ];
-        let case = Case::decay(parameters, *self).at(Stage::Recorder).starting(starts(longest_s));
+        let starts = starts(earliest_s, longest_s);
+        let case = Case::decay(parameters, *self).at(Stage::Recorder).starting(starts);
         vec![case.changing(|fitted| vec![ModelChange::Truncation([fitted.values()[0], fitted.values()[1]])])]
     }
 }
@@ -50,9 +57,10 @@ fn longest_s(survey: &Survey) -> f64 {
 }
 
 /// An end beyond what is compared changes nothing, and one before the true end silences what was measured: only close starts lead there.
-fn starts(longest_s: f64) -> Vec<Vec<f64>> {
-    let steps = ((longest_s / START_S) as usize).clamp(8, 120);
-    (1..steps).map(|k| vec![k as f64 / steps as f64 * longest_s, 0.03]).collect()
+fn starts(earliest_s: f64, longest_s: f64) -> Vec<Vec<f64>> {
+    let steps = (((longest_s - earliest_s) / START_S) as usize).clamp(8, 120);
+    let end_s = |k: usize| earliest_s + k as f64 / steps as f64 * (longest_s - earliest_s);
+    (0..steps).map(|k| vec![end_s(k), 0.03]).collect()
 }
 
 impl DecayTerm for Truncation {
@@ -70,5 +78,24 @@ impl DecayTerm for Truncation {
                 / POINTS as f64;
             *l += (mean + LEFT).ln();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hand_made;
+    use sabine_scene::{Levels, TimeZero};
+
+    #[test]
+    fn what_most_responses_sound_beyond_is_no_end() {
+        let mut survey = hand_made::survey(Levels::Common, TimeZero::Emission);
+        for (response, until_s) in survey.responses.iter_mut().zip([0.2, 0.18, 0.39]) {
+            response.sounds_until_s = until_s;
+        }
+        let case = &Truncation.cases(&survey)[0];
+        let (low, high) = case.parameters[0].bounds;
+        assert!((low - (0.2 - FRAME_S)).abs() < 1e-9 && high > 0.4, "{low} {high}");
+        assert!(case.starts.iter().all(|start| (low..0.4).contains(&start[0])));
     }
 }

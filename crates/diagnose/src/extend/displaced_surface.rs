@@ -71,28 +71,30 @@ pub(crate) fn put(all: &mut Vec<DisplacedSurface>, one: DisplacedSurface) {
     }
 }
 
+/// A surface (index) and the plane in which it stands: its unit normal and a point.
+pub(crate) type Mirror = (usize, ([f64; 3], [f64; 3]));
+
+/// The planes of displaced surfaces.
+pub(crate) fn mirrors(displaced: &[(usize, DisplacedSurface)]) -> Vec<Mirror> {
+    displaced.iter().map(|(surface, one)| (*surface, one.plane())).collect()
+}
+
 /// By how much longer the specular path of a response over surfaces (indices, from the source on) is where some of these stand elsewhere,
 /// in metres: the distance of the source's image in the mirrors as they stand from the receiver, less that in the mirrors as stated. What is
 /// said last of a surface counts.
-pub(crate) fn longer_m(
-    survey: &Survey,
-    response: &SurveyedResponse,
-    met: &[usize],
-    displaced: &[(usize, DisplacedSurface)],
-) -> f64 {
-    if met.iter().all(|surface| displaced.iter().all(|(moved, _)| moved != surface)) {
+pub(crate) fn longer_m(survey: &Survey, response: &SurveyedResponse, met: &[usize], moved: &[Mirror]) -> f64 {
+    if met.iter().all(|surface| moved.iter().all(|(own, _)| own != surface)) {
         return 0.0;
     }
     let source = survey.sources[response.source].position_m;
     let receiver = survey.receivers[response.receiver].position_m;
-    let moved: Vec<_> = displaced.iter().map(|(surface, one)| (surface, one.plane())).collect();
     let (mut stated, mut found) = (source, source);
     for surface in met {
         let own = &survey.surfaces[*surface];
         stated = mirrored_in(stated, own.axes[0], own.centre_m);
         let as_stated = (own.axes[0], own.centre_m);
         let (normal, point) =
-            moved.iter().rfind(|(moved, _)| *moved == surface).map_or(as_stated, |(_, plane)| *plane);
+            moved.iter().rfind(|(moved, _)| moved == surface).map_or(as_stated, |(_, plane)| *plane);
         found = mirrored_in(found, normal, point);
     }
     let far = |image: [f64; 3]| (0..3).map(|k| (image[k] - receiver[k]).powi(2)).sum::<f64>().sqrt();
@@ -175,7 +177,7 @@ mod tests {
             for offset_m in [-0.6, -0.2, 0.35, 0.6] {
                 let moved =
                     DisplacedSurface::new(survey.surfaces[far].centre_m, [1.0, 0.0, 0.0], offset_m, [0.0; 2]);
-                let found = |met: &[usize]| longer_m(&survey, response, met, &[(far, moved.clone())]);
+                let found = |met: &[usize]| longer_m(&survey, response, met, &[(far, moved.plane())]);
                 // Allen and Berkley: images at 2 n L + x and 2 n L - x.
                 let (x, length) = (source[0], 5.0 + offset_m);
                 for (met, stated, there) in [
@@ -253,7 +255,7 @@ mod tests {
                     };
                     let expected = shortest_m(source, &planes(true), receiver)
                         - shortest_m(source, &planes(false), receiver);
-                    let found = longer_m(&survey, response, met, set);
+                    let found = longer_m(&survey, response, met, &mirrors(set));
                     assert!((found - expected).abs() < 1e-6, "{met:?} {set:?}: {found} {expected}");
                     checked += usize::from(found != 0.0);
                 }

@@ -209,7 +209,7 @@ fn density(
     let firsts: &[usize] = if *chosen == state.chosen { &state.energy_firsts } else { &[] };
     let before = WarmStart { values: &state.energy.values, firsts };
     let (energy, energy_firsts) = baseline.fit_energy(&predictor.decay_cases(search), used, Some(before))?;
-    let arrivals = baseline.fit_arrivals(&search.cases_of(chosen, Observable::Arrivals), used)?.0;
+    let arrivals = search.fit_arrivals(chosen, used)?.0;
     let fitted = Fitted { energy: &energy, energy_firsts: &energy_firsts, arrivals: &arrivals };
     let candidates = (&search.candidates[..], &search.used[..]);
     let own = direct_evidence::own(baseline, candidates, chosen, fitted, used);

@@ -1,5 +1,6 @@
 //! Which causes the observations support.
 
+pub(crate) mod arrival_fits;
 pub(crate) mod baseline;
 pub(crate) mod candidates;
 pub(crate) mod confirmation;

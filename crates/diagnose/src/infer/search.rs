@@ -3,6 +3,7 @@
 use crate::effect::AuxiliaryEvidence;
 use crate::effect::{Case, ChannelChange, Nuisance, Observable};
 use crate::error::Error;
+use crate::infer::arrival_fits::{ArrivalFit, ArrivalFits};
 use crate::infer::baseline::Baseline;
 use crate::infer::candidates::{
     Candidate, CatalogueCase, EffectScore, Score, by_effect, candidates, cases_of,
@@ -14,6 +15,7 @@ use crate::likelihood::laplace::LaplaceFit;
 use crate::likelihood::polarity;
 use rayon::prelude::*;
 use sabine_acoustics::{Observer, report};
+use std::sync::Arc;
 
 /// Causes whose evidence differs by less are not told apart, in nats: odds of 20 to 1.
 pub(crate) const RIVAL_NATS: f64 = 3.0;
@@ -60,12 +62,26 @@ pub(crate) struct Search<'a> {
     /// Number of effects, for the correction for how many were tried.
     pub effects: usize,
     pub used: Vec<bool>,
+    arrival_fits: Arc<ArrivalFits>,
 }
 
 impl<'a> Search<'a> {
     pub fn new(baseline: &'a Baseline, cases: &'a [CatalogueCase], effects: usize, used: Vec<bool>) -> Self {
         let candidates = candidates(cases);
-        Self { baseline, candidates, effects, used }
+        Self { baseline, candidates, effects, used, arrival_fits: Arc::default() }
+    }
+
+    /// With fits that another search over the same cases has made.
+    pub fn knowing(self, arrival_fits: &Arc<ArrivalFits>) -> Self {
+        Self { arrival_fits: Arc::clone(arrival_fits), ..self }
+    }
+
+    /// Fits the arrival times of some responses under the chosen candidates that bear on them.
+    pub fn fit_arrivals(&self, chosen: &[usize], used: &[bool]) -> Result<ArrivalFit, Error> {
+        let bears = |c: &usize| self.candidates[*c].case.observable().concerns(Observable::Arrivals);
+        let bear: Vec<usize> = chosen.iter().copied().filter(bears).collect();
+        let cases = self.cases_of(&bear, Observable::Arrivals);
+        self.arrival_fits.of(bear, used, || self.baseline.fit_arrivals(&cases, used))
     }
 
     pub fn cases_of(&self, chosen: &[usize], part: Observable) -> Vec<&'a Case> {
@@ -76,8 +92,7 @@ impl<'a> Search<'a> {
         let before = near.map(|s| WarmStart { values: &s.energy.values, firsts: &[] });
         let cases = self.cases_of(chosen, Observable::Decay);
         let (energy, energy_firsts) = self.baseline.fit_energy(&cases, &self.used, before)?;
-        let cases = self.cases_of(chosen, Observable::Arrivals);
-        let (arrivals, arrival_firsts) = self.baseline.fit_arrivals(&cases, &self.used)?;
+        let (arrivals, arrival_firsts) = self.fit_arrivals(chosen, &self.used)?;
         let polarity = polarity::log_likelihood(
             &self.baseline.observations.measured,
             &self.all_cases(chosen),
@@ -107,8 +122,7 @@ impl<'a> Search<'a> {
                 self.baseline.fit_energy(&cases, &self.used, Some(state.before()))?;
         }
         if evidence.concerns(Observable::Arrivals) && !inverts {
-            let cases = self.cases_of(&next.chosen, Observable::Arrivals);
-            (next.arrivals, next.arrival_firsts) = self.baseline.fit_arrivals(&cases, &self.used)?;
+            (next.arrivals, next.arrival_firsts) = self.fit_arrivals(&next.chosen, &self.used)?;
         }
         if inverts {
             next.polarity = polarity::log_likelihood(

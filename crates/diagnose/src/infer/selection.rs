@@ -4,11 +4,13 @@ use crate::effect::{Case, Observable};
 use crate::error::Error;
 use crate::extend::extension::changes;
 use crate::extend::model_change::ModelChange;
+use crate::infer::arrival_fits::ArrivalFits;
 use crate::infer::baseline::Baseline;
 use crate::infer::candidates::{CatalogueCase, EffectScore};
 use crate::infer::ray_dependence::MoreWithHalf;
 use crate::infer::search::{Search, State};
 use sabine_acoustics::Observer;
+use std::sync::Arc;
 
 /// What the search found.
 #[derive(Default)]
@@ -51,13 +53,13 @@ pub(crate) fn select(
     baseline: &mut Baseline,
     cases: &[CatalogueCase],
     effects: usize,
-    used: &[bool],
+    (used, arrival_fits): (&[bool], &Arc<ArrivalFits>),
     observer: &dyn Observer,
 ) -> Result<Selection, Error> {
     let mut named = Selection::default();
     while named.chosen.len() < baseline.config.most_causes {
         let (ranked, rivals, interchangeable, threshold) = {
-            let search = Search::new(baseline, cases, effects, used.to_vec());
+            let search = Search::new(baseline, cases, effects, used.to_vec()).knowing(arrival_fits);
             let base = search.state(&[], None)?;
             let state = search.state(&named.chosen, Some(&base))?;
             let mut scores = search.scores(&state, observer)?;
@@ -104,7 +106,7 @@ pub(crate) fn select(
             break;
         }
         let (changes, absorption) = {
-            let search = Search::new(baseline, cases, effects, used.to_vec());
+            let search = Search::new(baseline, cases, effects, used.to_vec()).knowing(arrival_fits);
             let state = search.state(&named.chosen, None)?;
             (changes(&search, &state, best.best), state.energy.values)
         };
@@ -123,7 +125,7 @@ pub(crate) fn select(
             .collect();
         baseline.calibrate_scatter(&chosen, used)?;
     }
-    let search = Search::new(baseline, cases, effects, used.to_vec());
+    let search = Search::new(baseline, cases, effects, used.to_vec()).knowing(arrival_fits);
     let state = search.backward(search.state(&named.chosen, None)?)?;
     if named.chosen.last() != state.chosen.last() {
         // The set stands for a cause that has turned out to be superfluous.
@@ -182,7 +184,8 @@ mod tests {
             vec![Box::new(PositionError), Box::new(TimeZeroOffset), Box::new(SurfaceAbsorption)];
         let cases = cases(&effects, baseline.survey());
         let used = vec![true; baseline.pairs()];
-        let found = select(&mut baseline, &cases, effects.len(), &used, &()).expect("fits");
+        let found =
+            select(&mut baseline, &cases, effects.len(), (&used, &Arc::default()), &()).expect("fits");
         let chosen = found.chosen.iter().map(|&c| (cases[c].id, cases[c].case.subject.clone())).collect();
         (chosen, found)
     }

@@ -7,7 +7,7 @@ mod unassigned_peaks;
 
 use crate::effect::Case;
 use crate::error::Error;
-use crate::extend::displaced_surface::DisplacedSurface;
+use crate::extend::displaced_surface::{DisplacedSurface, Mirror, mirrors};
 use crate::likelihood::laplace::{LaplaceFit, Model, Prior, Slopes, maximise};
 use crate::likelihood::parameters::{ArrivalLayout, ModelTerm, ModelTerms};
 use crate::observe::observed_response::{Measured, PEAK_FLOOR_DB, PEAKS_S};
@@ -62,6 +62,21 @@ pub(crate) struct ArrivalModel<'a> {
     width_s: Option<f64>,
 }
 
+/// Values of all parameters, and the surfaces that they move.
+pub(crate) struct At<'v> {
+    values: &'v [f64],
+    is_sloping: bool,
+    mirrors: Vec<Mirror>,
+    /// By term, where it does nothing but move a surface.
+    moved: Vec<Option<Moved>>,
+}
+
+/// A surface that a term moves, and all mirrors a step of each parameter farther and less far.
+struct Moved {
+    surface: usize,
+    steps: Vec<[Vec<Mirror>; 2]>,
+}
+
 fn normal(residual: f64, sd: f64) -> f64 {
     let z = residual / sd;
     // Most peaks are far from most reflections; beside the even background their density is less than the last bit.
@@ -89,13 +104,43 @@ impl<'a> ArrivalModel<'a> {
         Self { data, layout, terms, priors, used, assignment, width_s: None }
     }
 
-    fn effect_delay_s(&self, values: &[f64], view: &ArrivalView<'_>) -> f64 {
-        let delay_s = |p: &ModelTerm<'_>| {
-            let term = p.case.arrival_term().filter(|term| term.displaces(p.own(values)).is_none())?;
-            Some(term.delay_s(p.own(values), view))
+    /// Values, with what their terms make of the mirrors; a step farther, too, where slopes are wanted.
+    fn at<'v>(&self, values: &'v [f64], is_sloping: bool) -> At<'v> {
+        let moved = |(number, placed): (usize, &ModelTerm<'_>)| {
+            let mut own = placed.own(values).to_vec();
+            let (surface, _) = placed.case.arrival_term()?.displaces(&own)?;
+            let mut stepped = |i: usize, step: f64| {
+                let value = own[i];
+                own[i] = value + step;
+                let found = mirrors(&self.displaced(values, Some((number, &own))));
+                own[i] = value;
+                found
+            };
+            let count = if is_sloping { placed.case.parameters.len() } else { 0 };
+            let steps = (0..count)
+                .map(|i| [1.0, -1.0].map(|sign| stepped(i, sign * self.step(placed.first + i))))
+                .collect();
+            Some(Moved { surface, steps })
         };
-        let displaced = self.displaced(values, None);
-        self.terms.iter().filter_map(delay_s).sum::<f64>() + view.delay_by_displaced_s(&displaced)
+        At {
+            values,
+            is_sloping,
+            mirrors: mirrors(&self.displaced(values, None)),
+            moved: self.terms.iter().enumerate().map(moved).collect(),
+        }
+    }
+
+    /// Step of differences of a parameter.
+    fn step(&self, index: usize) -> f64 {
+        1e-4 * self.priors[index].sd
+    }
+
+    fn effect_delay_s(&self, at: &At<'_>, view: &ArrivalView<'_>) -> f64 {
+        let delay_s = |(placed, moved): (&ModelTerm<'_>, &Option<Moved>)| {
+            let term = placed.case.arrival_term().filter(|_| moved.is_none())?;
+            Some(term.delay_s(placed.own(at.values), view))
+        };
+        self.terms.iter().zip(&at.moved).filter_map(delay_s).sum::<f64>() + view.delay_in_s(&at.mirrors)
     }
 
     /// All surfaces that the terms move; `instead` are other values of one term (its number).
@@ -120,13 +165,13 @@ impl<'a> ArrivalModel<'a> {
     }
 
     /// Time of an arrival in the file.
-    fn time_s(&self, values: &[f64], pair: usize, arrival: &Arrival) -> f64 {
-        let response = &self.data.survey.responses[pair];
+    fn time_s(&self, at: &At<'_>, pair: usize, arrival: &Arrival) -> f64 {
+        let (values, response) = (at.values, &self.data.survey.responses[pair]);
         let speed = self.data.speed_m_s[pair];
         let source = self.layout.source(response.source).start;
         let receiver = self.layout.receiver(response.receiver).start;
         let latency = self.layout.latency(self.assignment[pair]);
-        let effects_s = self.effect_delay_s(values, &self.view(pair, arrival));
+        let effects_s = self.effect_delay_s(at, &self.view(pair, arrival));
         let mut time_s = arrival.length_m / speed + values[latency] + effects_s;
         for k in 0..3 {
             let (s, r) = (-arrival.departure[k] / speed, -arrival.arrival[k] / speed);
@@ -136,7 +181,7 @@ impl<'a> ArrivalModel<'a> {
     }
 
     /// Change of that time with each parameter that matters.
-    fn time_slopes(&self, values: &[f64], pair: usize, arrival: &Arrival) -> Vec<(usize, f64)> {
+    fn time_slopes(&self, at: &At<'_>, pair: usize, arrival: &Arrival) -> Vec<(usize, f64)> {
         let response = &self.data.survey.responses[pair];
         let speed = self.data.speed_m_s[pair];
         let source = self.layout.source(response.source).start;
@@ -148,27 +193,28 @@ impl<'a> ArrivalModel<'a> {
         }
         found.push((self.layout.latency(self.assignment[pair]), 1.0));
         let view = self.view(pair, arrival);
-        for (number, placed) in self.terms.iter().enumerate() {
-            let Some(term) = placed.case.arrival_term() else { continue };
-            let mut own = placed.own(values).to_vec();
-            let displaces = term.displaces(&own).map(|(surface, _)| surface);
-            if displaces.is_some_and(|surface| !arrival.surfaces.contains(&surface)) {
+        for (placed, moved) in self.terms.iter().zip(&at.moved) {
+            let mut slope = |i: usize, [later, earlier]: [f64; 2]| {
+                let index = placed.first + i;
+                found.push((index, (later - earlier) / (2.0 * self.step(index))));
+            };
+            if let Some(moved) = moved {
+                if arrival.surfaces.contains(&moved.surface) {
+                    let steps = moved.steps.iter().enumerate();
+                    steps.for_each(|(i, both)| slope(i, [0, 1].map(|k| view.delay_in_s(&both[k]))));
+                }
                 continue;
             }
+            let Some(term) = placed.case.arrival_term() else { continue };
+            let mut own = placed.own(at.values).to_vec();
             for i in 0..own.len() {
-                let (index, value) = (placed.first + i, own[i]);
-                let step = 1e-4 * self.priors[index].sd;
-                let mut at = |moved: f64| {
-                    own[i] = moved;
-                    if displaces.is_some() {
-                        view.delay_by_displaced_s(&self.displaced(values, Some((number, &own))))
-                    } else {
-                        term.delay_s(&own, &view)
-                    }
-                };
-                let (later, earlier) = (at(value + step), at(value - step));
+                let value = own[i];
+                let both = [1.0, -1.0].map(|sign| {
+                    own[i] = value + sign * self.step(placed.first + i);
+                    term.delay_s(&own, &view)
+                });
                 own[i] = value;
-                found.push((index, (later - earlier) / (2.0 * step)));
+                slope(i, both);
             }
         }
         found
@@ -177,10 +223,10 @@ impl<'a> ArrivalModel<'a> {
     /// The same, for tests of effects.
     #[cfg(test)]
     pub fn arrival_s(&self, values: &[f64], pair: usize, arrival: &Arrival) -> f64 {
-        self.time_s(values, pair, arrival)
+        self.time_s(&self.at(values, false), pair, arrival)
     }
 
-    fn pair_likelihood(&self, values: &[f64], pair: usize, mut slopes: Option<&mut Slopes>) -> f64 {
+    fn pair_likelihood(&self, at: &At<'_>, pair: usize, mut slopes: Option<&mut Slopes>) -> f64 {
         let Some((direct, later)) = self.data.arrivals[pair].split_first() else { return 0.0 };
         let measured = &self.data.measured[self.assignment[pair]];
         let direct_sd_s = DIRECT_SD_S * measured.slowness();
@@ -195,8 +241,8 @@ impl<'a> ArrivalModel<'a> {
                 }
             }
         };
-        let residual = measured.direct_s - self.time_s(values, pair, direct);
-        let found = if sloping { self.time_slopes(values, pair, direct) } else { Vec::new() };
+        let residual = measured.direct_s - self.time_s(at, pair, direct);
+        let found = if sloping { self.time_slopes(at, pair, direct) } else { Vec::new() };
         let Some(width_s) = self.width_s else {
             push(&found, residual, direct_sd_s, 1.0);
             return -0.5 * (residual / direct_sd_s).powi(2);
@@ -207,25 +253,26 @@ impl<'a> ArrivalModel<'a> {
         let mut value = (right + wrong).ln();
 
         let sd = (REFLECTION_SD_S * measured.slowness()).hypot(width_s);
-        let amplitude: f64 = later.iter().map(|a| a.energy.sqrt()).sum();
+        let amplitudes: Vec<f64> = later.iter().map(|a| a.energy.sqrt()).collect();
+        let amplitude: f64 = amplitudes.iter().sum();
         if amplitude <= 0.0 {
             return value;
         }
-        let times_s: Vec<f64> = later.iter().map(|a| self.time_s(values, pair, a)).collect();
+        let times_s: Vec<f64> = later.iter().map(|a| self.time_s(at, pair, a)).collect();
         // Slopes of those that are some peak's partner: few are.
         let mut own_slopes: Vec<Option<Vec<(usize, f64)>>> = vec![None; later.len()];
-        let more = self.added(values, pair);
+        let more = self.added(at, pair);
         let each = SEEN_SHARE / measured.peaks_s.len().max(1) as f64;
         let rest = 1.0 - each * more.len() as f64;
+        let mut partners: Vec<(usize, f64)> = Vec::new();
         for (peak, height_db) in measured.peaks_s.iter().zip(&measured.peaks_db) {
-            let densities: Vec<f64> = later
-                .iter()
-                .zip(&times_s)
-                .map(|(a, t)| match normal(peak - t, sd) {
-                    0.0 => 0.0,
-                    density => rest * (1.0 - STRAY_SHARE) * a.energy.sqrt() / amplitude * density,
-                })
-                .collect();
+            partners.clear();
+            for (i, (time_s, own)) in times_s.iter().zip(&amplitudes).enumerate() {
+                if (peak - time_s).abs() < FAR_SD * sd {
+                    let density = normal(peak - time_s, sd);
+                    partners.push((i, rest * (1.0 - STRAY_SHARE) * own / amplitude * density));
+                }
+            }
             // Heights of other peaks say nothing: anything down to the floor is as probable.
             let added: Vec<f64> = more
                 .iter()
@@ -236,17 +283,17 @@ impl<'a> ArrivalModel<'a> {
                 })
                 .collect();
             let stray = rest * STRAY_SHARE / PEAKS_S;
-            let total = densities.iter().sum::<f64>() + added.iter().sum::<f64>() + stray;
+            let total =
+                partners.iter().map(|(_, density)| density).sum::<f64>() + added.iter().sum::<f64>() + stray;
             value += total.ln();
             if !sloping {
                 continue;
             }
-            for (i, density) in densities.iter().enumerate() {
+            for (i, density) in &partners {
                 let share = density / total;
                 if share > 1e-3 {
-                    let found =
-                        own_slopes[i].get_or_insert_with(|| self.time_slopes(values, pair, &later[i]));
-                    push(found, peak - times_s[i], sd, share);
+                    let found = own_slopes[*i].get_or_insert_with(|| self.time_slopes(at, pair, &later[*i]));
+                    push(found, peak - times_s[*i], sd, share);
                 }
             }
             for (density, m) in added.iter().zip(&more) {
@@ -261,7 +308,8 @@ impl<'a> ArrivalModel<'a> {
     }
 
     pub fn by_pair(&self, values: &[f64]) -> Vec<f64> {
-        (0..self.assignment.len()).map(|pair| self.pair_likelihood(values, pair, None)).collect()
+        let at = self.at(values, false);
+        (0..self.assignment.len()).map(|pair| self.pair_likelihood(&at, pair, None)).collect()
     }
 }
 
@@ -271,9 +319,10 @@ impl Model for ArrivalModel<'_> {
     }
 
     fn log_likelihood(&self, values: &[f64], mut slopes: Option<&mut Slopes>) -> f64 {
+        let at = self.at(values, slopes.is_some());
         (0..self.assignment.len())
             .filter(|&pair| self.used[pair])
-            .map(|pair| self.pair_likelihood(values, pair, slopes.as_deref_mut()))
+            .map(|pair| self.pair_likelihood(&at, pair, slopes.as_deref_mut()))
             .sum()
     }
 }

@@ -106,6 +106,7 @@ impl Observations {
                     air: entry.air,
                     duration_s: found.duration_s,
                     direct_s: found.direct_s,
+                    sounds_until_s: found.sounds_until_s,
                     recorded_at: entry.recorded_at,
                 });
                 self.measured.push(found);

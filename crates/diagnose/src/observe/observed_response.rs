@@ -23,6 +23,12 @@ const MAX_PEAKS: usize = 24;
 const SMOOTHING_S: f64 = 0.08e-3;
 /// Half of the direct pulse that is compared for its sign.
 const PULSE_S: f64 = 0.5e-3;
+/// Frames in which a response is held against its own end.
+const FRAME_S: f64 = 0.02;
+/// The share of a response that counts as its end.
+const END_SHARE: f64 = 0.1;
+/// Energy of a frame over the mean of those at the end from which it is more than they are.
+const ABOVE_END: f64 = 2.0;
 
 /// One measured response: energies relative to the direct sound's instant, arrivals in the time of the file.
 #[derive(Clone, Debug)]
@@ -43,6 +49,8 @@ pub(crate) struct Measured {
     pub lead_in: Vec<PreArrivalBand>,
     pub sample_rate_hz: u32,
     pub duration_s: f64,
+    /// Until when it is louder than at its end, in seconds from the first sample.
+    pub sounds_until_s: f64,
 }
 
 impl Measured {
@@ -97,7 +105,19 @@ impl Measured {
         let (peaks_s, peaks_db) = peaks(&smooth, direct, rate);
         let complete = |band: usize| bank.is_complete(band);
         let lead_in = pre_arrival::of_response(filtered.values(), &complete, bands, direct_s * rate, rate);
-        Ok(Self { energies, direct_s, peaks_s, peaks_db, early, pulse, lead_in, sample_rate_hz, duration_s })
+        let sounds_until_s = sounds_until_s(samples, rate);
+        Ok(Self {
+            energies,
+            direct_s,
+            peaks_s,
+            peaks_db,
+            early,
+            pulse,
+            lead_in,
+            sample_rate_hz,
+            duration_s,
+            sounds_until_s,
+        })
     }
 
     /// Likeness of the direct pulses of two responses, -1 to 1, at the best of small lags.
@@ -118,6 +138,18 @@ impl Measured {
         };
         (-2..=2).map(at).max_by(|a, b| a.abs().total_cmp(&b.abs())).filter(|c| c.is_finite())
     }
+}
+
+/// Until when a response is louder than at its end, in seconds: the end of the last frame of which that is so. Nothing can have been cut
+/// off before.
+fn sounds_until_s(samples: &[f32], rate: f64) -> f64 {
+    let size = ((FRAME_S * rate).round() as usize).max(1);
+    let frames: Vec<f64> =
+        samples.chunks_exact(size).map(|f| f.iter().map(|&x| f64::from(x).powi(2)).sum()).collect();
+    let last = ((END_SHARE * frames.len() as f64).ceil() as usize).min(frames.len());
+    let end = frames[frames.len() - last..].iter().sum::<f64>() / last.max(1) as f64;
+    let until = frames.iter().rposition(|&energy| energy > ABOVE_END * end).map_or(0, |frame| frame + 1);
+    (until * size) as f64 / rate
 }
 
 /// Energy of each bin from squared samples; bin edges fall between samples.
@@ -184,4 +216,26 @@ fn peaks(smooth: &[f64], direct: usize, rate: f64) -> (Vec<f64>, Vec<f64>) {
     let height_db = |k: &usize| 10.0 * (smooth[*k] / smooth[direct]).log10();
     let heights = kept.iter().map(height_db).collect();
     (kept.into_iter().map(|k| vertex(smooth, k) / rate).collect(), heights)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_decay_sounds_until_it_meets_noise_or_is_cut_off() {
+        let rate = 8000.0;
+        // 60 dB in 0.6 s, beside noise 40 dB down: they meet at 0.4 s, and to be twice as much as noise takes as much again.
+        let decay = |i: usize| 10f32.powf(-3.0 * i as f32 / (0.6 * rate as f32));
+        let sign = |i: usize| if (i * i / 7).is_multiple_of(3) { 1.0 } else { -1.0 };
+        let noisy: Vec<f32> = (0..8000).map(|i| sign(i) * (decay(i).powi(2) + 1e-4).sqrt()).collect();
+        let found = sounds_until_s(&noisy, rate);
+        assert!((0.36..=0.42).contains(&found), "{found}");
+        let cut: Vec<f32> = (0..8000).map(|i| if i < 2000 { sign(i) * decay(i) } else { 0.0 }).collect();
+        let found = sounds_until_s(&cut, rate);
+        assert!((0.25..0.25 + 1.01 * FRAME_S).contains(&found), "{found}");
+        // Too short for a frame, and the same from beginning to end.
+        assert_eq!(sounds_until_s(&cut[..100], rate), 0.0);
+        assert_eq!(sounds_until_s(&[0.5; 8000], rate), 0.0);
+    }
 }

@@ -1,6 +1,6 @@
 //! What an effect is shown of a prediction.
 
-use crate::extend::displaced_surface::{DisplacedSurface, longer_m};
+use crate::extend::displaced_surface::{DisplacedSurface, Mirror, longer_m, mirrors};
 use crate::simulate::reflection_reweighting::HitChanges;
 use crate::simulate::tables::Tables;
 use crate::simulate::traced_pair::BandState;
@@ -182,6 +182,11 @@ impl ArrivalView<'_> {
     /// Seconds by which it comes later if surfaces (indices into [`Survey::surfaces`]) stand elsewhere: exact for a specular path, whose
     /// source has its image in the mirrors as they stand. Zero where it meets none of them.
     pub fn delay_by_displaced_s(&self, displaced: &[(usize, DisplacedSurface)]) -> f64 {
-        longer_m(self.survey, self.pair(), self.surfaces, displaced) / self.speed_m_s
+        self.delay_in_s(&mirrors(displaced))
+    }
+
+    /// The same of the planes in which they stand.
+    pub(crate) fn delay_in_s(&self, moved: &[Mirror]) -> f64 {
+        longer_m(self.survey, self.pair(), self.surfaces, moved) / self.speed_m_s
     }
 }

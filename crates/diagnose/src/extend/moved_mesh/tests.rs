@@ -304,7 +304,7 @@ fn the_tracer_finds_every_early_path_as_long_in_the_moved_mesh_as_its_delay_says
                 continue;
             };
             followed += 1;
-            let longer_m = longer_m(&survey, &survey.responses[0], &own, &[(number, one.clone())]);
+            let longer_m = longer_m(&survey, &survey.responses[0], &own, &[(number, one.plane())]);
             // Beside an edge, a path may be gone once one of the surfaces is tilted: what leads from the receiver to its image says so.
             let image = own.iter().fold(source.position_m, |place, &s| {
                 let (normal, point) = if s == number { one.plane() } else { surfaces.planes[s] };

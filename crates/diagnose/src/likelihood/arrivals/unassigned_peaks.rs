@@ -1,6 +1,6 @@
 //! Reflections that the mesh does not have: what effects add, where peaks point, and the fit from there.
 
-use super::{ArrivalData, ArrivalModel, PEAKS_S, REFLECTION_SD_S, STRAY_SHARE, WIDTHS_S, at_fit, normal};
+use super::{ArrivalData, ArrivalModel, At, PEAKS_S, REFLECTION_SD_S, STRAY_SHARE, WIDTHS_S, at_fit, normal};
 use crate::effect::{Case, FittedCase, Nuisance};
 use crate::error::Error;
 use crate::extend::model_change::ModelChange;
@@ -18,7 +18,7 @@ fn apart_m(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// A reflection that an effect adds, and how its time and its height change with parameters.
+/// A reflection that an effect adds, and, where slopes are wanted, how its time and its height change with parameters.
 pub(super) struct AddedArrival {
     pub time_s: f64,
     pub slopes: Vec<(usize, f64)>,
@@ -28,7 +28,8 @@ pub(super) struct AddedArrival {
 
 impl<'a> ArrivalModel<'a> {
     /// Reflections that effects add to a pair.
-    pub(super) fn added(&self, values: &[f64], pair: usize) -> Vec<AddedArrival> {
+    pub(super) fn added(&self, at: &At<'_>, pair: usize) -> Vec<AddedArrival> {
+        let values = at.values;
         let one = |placed: &ModelTerm<'_>| {
             let (term, survey) = (placed.case.reflection_term()?, self.data.survey);
             let range = placed.range();
@@ -46,17 +47,25 @@ impl<'a> ArrivalModel<'a> {
                 energy: 0.0,
                 surfaces: Vec::new(),
             };
-            let time_s = self.time_s(values, pair, &arrival);
-            let mut slopes = self.time_slopes(values, pair, &arrival);
+            let time_s = self.time_s(at, pair, &arrival);
+            if !at.is_sloping {
+                return Some(AddedArrival {
+                    time_s,
+                    slopes: Vec::new(),
+                    level_db: added.level_db,
+                    level_slopes: Vec::new(),
+                });
+            }
+            let mut slopes = self.time_slopes(at, pair, &arrival);
             let mut level_slopes = Vec::new();
             for index in range.clone() {
-                let step = 1e-4 * self.priors[index].sd;
-                let at = |offset: f64| {
-                    let mut moved = values[range.clone()].to_vec();
-                    moved[index - range.start] += offset;
-                    term.reflection(&moved, survey, pair)
+                let step = self.step(index);
+                let moved = |offset: f64| {
+                    let mut own = values[range.clone()].to_vec();
+                    own[index - range.start] += offset;
+                    term.reflection(&own, survey, pair)
                 };
-                if let (Some(up), Some(down)) = (at(step), at(-step)) {
+                if let (Some(up), Some(down)) = (moved(step), moved(-step)) {
                     slopes.push((
                         index,
                         (up.length_m - down.length_m) / (2.0 * step) / self.data.speed_m_s[pair],
@@ -71,11 +80,12 @@ impl<'a> ArrivalModel<'a> {
 
     /// When reflections that effects add come, in seconds of the file.
     pub fn added_s(&self, values: &[f64], pair: usize) -> Vec<f64> {
-        self.added(values, pair).iter().map(|m| m.time_s).collect()
+        self.added(&self.at(values, false), pair).iter().map(|m| m.time_s).collect()
     }
 
     /// Peaks with the length of their way and the probability that nothing predicted explains them.
     fn strays(&self, values: &[f64]) -> UnassignedPeaks<'a> {
+        let at = self.at(values, false);
         let peaks = (0..self.assignment.len())
             .map(|pair| {
                 let Some((direct, later)) = self.data.arrivals[pair].split_first() else { return Vec::new() };
@@ -83,8 +93,8 @@ impl<'a> ArrivalModel<'a> {
                     return Vec::new();
                 }
                 let amplitude: f64 = later.iter().map(|a| a.energy.sqrt()).sum();
-                let times: Vec<f64> = later.iter().map(|a| self.time_s(values, pair, a)).collect();
-                let direct_s = self.time_s(values, pair, direct);
+                let times: Vec<f64> = later.iter().map(|a| self.time_s(&at, pair, a)).collect();
+                let direct_s = self.time_s(&at, pair, direct);
                 let measured = &self.data.measured[self.assignment[pair]];
                 let one = |peak: &f64| {
                     let explained: f64 = later
