@@ -21,8 +21,6 @@ const LEFT: f64 = 1e-9;
 /// Points within a bin at which the fade is averaged.
 const POINTS: usize = 4;
 
-/// How much later than it ends a response may seem to: the frames in which it is held against its end.
-const FRAME_S: f64 = 0.02;
 /// Distance of the ends from which a fit starts, in seconds.
 const START_S: f64 = 0.02;
 
@@ -40,7 +38,7 @@ impl Effect for Truncation {
         let longest_s = longest_s(survey);
         // What sounds on has not ended. Half of the responses decide: a door may slam in any of them.
         let sounds_until_s = median(survey.responses().iter().map(|r| r.sounds_until_s).collect());
-        let earliest_s = (sounds_until_s - FRAME_S).max(0.02).min(longest_s);
+        let earliest_s = sounds_until_s.max(0.02).min(longest_s);
         let parameters = vec![
             Parameter::new("end", "s", 1.2 * longest_s, 0.6 * longest_s, (earliest_s, 2.0 * longest_s))
                 .typically(0.4 * longest_s),
@@ -95,7 +93,7 @@ mod tests {
         }
         let case = &Truncation.cases(&survey)[0];
         let (low, high) = case.parameters[0].bounds;
-        assert!((low - (0.2 - FRAME_S)).abs() < 1e-9 && high > 0.4, "{low} {high}");
+        assert!((low - 0.2).abs() < 1e-9 && high > 0.4, "{low} {high}");
         assert!(case.starts.iter().all(|start| (low..0.4).contains(&start[0])));
     }
 }

@@ -49,7 +49,7 @@ pub(crate) struct Measured {
     pub lead_in: Vec<PreArrivalBand>,
     pub sample_rate_hz: u32,
     pub duration_s: f64,
-    /// Until when it is louder than at its end, in seconds from the first sample.
+    /// When it is louder than at its end for the last time, in seconds from the first sample.
     pub sounds_until_s: f64,
 }
 
@@ -140,16 +140,16 @@ impl Measured {
     }
 }
 
-/// Until when a response is louder than at its end, in seconds: the end of the last frame of which that is so. Nothing can have been cut
-/// off before.
+/// When a response is louder than at its end for the last time, in seconds: the beginning of the last frame of which that is so. Nothing
+/// can have been cut off before.
 fn sounds_until_s(samples: &[f32], rate: f64) -> f64 {
     let size = ((FRAME_S * rate).round() as usize).max(1);
     let frames: Vec<f64> =
         samples.chunks_exact(size).map(|f| f.iter().map(|&x| f64::from(x).powi(2)).sum()).collect();
     let last = ((END_SHARE * frames.len() as f64).ceil() as usize).min(frames.len());
     let end = frames[frames.len() - last..].iter().sum::<f64>() / last.max(1) as f64;
-    let until = frames.iter().rposition(|&energy| energy > ABOVE_END * end).map_or(0, |frame| frame + 1);
-    (until * size) as f64 / rate
+    let frame = frames.iter().rposition(|&energy| energy > ABOVE_END * end).unwrap_or(0);
+    (frame * size) as f64 / rate
 }
 
 /// Energy of each bin from squared samples; bin edges fall between samples.
@@ -230,10 +230,10 @@ mod tests {
         let sign = |i: usize| if (i * i / 7).is_multiple_of(3) { 1.0 } else { -1.0 };
         let noisy: Vec<f32> = (0..8000).map(|i| sign(i) * (decay(i).powi(2) + 1e-4).sqrt()).collect();
         let found = sounds_until_s(&noisy, rate);
-        assert!((0.36..=0.42).contains(&found), "{found}");
+        assert!((0.34..=0.40).contains(&found), "{found}");
         let cut: Vec<f32> = (0..8000).map(|i| if i < 2000 { sign(i) * decay(i) } else { 0.0 }).collect();
         let found = sounds_until_s(&cut, rate);
-        assert!((0.25..0.25 + 1.01 * FRAME_S).contains(&found), "{found}");
+        assert!((0.25 - 1.01 * FRAME_S..=0.25).contains(&found), "{found}");
         // Too short for a frame, and the same from beginning to end.
         assert_eq!(sounds_until_s(&cut[..100], rate), 0.0);
         assert_eq!(sounds_until_s(&[0.5; 8000], rate), 0.0);

@@ -24,7 +24,7 @@ pub struct SurveyedResponse {
     pub duration_s: f64,
     /// When the direct sound comes, in seconds from the first sample.
     pub direct_s: f64,
-    /// Until when it is louder than at its end, in seconds from the first sample.
+    /// When it is louder than at its end for the last time, in seconds from the first sample, to 20 ms.
     pub sounds_until_s: f64,
     /// A number that rises with the time of recording, where the room file states it.
     pub recorded_at: Option<f64>,
