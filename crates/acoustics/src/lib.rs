@@ -48,6 +48,7 @@
 //! - What rooms are made of: [`Material`], [`material_library`], [`Air`] (ISO 9613-1), [`Directivity`] and [`Orientation`] of a
 //!   source or receiver.
 //! - [`EnergyResponse`] (energy, **not** to be convolved) and [`RoomTargets`]: what a simulation gives and what a fit wants.
+//! - Fourier transforms, compiled once for all crates: [`RealTransforms`].
 //! - The trait [`RoomEstimator`]: speech in, [`RoomTargets`] out. [`Observer`]: progress of long work, and a way to stop it.
 //!
 //! # Does not
@@ -130,6 +131,7 @@ mod strength;
 mod sweep;
 mod sweep_error;
 mod targets;
+mod transforms;
 
 pub use air::Air;
 pub use atomic_file::{create_folder_beside, write_atomically};
@@ -175,3 +177,4 @@ pub use strength::{FreeFieldReference, SoundStrength};
 pub use sweep::{ExponentialSweep, SweepConfig};
 pub use sweep_error::SweepError;
 pub use targets::RoomTargets;
+pub use transforms::RealTransforms;

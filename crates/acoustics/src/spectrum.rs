@@ -1,39 +1,26 @@
 //! The spectrum of a padded signal, filtered by gains at frequencies.
 
+use crate::transforms::RealTransforms;
 use realfft::num_complex::Complex;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use std::cell::RefCell;
 use std::collections::HashMap;
-use std::sync::Arc;
 
 /// Plans that a thread keeps, a megabyte or two each.
 const MOST_PLANS: usize = 32;
 
-/// Both transforms of one length.
-#[derive(Clone)]
-struct Plan {
-    forward: Arc<dyn RealToComplex<f64>>,
-    inverse: Arc<dyn ComplexToReal<f64>>,
-}
-
 thread_local! {
     /// Plans made so far: planning a length costs more than transforming it.
-    static PLANS: RefCell<HashMap<usize, Plan>> = RefCell::new(HashMap::new());
+    static PLANS: RefCell<HashMap<usize, RealTransforms<f64>>> = RefCell::new(HashMap::new());
 }
 
-/// The plan of a length, the same on every thread: a planner takes apart a length by what it has planned before, so that
-/// with a planner kept from length to length the last bits would depend on what a thread happened to do earlier.
-fn plan(length: usize) -> Plan {
+/// The plan of a length, the same on every thread.
+fn plan(length: usize) -> RealTransforms<f64> {
     PLANS.with(|plans| {
         let mut plans = plans.borrow_mut();
         if plans.len() >= MOST_PLANS && !plans.contains_key(&length) {
             plans.clear();
         }
-        let make = || {
-            let mut planner = RealFftPlanner::new();
-            Plan { forward: planner.plan_fft_forward(length), inverse: planner.plan_fft_inverse(length) }
-        };
-        plans.entry(length).or_insert_with(make).clone()
+        plans.entry(length).or_insert_with(|| RealTransforms::<f64>::new(length)).clone()
     })
 }
 

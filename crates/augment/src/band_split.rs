@@ -2,8 +2,8 @@
 
 use crate::Error;
 use realfft::num_complex::Complex32;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
-use sabine_acoustics::Bands;
+use realfft::{ComplexToReal, RealToComplex};
+use sabine_acoustics::{Bands, RealTransforms};
 use std::sync::Arc;
 
 /// Half the width of the cross-over between two bands, in octaves.
@@ -25,9 +25,7 @@ impl BandSplit {
     /// For signals of up to `samples` samples, padded so that what a band filter smears does not wrap around.
     pub(crate) fn new(bands: Bands, samples: usize, sample_rate_hz: u32) -> Self {
         let length = (samples + samples / 16 + 64).next_power_of_two();
-        let mut planner = RealFftPlanner::new();
-        let forward = planner.plan_fft_forward(length);
-        let inverse = planner.plan_fft_inverse(length);
+        let RealTransforms { forward, inverse } = RealTransforms::<f32>::new(length);
         let bins = length / 2 + 1;
         let hz = |bin: usize| bin as f64 * f64::from(sample_rate_hz) / length as f64;
         let weights = (0..bands.len())

@@ -5,7 +5,8 @@ use crate::noise::coloured_noise;
 use rand::Rng;
 use rand_pcg::Pcg64;
 use realfft::num_complex::Complex32;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use realfft::{ComplexToReal, RealToComplex};
+use sabine_acoustics::RealTransforms;
 use sabine_features::FeatureExtractor;
 use sabine_features::{LogMel, LogMelConfig, LogMelScratch};
 use serde::{Deserialize, Serialize};
@@ -137,7 +138,6 @@ impl ClipMaker {
         let rate = f64::from(log_mel.sample_rate_hz());
         let samples = (config.duration_s * rate).round() as usize;
         let longest = samples + (longest_response_s * rate).ceil() as usize + 1;
-        let mut planner = RealFftPlanner::new();
         let mut plans = Vec::new();
         // Lengths 2^k {4 5 6 7}/4: a quarter of the work saved for short responses.
         let mut base = samples.next_power_of_two() / 2;
@@ -145,11 +145,8 @@ impl ClipMaker {
             for quarter in 4..8 {
                 let length = base / 4 * quarter;
                 if length > samples {
-                    plans.push(Plan {
-                        length,
-                        forward: planner.plan_fft_forward(length),
-                        inverse: planner.plan_fft_inverse(length),
-                    });
+                    let RealTransforms { forward, inverse } = RealTransforms::<f32>::new(length);
+                    plans.push(Plan { length, forward, inverse });
                 }
             }
             base *= 2;

@@ -1,6 +1,6 @@
 //! Distributions, tails and order statistics.
 
-use wide::f64x4;
+use pulp::Arch;
 
 /// Above this logarithm of the ratio of measured to predicted energy the negative log-likelihood grows linearly (Huber), so that
 /// outliers do not dominate.
@@ -134,13 +134,48 @@ pub(crate) fn student_tail(t: f64, degrees: usize) -> f64 {
     0.5 * (1.0 - within)
 }
 
-/// Each value's exponential, four at a time: fits spend their time on these.
+/// Each value's exponential, as many at a time as the machine computes: fits spend their time on these. No sum or product is contracted, so
+/// that machines of different width agree to the last bit. Below -708, where numbers lose digits, it is zero.
 pub(crate) fn exp_all(values: &mut [f64]) {
-    let mut fours = values.chunks_exact_mut(4);
-    for four in &mut fours {
-        four.copy_from_slice(&f64x4::new([four[0], four[1], four[2], four[3]]).exp().to_array());
+    Arch::new().dispatch(
+        #[inline(always)]
+        || values.iter_mut().for_each(|x| *x = exponential(*x)),
+    );
+}
+
+/// exp(x) = 2^k exp(r) with k the integer next to x / ln 2: r, at most ln 2 / 2, goes through Taylor's polynomial, whose remainder is below
+/// the last bit.
+#[inline(always)]
+fn exponential(x: f64) -> f64 {
+    const LOWEST: f64 = -708.0;
+    const HIGHEST: f64 = 709.0;
+    /// Added to a number it leaves the next integer in the last bits.
+    const ROUNDING: f64 = 1.5 * (1u64 << 52) as f64;
+    /// ln 2 in two parts, the first so short that its products with k are exact.
+    const LN_2_PARTS: [f64; 2] = [f64::from_bits(0x3fe6_2e42_fee0_0000), 1.908_214_929_270_587_7e-10];
+    /// 1 / n! from n = 13 down.
+    const TAYLOR: [f64; 14] = {
+        let mut found = [1.0; 14];
+        let mut n = 1;
+        while n < 14 {
+            found[13 - n] = found[14 - n] / n as f64;
+            n += 1;
+        }
+        found
+    };
+    let within = x.clamp(LOWEST, HIGHEST);
+    let rounded = within * std::f64::consts::LOG2_E + ROUNDING;
+    let k = rounded - ROUNDING;
+    let r = within - k * LN_2_PARTS[0] - k * LN_2_PARTS[1];
+    let mut sum = TAYLOR[0];
+    let mut n = 1;
+    while n < TAYLOR.len() {
+        sum = sum * r + TAYLOR[n];
+        n += 1;
     }
-    fours.into_remainder().iter_mut().for_each(|x| *x = x.exp());
+    let power = f64::from_bits(rounded.to_bits().wrapping_add(1023) << 52);
+    let kept = if x < LOWEST { 0.0 } else { sum * power };
+    if x > HIGHEST { f64::INFINITY } else { kept }
 }
 
 #[cfg(test)]

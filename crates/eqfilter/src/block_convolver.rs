@@ -4,7 +4,8 @@ use crate::Error;
 use crate::error::check_taps;
 use crate::grid::fast_length;
 use realfft::num_complex::Complex;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use realfft::{ComplexToReal, RealToComplex};
+use sabine_acoustics::RealTransforms;
 use std::sync::Arc;
 
 /// Shortest transform: shorter ones cost more a sample.
@@ -65,8 +66,7 @@ impl BlockConvolver {
     pub fn new(response: &[f32]) -> Result<Self, Error> {
         check_taps(response, 1 << 28)?;
         let size = fast_length((4 * response.len()).max(SHORTEST));
-        let mut planner = RealFftPlanner::<f64>::new();
-        let (forward, backward) = (planner.plan_fft_forward(size), planner.plan_fft_inverse(size));
+        let RealTransforms { forward, inverse: backward } = RealTransforms::<f64>::new(size);
         let empty = vec![Complex::default(); size / 2 + 1];
         let mut new = Self {
             taps: response.len(),

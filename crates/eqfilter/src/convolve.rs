@@ -1,8 +1,8 @@
 //! Convolution of whole signals.
 
 use crate::grid::fast_length;
-use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
+use sabine_acoustics::RealTransforms;
 
 /// Below this length of the shorter operand the plain sum is at least as fast as transforms.
 const DIRECT: usize = 32;
@@ -34,8 +34,7 @@ pub fn convolve(a: &[f32], b: &[f32]) -> Vec<f32> {
     // Four times the shorter operand is near the best block; the whole in one transform if it fits.
     let size = fast_length(length.min(4 * short.len()));
     let block = size + 1 - short.len();
-    let mut planner = RealFftPlanner::<f64>::new();
-    let (forward, backward) = (planner.plan_fft_forward(size), planner.plan_fft_inverse(size));
+    let RealTransforms { forward, inverse: backward } = RealTransforms::<f64>::new(size);
     let mut time = vec![0.0; size];
     let mut spectrum = vec![Complex::default(); size / 2 + 1];
     let mut filter = spectrum.clone();

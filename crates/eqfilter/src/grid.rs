@@ -2,9 +2,7 @@
 
 use crate::octave::{support_hz, weight};
 use realfft::num_complex::Complex;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
-use sabine_acoustics::Bands;
-use std::sync::Arc;
+use sabine_acoustics::{Bands, RealTransforms};
 
 /// Shape of the Kaiser window on the taps: its main lobe is 1.6 times as wide as without a window, its side lobes are 30 dB down.
 const KAISER_BETA: f64 = 4.0;
@@ -13,20 +11,17 @@ const KAISER_BETA: f64 = 4.0;
 pub(crate) struct Grid {
     length: usize,
     bin_hz: f64,
-    forward: Arc<dyn RealToComplex<f64>>,
-    backward: Arc<dyn ComplexToReal<f64>>,
+    transforms: RealTransforms<f64>,
 }
 
 impl Grid {
     /// A grid for filters of `2 half + 1` taps: |H|^2 has `4 half + 1` lags, and twice as many points let it be interpolated.
     pub fn new(half: usize, sample_rate_hz: u32) -> Self {
         let length = fast_length(8 * half);
-        let mut planner = RealFftPlanner::new();
         Self {
             length,
             bin_hz: f64::from(sample_rate_hz) / length as f64,
-            forward: planner.plan_fft_forward(length),
-            backward: planner.plan_fft_inverse(length),
+            transforms: RealTransforms::<f64>::new(length),
         }
     }
 
@@ -51,7 +46,7 @@ impl Grid {
         let mut spectrum: Vec<Complex<f64>> =
             (0..=self.length / 2).map(|k| Complex::new(gain(k as f64 * self.bin_hz), 0.0)).collect();
         let mut time = vec![0.0; self.length];
-        let done = self.backward.process(&mut spectrum, &mut time);
+        let done = self.transforms.inverse.process(&mut spectrum, &mut time);
         debug_assert!(done.is_ok(), "a real spectrum of the planned length");
         let scale = 1.0 / self.length as f64;
         let taps: Vec<f64> = time.iter().zip(window).map(|(x, w)| x * w * scale).collect();
@@ -60,7 +55,7 @@ impl Grid {
         for (n, &tap) in taps.iter().enumerate().skip(1) {
             time[self.length - n] = tap;
         }
-        let done = self.forward.process(&mut time, &mut spectrum);
+        let done = self.transforms.forward.process(&mut time, &mut spectrum);
         debug_assert!(done.is_ok(), "lengths agree by construction");
         (taps, spectrum.iter().map(|x| x.re).collect())
     }
@@ -94,7 +89,7 @@ impl Grid {
             *to = f64::from(from);
         }
         let mut spectrum = vec![Complex::default(); self.length / 2 + 1];
-        let done = self.forward.process(&mut time, &mut spectrum);
+        let done = self.transforms.forward.process(&mut time, &mut spectrum);
         debug_assert!(done.is_ok(), "lengths agree by construction");
         let mean =
             |band| self.weights(bands, band).iter().map(|&(k, w)| w * spectrum[k].norm_sqr()).sum::<f64>();

@@ -1,31 +1,18 @@
 //! One stage of partitioned convolution: blocks of one size, spectra of past blocks kept.
 
 use realfft::num_complex::Complex;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
-use std::sync::Arc;
+use sabine_acoustics::RealTransforms;
 
 /// Transforms of one block size, shared by the stage and the responses prepared for it.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub(crate) struct BlockTransform {
     pub block: usize,
-    forward: Arc<dyn RealToComplex<f32>>,
-    backward: Arc<dyn ComplexToReal<f32>>,
-}
-
-impl std::fmt::Debug for BlockTransform {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("BlockTransform").field("block", &self.block).finish()
-    }
+    transforms: RealTransforms<f32>,
 }
 
 impl BlockTransform {
     pub fn new(block: usize) -> Self {
-        let mut planner = RealFftPlanner::new();
-        Self {
-            block,
-            forward: planner.plan_fft_forward(2 * block),
-            backward: planner.plan_fft_inverse(2 * block),
-        }
+        Self { block, transforms: RealTransforms::<f32>::new(2 * block) }
     }
 
     pub fn bins(&self) -> usize {
@@ -49,20 +36,23 @@ impl BlockTransform {
     }
 
     pub fn scratch(&self) -> Vec<Complex<f32>> {
-        vec![Complex::default(); self.forward.get_scratch_len().max(self.backward.get_scratch_len())]
+        vec![
+            Complex::default();
+            self.transforms.forward.get_scratch_len().max(self.transforms.inverse.get_scratch_len())
+        ]
     }
 
     fn forward(&self, time: &mut [f32], spectrum: &mut [Complex<f32>], scratch: &mut [Complex<f32>]) {
-        let scratch = &mut scratch[..self.forward.get_scratch_len()];
-        let done = self.forward.process_with_scratch(time, spectrum, scratch);
+        let scratch = &mut scratch[..self.transforms.forward.get_scratch_len()];
+        let done = self.transforms.forward.process_with_scratch(time, spectrum, scratch);
         debug_assert!(done.is_ok(), "lengths agree by construction");
     }
 
     fn backward(&self, spectrum: &mut [Complex<f32>], time: &mut [f32], scratch: &mut [Complex<f32>]) {
         spectrum[0].im = 0.0;
         spectrum[self.block].im = 0.0;
-        let scratch = &mut scratch[..self.backward.get_scratch_len()];
-        let done = self.backward.process_with_scratch(spectrum, time, scratch);
+        let scratch = &mut scratch[..self.transforms.inverse.get_scratch_len()];
+        let done = self.transforms.inverse.process_with_scratch(spectrum, time, scratch);
         debug_assert!(done.is_ok(), "the spectrum of a real signal");
     }
 }

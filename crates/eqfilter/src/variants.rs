@@ -4,9 +4,8 @@ use crate::designer::check_gains;
 use crate::filter::band_gains_db;
 use crate::grid::fast_length;
 use crate::{EqFilter, EqFilterConfig, Error, Phase};
-use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
-use sabine_acoustics::{Bands, PerBand};
+use sabine_acoustics::{Bands, PerBand, RealTransforms};
 
 /// Least magnitude, relative to the largest, whose logarithm enters the minimum phase: -120 dB.
 const LEAST_MAGNITUDE: f64 = 1e-6;
@@ -40,7 +39,7 @@ impl EqFilter {
             .map(|k| Complex::new(10f64.powf(interpolate(&points, (k as f64 * bin_hz).log2()) / 20.0), 0.0))
             .collect();
         let mut time = vec![0.0; length];
-        let done = RealFftPlanner::new().plan_fft_inverse(length).process(&mut spectrum, &mut time);
+        let done = RealTransforms::<f64>::new(length).inverse.process(&mut spectrum, &mut time);
         debug_assert!(done.is_ok(), "a real spectrum of the planned length");
         let right: Vec<f64> = (0..=half)
             .map(|n| {
@@ -77,8 +76,7 @@ impl EqFilter {
         let taps = self.taps();
         // Eight times the length keeps the aliasing of the cepstrum below the resolution of the taps.
         let length = fast_length(8 * taps.len());
-        let mut planner = RealFftPlanner::<f64>::new();
-        let (forward, backward) = (planner.plan_fft_forward(length), planner.plan_fft_inverse(length));
+        let RealTransforms { forward, inverse: backward } = RealTransforms::<f64>::new(length);
         let mut time = vec![0.0; length];
         for (to, &from) in time.iter_mut().zip(taps) {
             *to = f64::from(from);

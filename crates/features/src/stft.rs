@@ -3,8 +3,8 @@
 use crate::Error;
 use ndarray::{Array2, ArrayView2};
 use realfft::num_complex::Complex;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
-use sabine_acoustics::OutOfRange;
+use realfft::{ComplexToReal, RealToComplex};
+use sabine_acoustics::{OutOfRange, RealTransforms};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -68,12 +68,12 @@ impl Stft {
     pub fn new(n_fft: usize, hop: usize) -> Result<Self, Error> {
         OutOfRange::check("n_fft", n_fft as f64, 2.0, MAX_N_FFT as f64, "between 2 and 2^20")?;
         OutOfRange::check("hop", hop as f64, 1.0, n_fft as f64, "between 1 and n_fft")?;
-        let mut planner = RealFftPlanner::new();
+        let transforms = RealTransforms::<f64>::new(n_fft);
         Ok(Self {
             window: hann_periodic(n_fft),
             hop,
-            forward: planner.plan_fft_forward(n_fft),
-            backward: planner.plan_fft_inverse(n_fft),
+            forward: transforms.forward,
+            backward: transforms.inverse,
         })
     }
 

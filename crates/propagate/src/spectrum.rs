@@ -1,13 +1,11 @@
 //! Filtering by a real frequency response: zero phase, whole signals at once.
 
 use realfft::num_complex::Complex;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
-use std::sync::Arc;
+use sabine_acoustics::RealTransforms;
 
 /// A transform of one length, planned once.
 pub(crate) struct Spectrum {
-    forward: Arc<dyn RealToComplex<f64>>,
-    inverse: Arc<dyn ComplexToReal<f64>>,
+    transforms: RealTransforms<f64>,
     length: usize,
     hz_per_line: f64,
 }
@@ -16,10 +14,8 @@ impl Spectrum {
     /// At least `least` samples.
     pub fn new(least: usize, sample_rate_hz: u32) -> Self {
         let length = smooth_even(least.max(16));
-        let mut planner = RealFftPlanner::new();
         Self {
-            forward: planner.plan_fft_forward(length),
-            inverse: planner.plan_fft_inverse(length),
+            transforms: RealTransforms::<f64>::new(length),
             length,
             hz_per_line: f64::from(sample_rate_hz) / length as f64,
         }
@@ -36,9 +32,9 @@ impl Spectrum {
     /// Lines of a signal of [`Spectrum::length`] samples.
     pub fn lines(&self, mut samples: Vec<f64>) -> Vec<Complex<f64>> {
         samples.resize(self.length, 0.0);
-        let mut lines = self.forward.make_output_vec();
+        let mut lines = self.transforms.forward.make_output_vec();
         // Lengths match by construction, the only thing that can fail.
-        let done = self.forward.process(&mut samples, &mut lines);
+        let done = self.transforms.forward.process(&mut samples, &mut lines);
         debug_assert!(done.is_ok());
         lines
     }
@@ -48,8 +44,8 @@ impl Spectrum {
         // A real signal has real lines at both ends.
         lines[0].im = 0.0;
         lines[self.length / 2].im = 0.0;
-        let mut samples = self.inverse.make_output_vec();
-        let done = self.inverse.process(&mut lines, &mut samples);
+        let mut samples = self.transforms.inverse.make_output_vec();
+        let done = self.transforms.inverse.process(&mut lines, &mut samples);
         debug_assert!(done.is_ok());
         let scale = 1.0 / self.length as f64;
         samples.iter_mut().for_each(|s| *s *= scale);

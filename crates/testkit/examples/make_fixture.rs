@@ -5,8 +5,8 @@
 
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
+use sabine_acoustics::RealTransforms;
 use sabine_acoustics::{
     Air, Bands, Channel, ImpulseResponse, Material, PerBand, SampleFormat, library_material, read_audio,
     write_atomically, write_wav,
@@ -210,7 +210,7 @@ fn reverberation(
 }
 
 fn spectrum(samples: &[f64], size: usize) -> Vec<Complex<f64>> {
-    let forward = RealFftPlanner::<f64>::new().plan_fft_forward(size);
+    let forward = RealTransforms::<f64>::new(size).forward;
     let mut input = samples.to_vec();
     input.resize(size, 0.0);
     let mut output = forward.make_output_vec();
@@ -219,7 +219,7 @@ fn spectrum(samples: &[f64], size: usize) -> Vec<Complex<f64>> {
 }
 
 fn samples_of(mut spectrum: Vec<Complex<f64>>, size: usize) -> Vec<f64> {
-    let inverse = RealFftPlanner::<f64>::new().plan_fft_inverse(size);
+    let inverse = RealTransforms::<f64>::new(size).inverse;
     let end = spectrum.len() - 1;
     (spectrum[0].im, spectrum[end].im) = (0.0, 0.0);
     let mut output = inverse.make_output_vec();

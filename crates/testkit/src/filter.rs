@@ -1,7 +1,7 @@
 //! Octave bands of a response, by one long Fourier transform.
 
-use realfft::RealFftPlanner;
 use sabine_acoustics::Bands;
+use sabine_acoustics::RealTransforms;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// What adds up to one across the bands.
@@ -23,8 +23,7 @@ pub(crate) fn join_bands(
     let n = columns.first().map_or(0, Vec::len);
     // Half as long again: the filters' ringing must not wrap around to the beginning.
     let size = (n + n / 2 + 4096).next_power_of_two();
-    let mut planner = RealFftPlanner::<f64>::new();
-    let (forward, inverse) = (planner.plan_fft_forward(size), planner.plan_fft_inverse(size));
+    let RealTransforms { forward, inverse } = RealTransforms::<f64>::new(size);
     let mut sum = forward.make_output_vec();
     for (band, mut column) in columns.into_iter().enumerate() {
         column.resize(size, 0.0);

@@ -2,8 +2,8 @@
 
 use crate::geometry::Vec3;
 use rayon::prelude::*;
-use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
+use sabine_acoustics::RealTransforms;
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
@@ -267,7 +267,7 @@ impl GridResponse {
         assert!(pass_hz[3] <= 0.5 * rate, "{pass_hz:?}");
         // Twice as long: what the filter's ringing puts before the beginning does not come back at the end.
         let size = 2 * samples.max(self.length(rate));
-        let inverse = RealFftPlanner::<f64>::new().plan_fft_inverse(size);
+        let inverse = RealTransforms::<f64>::new(size).inverse;
         let mut spectrum = inverse.make_input_vec();
         let edge = |hz: f64, low: f64, high: f64| {
             0.5 - 0.5 * (PI * ((hz - low) / (high - low)).clamp(0.0, 1.0)).cos()

@@ -83,7 +83,7 @@ pub(crate) fn mirrors(displaced: &[(usize, DisplacedSurface)]) -> Vec<Mirror> {
 /// in metres: the distance of the source's image in the mirrors as they stand from the receiver, less that in the mirrors as stated. What is
 /// said last of a surface counts.
 pub(crate) fn longer_m(survey: &Survey, response: &SurveyedResponse, met: &[usize], moved: &[Mirror]) -> f64 {
-    if met.iter().all(|surface| moved.iter().all(|(own, _)| own != surface)) {
+    if moved.iter().all(|(own, _)| !met.contains(own)) {
         return 0.0;
     }
     let source = survey.sources[response.source].position_m;

@@ -36,6 +36,10 @@ const WIDTHS_S: [f64; 3] = [4e-4, 1.2e-4, 0.0];
 const FAR_SD: f64 = 12.0;
 /// Of the starts that an effect offers, those that are followed from the widest of these on, and from the next one on.
 const MAX_STARTS: [usize; 2] = [3, 2];
+/// Tops whose evidence differs by less than this, in nats, ...
+const SAME_NATS: f64 = 0.02;
+/// ... and whose values differ by less than so many posterior standard deviations, are one.
+const SAME_SD: f64 = 0.1;
 /// Latency of a recording whose time zero means nothing.
 const FREE_LATENCY_S: f64 = 1.0;
 /// Time zero where the file says that it is the emission: half a sample or so.
@@ -231,25 +235,26 @@ impl<'a> ArrivalModel<'a> {
         let measured = &self.data.measured[self.assignment[pair]];
         let direct_sd_s = DIRECT_SD_S * measured.slowness();
         let sloping = slopes.is_some();
-        let mut push = |found: &[(usize, f64)], residual: f64, sd: f64, share: f64| {
+        // Of weighted residuals and their weights.
+        let mut push = |found: &[(usize, f64)], [pull, weight]: [f64; 2]| {
             let Some(slopes) = slopes.as_deref_mut() else { return };
-            let weight = share / (sd * sd);
             for &(a, x) in found {
-                slopes.gradient[a] += weight * residual * x;
+                slopes.gradient[a] += pull * x;
                 for &(b, y) in found {
                     slopes.information[(a, b)] += weight * x * y;
                 }
             }
         };
+        let weighed = |residual: f64, sd: f64, share: f64| [residual, 1.0].map(|r| r * share / (sd * sd));
         let residual = measured.direct_s - self.time_s(at, pair, direct);
         let found = if sloping { self.time_slopes(at, pair, direct) } else { Vec::new() };
         let Some(width_s) = self.width_s else {
-            push(&found, residual, direct_sd_s, 1.0);
+            push(&found, weighed(residual, direct_sd_s, 1.0));
             return -0.5 * (residual / direct_sd_s).powi(2);
         };
         let sd = direct_sd_s.hypot(width_s);
         let (right, wrong) = ((1.0 - MISREAD_SHARE) * normal(residual, sd), MISREAD_SHARE / PEAKS_S);
-        push(&found, residual, sd, right / (right + wrong));
+        push(&found, weighed(residual, sd, right / (right + wrong)));
         let mut value = (right + wrong).ln();
 
         let sd = (REFLECTION_SD_S * measured.slowness()).hypot(width_s);
@@ -259,20 +264,22 @@ impl<'a> ArrivalModel<'a> {
             return value;
         }
         let times_s: Vec<f64> = later.iter().map(|a| self.time_s(at, pair, a)).collect();
-        // Slopes of those that are some peak's partner: few are.
-        let mut own_slopes: Vec<Option<Vec<(usize, f64)>>> = vec![None; later.len()];
+        let mut in_time: Vec<(f64, usize)> = times_s.iter().copied().zip(0..).collect();
+        in_time.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // Sums over the peaks whose partner each may be.
+        let mut sums = vec![[0.0; 2]; later.len()];
         let more = self.added(at, pair);
         let each = SEEN_SHARE / measured.peaks_s.len().max(1) as f64;
         let rest = 1.0 - each * more.len() as f64;
         let mut partners: Vec<(usize, f64)> = Vec::new();
         for (peak, height_db) in measured.peaks_s.iter().zip(&measured.peaks_db) {
             partners.clear();
-            for (i, (time_s, own)) in times_s.iter().zip(&amplitudes).enumerate() {
-                if (peak - time_s).abs() < FAR_SD * sd {
-                    let density = normal(peak - time_s, sd);
-                    partners.push((i, rest * (1.0 - STRAY_SHARE) * own / amplitude * density));
-                }
-            }
+            let first = in_time.partition_point(|(time_s, _)| *time_s <= peak - FAR_SD * sd);
+            let near = in_time[first..].iter().take_while(|(time_s, _)| *time_s < peak + FAR_SD * sd);
+            partners.extend(near.map(|&(time_s, i)| {
+                let density = normal(peak - time_s, sd);
+                (i, rest * (1.0 - STRAY_SHARE) * amplitudes[i] / amplitude * density)
+            }));
             // Heights of other peaks say nothing: anything down to the floor is as probable.
             let added: Vec<f64> = more
                 .iter()
@@ -292,17 +299,20 @@ impl<'a> ArrivalModel<'a> {
             for (i, density) in &partners {
                 let share = density / total;
                 if share > 1e-3 {
-                    let found = own_slopes[*i].get_or_insert_with(|| self.time_slopes(at, pair, &later[*i]));
-                    push(found, peak - times_s[*i], sd, share);
+                    let own = weighed(peak - times_s[*i], sd, share);
+                    sums[*i].iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
                 }
             }
             for (density, m) in added.iter().zip(&more) {
                 let share = density / total;
                 if share > 1e-3 {
-                    push(&m.slopes, peak - m.time_s, sd, share);
-                    push(&m.level_slopes, height_db - m.level_db, HEIGHT_SD_DB, share);
+                    push(&m.slopes, weighed(peak - m.time_s, sd, share));
+                    push(&m.level_slopes, weighed(height_db - m.level_db, HEIGHT_SD_DB, share));
                 }
             }
+        }
+        for (sums, arrival) in sums.into_iter().zip(later).filter(|(sums, _)| sums[1] > 0.0) {
+            push(&self.time_slopes(at, pair, arrival), sums);
         }
         value
     }
@@ -338,27 +348,34 @@ pub(crate) fn fit(
     }
     let mut model = ArrivalModel::new(data, cases, used);
     let start: Vec<f64> = model.priors.iter().map(|p| p.mean).collect();
-    let mut best: Option<LaplaceFit> = None;
     // From where the direct sounds point, and from where everything should be: a single response far off must not carry the
     // others away.
     let direct = maximise(&model, &start, "arrival times")?.values;
     let mut firsts = offered(&mut model, &start);
     firsts.extend([(direct, 0), (start, 0)]);
-    for (first, widest) in firsts {
-        let mut x = first;
-        let mut found = None;
-        for width_s in &WIDTHS_S[widest..] {
-            model.width_s = Some(*width_s);
+    let mut tops: Vec<LaplaceFit> = Vec::new();
+    for (number, width_s) in WIDTHS_S.into_iter().enumerate() {
+        model.width_s = Some(width_s);
+        let joining = firsts.iter().filter(|(_, widest)| *widest == number).map(|(x, _)| x.clone());
+        let starts: Vec<Vec<f64>> = tops.drain(..).map(|top| top.values).chain(joining).collect();
+        for x in starts {
             let top = maximise(&model, &x, "arrival times")?;
-            x = top.values.clone();
-            found = Some(top);
-        }
-        if let Some(found) = found.filter(|f| best.as_ref().is_none_or(|b| f.log_evidence > b.log_evidence)) {
-            best = Some(found);
+            // What has come to a top that another has reached goes on as the other does.
+            if tops.iter().all(|other| !is_same_top(other, &top)) {
+                tops.push(top);
+            }
         }
     }
+    let best = tops.into_iter().rev().max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence));
     let places = model.terms.iter().map(|p| p.first).collect();
     best.map(|b| (b, places)).ok_or(Error::Singular { what: "arrival times" })
+}
+
+/// Whether two searches have come to rest at one place, as far as the data tell places apart.
+fn is_same_top(one: &LaplaceFit, other: &LaplaceFit) -> bool {
+    let mut apart = one.values.iter().zip(&other.values).enumerate();
+    (one.log_evidence - other.log_evidence).abs() < SAME_NATS
+        && apart.all(|(i, (a, b))| (a - b).abs() < SAME_SD * one.sd(i))
 }
 
 /// The most promising of the values that the effects offer to start from, and the width ([`WIDTHS_S`]) with which each is followed:

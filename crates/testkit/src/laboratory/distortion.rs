@@ -6,8 +6,8 @@
 
 use super::hidden::Hidden;
 use super::truth::Truth;
-use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
+use sabine_acoustics::RealTransforms;
 use std::f64::consts::TAU;
 
 /// Harmonics above this share of the sample rate do not pass the converter.
@@ -63,8 +63,7 @@ impl Sweep {
             harmonics[i] = -0.5 * quadratic * passed(2.0) * (2.0 * phase).cos()
                 - 0.25 * cubic * passed(3.0) * (3.0 * phase).sin();
         }
-        let mut planner = RealFftPlanner::<f64>::new();
-        let (forward, back) = (planner.plan_fft_forward(size), planner.plan_fft_inverse(size));
+        let RealTransforms { forward, inverse: back } = RealTransforms::<f64>::new(size);
         let spectrum = |samples: &mut Vec<f64>| {
             let mut lines = forward.make_output_vec();
             // The plan made both buffers: their lengths agree.
@@ -96,8 +95,7 @@ impl Sweep {
 /// Adds the convolution with a pulse whose time zero stands at `lead`; what falls before the first sample is lost.
 fn add_convolved(samples: &mut [f64], pulse: &[f64], lead: usize) {
     let size = (samples.len() + pulse.len()).next_power_of_two();
-    let mut planner = RealFftPlanner::<f64>::new();
-    let (forward, back) = (planner.plan_fft_forward(size), planner.plan_fft_inverse(size));
+    let RealTransforms { forward, inverse: back } = RealTransforms::<f64>::new(size);
     let spectrum = |samples: &[f64]| {
         let mut padded = samples.to_vec();
         padded.resize(size, 0.0);

@@ -6,8 +6,8 @@ use super::truth::{Medium, Truth};
 use crate::BoxModes;
 use crate::own_air::energy_exponent_per_m;
 use rayon::prelude::*;
-use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
+use sabine_acoustics::RealTransforms;
 use sabine_acoustics::{Bands, Error, OutOfRange};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -114,8 +114,7 @@ pub(crate) fn join(
             [Complex::new(re, im) * late, direct * late]
         })
         .collect();
-    let inverse = RealFftPlanner::<f64>::new().plan_fft_inverse(size);
-    let forward = RealFftPlanner::<f64>::new().plan_fft_forward(size);
+    let RealTransforms { forward, inverse } = RealTransforms::<f64>::new(size);
     let spectrum = |mut samples: Vec<f64>| {
         let mut lines = forward.make_output_vec();
         samples.resize(size, 0.0);

@@ -4,8 +4,8 @@ use super::hidden::{Fault, Hidden};
 use super::steep_bands::colour;
 use super::stream::{Purpose, key, unit};
 use super::truth::Truth;
-use realfft::RealFftPlanner;
 use sabine_acoustics::Bands;
+use sabine_acoustics::RealTransforms;
 use std::f64::consts::{PI, TAU};
 
 /// Duration over which a gap opens and closes, in seconds.
@@ -112,7 +112,7 @@ fn energy_between(samples: &[f64], rate_hz: f64, low_hz: f64, high_hz: f64) -> f
     let size = samples.len().next_power_of_two();
     let mut padded = samples.to_vec();
     padded.resize(size, 0.0);
-    let forward = RealFftPlanner::<f64>::new().plan_fft_forward(size);
+    let forward = RealTransforms::<f64>::new(size).forward;
     let mut spectrum = forward.make_output_vec();
     // The plan made both buffers: their lengths agree.
     let _ = forward.process(&mut padded, &mut spectrum);

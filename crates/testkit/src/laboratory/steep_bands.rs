@@ -1,8 +1,8 @@
 //! Octaves with steep crossovers: what decays slowly in one octave does not show in its neighbours.
 
-use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
 use sabine_acoustics::Bands;
+use sabine_acoustics::RealTransforms;
 use std::f64::consts::FRAC_PI_2;
 
 /// Width of a crossover in octaves.
@@ -15,7 +15,7 @@ const PADDING_S: f64 = 0.4;
 pub(crate) fn join_steeply(bands: Bands, columns: Vec<Vec<f64>>, sample_rate_hz: u32) -> Vec<f64> {
     let n = columns.first().map_or(0, Vec::len);
     let size = padded(n, sample_rate_hz);
-    let forward = RealFftPlanner::<f64>::new().plan_fft_forward(size);
+    let forward = RealTransforms::<f64>::new(size).forward;
     let mut sum = forward.make_output_vec();
     let mut spectrum = forward.make_output_vec();
     let gains = Gains { bands, bin_hz: f64::from(sample_rate_hz) / size as f64, bins: sum.len() };
@@ -37,7 +37,7 @@ pub(crate) fn colour(
 ) -> Vec<f64> {
     let n = samples.len();
     let size = padded(n, sample_rate_hz);
-    let forward = RealFftPlanner::<f64>::new().plan_fft_forward(size);
+    let forward = RealTransforms::<f64>::new(size).forward;
     let mut sum = forward.make_output_vec();
     let mut spectrum = forward.make_output_vec();
     samples.resize(size, 0.0);
@@ -54,7 +54,7 @@ fn padded(n: usize, sample_rate_hz: u32) -> usize {
 }
 
 fn invert(mut spectrum: Vec<Complex<f64>>, size: usize, n: usize) -> Vec<f64> {
-    let inverse = RealFftPlanner::<f64>::new().plan_fft_inverse(size);
+    let inverse = RealTransforms::<f64>::new(size).inverse;
     // Without imaginary parts at the ends, as the inverse demands.
     let end = spectrum.len() - 1;
     spectrum[0].im = 0.0;

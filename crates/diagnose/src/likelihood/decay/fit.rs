@@ -65,16 +65,9 @@ pub(crate) fn fit(
         }
     }
     // Only the most promising starts are followed.
-    let mut ranked: Vec<(f64, Vec<f64>)> =
-        starts.into_iter().map(|x| (model.log_likelihood(&x, None), x)).collect();
-    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-    ranked.truncate(MAX_STARTS);
-    let mut others: Vec<(f64, Vec<f64>)> =
-        more.into_iter().map(|x| (model.log_likelihood(&x, None), x)).collect();
-    others.sort_by(|a, b| b.0.total_cmp(&a.0));
-    ranked.extend(others.into_iter().take(MAX_STARTS));
+    let followed = [starts, more].map(|some| most_promising(&model, some)).concat();
     let mut best: Option<LaplaceFit> = None;
-    for (_, start) in ranked {
+    for start in followed {
         let found = maximise(&model, &start, "decays")?;
         if best.as_ref().is_none_or(|b| found.log_evidence > b.log_evidence) {
             best = Some(found);
@@ -82,4 +75,15 @@ pub(crate) fn fit(
     }
     let firsts = (0..cases.len()).map(|order| model.first_of(order)).collect();
     best.map(|b| (b, firsts)).ok_or(Error::Singular { what: "decays" })
+}
+
+/// Those of the starts from which a search begins highest.
+fn most_promising(model: &EnergyModel<'_>, starts: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    if starts.len() <= MAX_STARTS {
+        return starts;
+    }
+    let mut ranked: Vec<(f64, Vec<f64>)> =
+        starts.into_iter().map(|x| (model.log_likelihood(&x, None), x)).collect();
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    ranked.into_iter().take(MAX_STARTS).map(|(_, x)| x).collect()
 }

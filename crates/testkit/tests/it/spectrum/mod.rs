@@ -1,7 +1,7 @@
 //! The middle of an octave, by a filter of zero phase that is no one else's.
 
-use realfft::RealFftPlanner;
 use sabine_acoustics::Bands;
+use sabine_acoustics::RealTransforms;
 
 /// A sixteenth of an octave is missing at each end of the octave; then the gain rises over an eighth.
 const MISSING: f64 = 0.0625;
@@ -16,8 +16,7 @@ fn gain(bands: Bands, band: usize, frequency_hz: f64) -> f64 {
 /// Samples with only the middle of an octave left.
 pub fn middle_of_octave(samples: &[f64], sample_rate_hz: u32, bands: Bands, band: usize) -> Vec<f64> {
     let size = (2 * samples.len()).next_power_of_two();
-    let mut planner = RealFftPlanner::<f64>::new();
-    let (forward, inverse) = (planner.plan_fft_forward(size), planner.plan_fft_inverse(size));
+    let RealTransforms { forward, inverse } = RealTransforms::<f64>::new(size);
     let mut padded = samples.to_vec();
     padded.resize(size, 0.0);
     let mut spectrum = forward.make_output_vec();
