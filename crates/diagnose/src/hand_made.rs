@@ -10,14 +10,15 @@ use crate::observe::early_energy::EarlySamples;
 use crate::observe::observations::Observations;
 use crate::observe::observed_response::Measured;
 use crate::observe::time_bins::Bins;
+use crate::simulate::band_state::BandState;
 use crate::simulate::simulation::Simulation;
 use crate::simulate::tables::Tables as Prepared;
-use crate::simulate::traced_pair::{Arrival, BandState};
+use crate::simulate::traced_pair::Arrival;
 use crate::survey::surfaces::{Surface, axes_of};
 use crate::survey::{Place, Survey, SurveyedResponse};
 use sabine_acoustics::{Air, Bands, Material, PerBand};
 use sabine_scene::{Levels, Measurement, TimeZero};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Bins of each band.
 const BINS: usize = 14;
@@ -185,6 +186,7 @@ impl Tables {
             level_sd: self.level_sd,
             drift_sd: self.drift_sd,
             seconds: BTreeMap::new(),
+            stale: BTreeSet::new(),
         }
     }
 

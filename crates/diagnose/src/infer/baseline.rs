@@ -21,7 +21,7 @@ use crate::simulate::traced_views::TracedRoomView;
 use crate::survey::Survey;
 use sabine_acoustics::{Observer, report};
 use sabine_scene::{MaterialPrior, MeasuredRoom};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::LN_10;
 use std::sync::Arc;
 use std::time::Instant;
@@ -29,7 +29,7 @@ use std::time::Instant;
 /// Rounds of expansion and fit of the baseline.
 const ROUNDS: usize = 4;
 /// Change of absorption (share of its prior's standard deviation) below which no further round is needed.
-const TOLERANCE: f64 = 0.1;
+pub(crate) const TOLERANCE: f64 = 0.1;
 /// Rounds of drift and dispersion.
 const SCATTER_ROUNDS: usize = 4;
 
@@ -50,6 +50,8 @@ pub(crate) struct Baseline {
     /// energy), by band.
     pub drift_sd: Vec<f64>,
     pub seconds: BTreeMap<&'static str, f64>,
+    /// Slots whose tables are of an expansion before.
+    pub stale: BTreeSet<usize>,
 }
 
 impl Baseline {
@@ -81,6 +83,7 @@ impl Baseline {
             observations,
             simulation,
             seconds: BTreeMap::from([("trace", started.elapsed().as_secs_f64())]),
+            stale: BTreeSet::new(),
         };
         baseline.simulation.expand(&baseline.observations, false)?;
         baseline.simulation.predict_arrivals(&mut baseline.observations.survey)?;
@@ -100,9 +103,28 @@ impl Baseline {
     /// Prepares the tables of all decay terms about the present absorption. Says which cases (a flag for each) refused to be prepared, and
     /// notes why.
     pub fn prepare(&mut self, cases: &[CatalogueCase]) -> Result<Vec<bool>, Error> {
+        self.forget_tables(cases);
+        self.prepare_those(cases, |_| true)
+    }
+
+    /// Prepares those tables that have not been since the last expansion.
+    pub fn prepare_rest(&mut self, cases: &[CatalogueCase]) -> Result<(), Error> {
+        let stale = self.stale.clone();
+        self.prepare_those(cases, |slot| stale.contains(&slot)).map(|_| ())
+    }
+
+    fn forget_tables(&mut self, cases: &[CatalogueCase]) {
+        self.stale = cases.iter().filter_map(|c| c.case.slot).collect();
+        let slots = self.stale.last().map_or(0, |last| last + 1);
+        self.simulation.tables = std::iter::repeat_with(Tables::default).take(slots).collect();
+    }
+
+    fn prepare_those(
+        &mut self,
+        cases: &[CatalogueCase],
+        wanted: impl Fn(usize) -> bool,
+    ) -> Result<Vec<bool>, Error> {
         let started = Instant::now();
-        let slots = cases.iter().filter_map(|c| c.case.slot).max().map_or(0, |last| last + 1);
-        let mut tables: Vec<Tables> = std::iter::repeat_with(Tables::default).take(slots).collect();
         let mut refused = vec![false; cases.len()];
         let room = TracedRoomView {
             survey: &self.observations.survey,
@@ -110,11 +132,13 @@ impl Baseline {
             pulses: &self.observations.pulses,
             materials: self.simulation.expanded_materials()?,
         };
-        let mut reasons = Vec::new();
+        let (mut found, mut reasons) = (Vec::new(), Vec::new());
         for (own, refused) in cases.iter().zip(&mut refused) {
-            let (Some(term), Some(slot)) = (own.case.decay_term(), own.case.slot) else { continue };
+            let Some(slot) = own.case.slot.filter(|&slot| wanted(slot)) else { continue };
+            self.stale.remove(&slot);
+            let Some(term) = own.case.decay_term() else { continue };
             match term.prepare(&room) {
-                Ok(found) => tables[slot] = found,
+                Ok(tables) => found.push((slot, tables)),
                 Err(Unprepared::Refused(reason)) => {
                     *refused = true;
                     reasons.push(reason);
@@ -122,7 +146,7 @@ impl Baseline {
                 Err(Unprepared::Failed(error)) => return Err(error),
             }
         }
-        self.simulation.tables = tables;
+        found.into_iter().for_each(|(slot, tables)| self.simulation.tables[slot] = tables);
         for reason in reasons {
             if !self.observations.notes.contains(&reason) {
                 self.observations.notes.push(reason);
@@ -134,9 +158,14 @@ impl Baseline {
 
     /// Takes a change of the model into the simulation, and expands it again where paths moved. Surfaces that cannot stand where they were
     /// found stay where they are, and a note says so.
-    pub fn retrace(&mut self, change: &ModelChange, cases: &[CatalogueCase]) -> Result<(), Error> {
+    pub fn retrace(
+        &mut self,
+        change: &ModelChange,
+        cases: &[CatalogueCase],
+        chosen: &[usize],
+    ) -> Result<(), Error> {
         match self.simulation.apply(change, &self.observations.survey) {
-            Ok(true) => self.expand(cases),
+            Ok(true) => self.expand(cases, chosen),
             Ok(false) => Ok(()),
             Err(Error::Displacement(reason)) => {
                 self.observations.notes.push(format!(
@@ -149,19 +178,40 @@ impl Baseline {
         }
     }
 
-    /// Predicts energies and tables again from the traced paths.
-    pub fn expand(&mut self, cases: &[CatalogueCase]) -> Result<(), Error> {
+    /// Predicts energies again from the traced paths, and the tables of some cases (indices); those of all others wait for
+    /// [`Baseline::prepare_rest`]: rounds of expansion and fit ask for few of them.
+    pub fn expand(&mut self, cases: &[CatalogueCase], chosen: &[usize]) -> Result<(), Error> {
         self.simulation.expand(&self.observations, true)?;
-        self.prepare(cases).map(|_| ())
+        self.forget_tables(cases);
+        let wanted: Vec<usize> = chosen.iter().filter_map(|&c| cases[c].case.slot).collect();
+        self.prepare_those(cases, |slot| wanted.contains(&slot)).map(|_| ())
     }
 
-    /// Expands about fitted absorption.
-    pub fn expand_about(&mut self, values: &[f64], cases: &[CatalogueCase]) -> Result<(), Error> {
+    /// Expands about a share of the way to fitted absorption; says how far it was off, in standard deviations of what is known of it.
+    pub fn expand_towards(
+        &mut self,
+        (values, share): (&[f64], f64),
+        cases: &[CatalogueCase],
+        chosen: &[usize],
+    ) -> Result<f64, Error> {
+        let moved = self.move_absorption(values, share);
+        self.expand(cases, chosen)?;
+        Ok(moved)
+    }
+
+    /// Moves the absorption of the expansion a share of the way to that fitted; says how far it was off, in standard deviations of what is
+    /// known of it.
+    fn move_absorption(&mut self, values: &[f64], share: f64) -> f64 {
         let layout = self.decay_layout();
+        let mut off = 0.0f64;
         for (m, material) in self.simulation.absorption.iter_mut().enumerate() {
-            material.copy_from_slice(&values[layout.material(m)]);
+            for (b, a) in material.iter_mut().enumerate() {
+                let by = values[layout.absorption(m, b)] - *a;
+                off = off.max(by.abs() / self.priors[m][b].sd.min(0.1));
+                *a += share * by;
+            }
         }
-        self.expand(cases)
+        off
     }
 
     /// Fits the baseline, expanding about it anew until it stays.
@@ -171,15 +221,7 @@ impl Baseline {
         for round in 0..ROUNDS {
             report(observer, "baseline", round as u64, ROUNDS as u64)?;
             let found = self.fit_energy(&[], &used, None)?;
-            let layout = self.decay_layout();
-            let mut moved = 0.0f64;
-            for (m, material) in self.simulation.absorption.iter_mut().enumerate() {
-                for (b, a) in material.iter_mut().enumerate() {
-                    let next = found.0.values[layout.absorption(m, b)];
-                    moved = moved.max((next - *a).abs() / self.priors[m][b].sd.min(0.1));
-                    *a = next;
-                }
-            }
+            let moved = self.move_absorption(&found.0.values, 1.0);
             let last = moved < TOLERANCE || round + 1 == ROUNDS;
             self.simulation.expand(&self.observations, last)?;
             if last {

@@ -43,8 +43,9 @@ pub(crate) fn more_with_half(
     let with_all = evidence(baseline)?;
     let half = baseline.simulation.traced_by(&tracer, &baseline.observations.survey, observer)?;
     let whole = std::mem::replace(&mut baseline.simulation, half);
-    let with_half = baseline.expand(cases).and_then(|()| evidence(baseline));
+    let with_half = baseline.expand(cases, &bear).and_then(|()| evidence(baseline));
     baseline.simulation = whole;
+    baseline.stale.clear();
     baseline.seconds.insert("half the rays", started.elapsed().as_secs_f64());
     Ok(bear
         .into_iter()

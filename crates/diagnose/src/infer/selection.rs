@@ -5,12 +5,15 @@ use crate::error::Error;
 use crate::extend::extension::changes;
 use crate::extend::model_change::ModelChange;
 use crate::infer::arrival_fits::ArrivalFits;
-use crate::infer::baseline::Baseline;
+use crate::infer::baseline::{self, Baseline};
 use crate::infer::candidates::{CatalogueCase, EffectScore};
 use crate::infer::ray_dependence::MoreWithHalf;
 use crate::infer::search::{Search, State};
 use sabine_acoustics::Observer;
 use std::sync::Arc;
+
+/// Expansions about the fit with one cause more, at most.
+const ROUNDS: usize = 4;
 
 /// What the search found.
 #[derive(Default)]
@@ -58,6 +61,7 @@ pub(crate) fn select(
 ) -> Result<Selection, Error> {
     let mut named = Selection::default();
     while named.chosen.len() < baseline.config.most_causes {
+        baseline.prepare_rest(cases)?;
         let (ranked, rivals, interchangeable, threshold) = {
             let search = Search::new(baseline, cases, effects, used.to_vec()).knowing(arrival_fits);
             let base = search.state(&[], None)?;
@@ -105,17 +109,9 @@ pub(crate) fn select(
             named.rivals = std::iter::once(best.id).chain(rivals.iter().map(|r| r.id)).collect();
             break;
         }
-        let (changes, absorption) = {
-            let search = Search::new(baseline, cases, effects, used.to_vec()).knowing(arrival_fits);
-            let state = search.state(&named.chosen, None)?;
-            (changes(&search, &state, best.best), state.energy.values)
-        };
-        // With the cause at work the materials are others: what is compared, and with which spread, follows them.
-        if cases[best.best].case.observable().concerns(Observable::Decay) {
-            baseline.expand_about(&absorption, cases)?;
-        }
+        let changes = expand_about_fit(baseline, cases, effects, &named.chosen, (used, arrival_fits))?;
         for change in &changes {
-            baseline.retrace(change, cases)?;
+            baseline.retrace(change, cases, &named.chosen)?;
         }
         let chosen: Vec<&Case> = named
             .chosen
@@ -125,6 +121,7 @@ pub(crate) fn select(
             .collect();
         baseline.calibrate_scatter(&chosen, used)?;
     }
+    baseline.prepare_rest(cases)?;
     let search = Search::new(baseline, cases, effects, used.to_vec()).knowing(arrival_fits);
     let state = search.backward(search.state(&named.chosen, None)?)?;
     if named.chosen.last() != state.chosen.last() {
@@ -133,6 +130,50 @@ pub(crate) fn select(
     }
     named.chosen = state.chosen;
     Ok(named)
+}
+
+/// With a cause at work the materials are others: what is compared, and with which spread, follows them. Expands about their fit until it
+/// stays or explains less than before, and gives the changes of the cause named last.
+fn expand_about_fit(
+    baseline: &mut Baseline,
+    cases: &[CatalogueCase],
+    effects: usize,
+    chosen: &[usize],
+    (used, arrival_fits): (&[bool], &Arc<ArrivalFits>),
+) -> Result<Vec<ModelChange>, Error> {
+    let Some(&last) = chosen.last() else { return Ok(Vec::new()) };
+    // Of the expansion before: evidence, absorption, changes.
+    let mut before: Option<(f64, Vec<Vec<f64>>, Vec<ModelChange>)> = None;
+    let mut round = 0;
+    loop {
+        let (changes, evidence, fitted) = {
+            let search = Search::new(baseline, cases, effects, used.to_vec()).knowing(arrival_fits);
+            let state = search.state(chosen, None)?;
+            (changes(&search, &state, last), state.log_evidence(), state.energy.values)
+        };
+        if !cases[last].case.observable().concerns(Observable::Decay) {
+            return Ok(changes);
+        }
+        if let Some((_, absorption, changes)) = before.take_if(|(most, ..)| evidence < *most) {
+            baseline.simulation.absorption = absorption;
+            baseline.expand(cases, chosen)?;
+            return Ok(changes);
+        }
+        if round == ROUNDS {
+            return Ok(changes);
+        }
+        // The first fit stands far from its expansion: its evidence is no measure.
+        if round > 0 {
+            before = Some((evidence, baseline.simulation.absorption.clone(), changes.clone()));
+        }
+        // Sums of pressures follow absorption otherwise than the sums of energies that fits step by: where a whole step overshoots to and
+        // fro, half of it does not.
+        let share = if round == 0 { 1.0 } else { 0.5 };
+        if baseline.expand_towards((&fitted, share), cases, chosen)? < baseline::TOLERANCE {
+            return Ok(changes);
+        }
+        round += 1;
+    }
 }
 
 /// Puts a cause that moves paths before those of decays alone, if it is worth a name by arrival times. Arrival times do not depend on what

@@ -1,9 +1,11 @@
 //! What the simulated room predicts.
 
+pub(crate) mod band_state;
 pub(crate) mod edges;
 pub(crate) mod hit_groups;
 pub(crate) mod local_reaction;
 pub(crate) mod met_surfaces;
+pub(crate) mod modes;
 pub(crate) mod monte_carlo_modes;
 pub(crate) mod path_chances;
 pub(crate) mod reflection_reweighting;

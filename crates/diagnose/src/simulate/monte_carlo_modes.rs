@@ -4,7 +4,8 @@
 //! together, and to take each bin's for its own would make evidence of chance. Their covariance is that between batches of
 //! rays; its strongest directions are kept.
 
-use crate::simulate::traced_pair::BandState;
+use crate::simulate::band_state::BandState;
+use crate::simulate::modes::Modes;
 use nalgebra::{DMatrix, SymmetricEigen};
 use sabine_paths::PathSet;
 
@@ -17,32 +18,6 @@ const LEAST: f64 = 0.1;
 const MOST_BIAS: f64 = 0.5;
 /// Nothing scatters more than the square of one Gaussian sample.
 const MOST_VARIANCE: f64 = 2.0;
-
-/// By how much directions of the tracer's chance move the logarithm of each bin of one band, a standard deviation of each.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Modes {
-    count: usize,
-    /// `[bin * count + mode]`.
-    moves: Vec<f64>,
-}
-
-impl Modes {
-    /// `moves` is `[bin * count + mode]`.
-    #[cfg(test)]
-    pub fn new(count: usize, moves: Vec<f64>) -> Self {
-        Self { count, moves }
-    }
-
-    /// Number of directions: the same in all bands of a response.
-    pub fn count(&self) -> usize {
-        self.count
-    }
-
-    /// Those of a bin.
-    pub fn of(&self, bin: usize) -> &[f64] {
-        &self.moves[bin * self.count..(bin + 1) * self.count]
-    }
-}
 
 /// Deviations of the batches from their mean, in units of a bin's whole energy: the sum of their squares is the relative variance of that
 /// by chance.
@@ -89,7 +64,7 @@ pub(crate) fn find(bands: &mut [BandState], ends: &[usize]) {
             state.variance[bin] = (state.variance[bin] + left).min(MOST_VARIANCE);
             state.correction[bin] += (0.5 * taken + left).min(MOST_BIAS);
         }
-        state.modes = Modes { count: order.len(), moves };
+        state.modes = Modes::new(order.len(), moves);
         state.batch_deviations = Vec::new();
     }
 }

@@ -1,6 +1,6 @@
 //! What it changes if each meeting with a material left less, remembered from call to call.
 
-use crate::simulate::traced_pair::BandState;
+use crate::simulate::band_state::BandState;
 use std::cell::RefCell;
 
 /// Questions that are remembered: those of a few effects, and of their slopes. An effect that asks for another share in each bin

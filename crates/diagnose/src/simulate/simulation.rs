@@ -9,6 +9,7 @@ use crate::extend::extended_model::Dimensions;
 use crate::extend::moved_mesh::find_ranges;
 use crate::observe::observations::Observations;
 use crate::observe::observed_response::PEAKS_S;
+use crate::simulate::band_state::BandState;
 use crate::simulate::edges::Edges;
 use crate::simulate::met_surfaces::MetSurfaces;
 use crate::simulate::monte_carlo_modes;
@@ -16,7 +17,7 @@ use crate::simulate::monte_carlo_modes;
 use crate::simulate::scene_tracer::Rays;
 use crate::simulate::scene_tracer::{PreparedTracer, SceneTracer};
 use crate::simulate::tables::Tables;
-use crate::simulate::traced_pair::{Arrival, BandState, IsolatedReflection, TracedPair};
+use crate::simulate::traced_pair::{Arrival, IsolatedReflection, TracedPair};
 use crate::simulate::traced_room::{trace, traced_s, traced_scene, traced_until_s};
 #[cfg(test)]
 use crate::survey::Place;

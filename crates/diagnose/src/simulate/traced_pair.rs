@@ -7,8 +7,8 @@ pub(crate) use isolated_reflections::IsolatedReflection;
 
 use crate::observe::band_pulse::{BandPulse, CELL_S};
 use crate::observe::time_bins::Bins;
+use crate::simulate::band_state::BandState;
 use crate::simulate::hit_groups;
-use crate::simulate::monte_carlo_modes::Modes;
 use crate::simulate::path_chances;
 use rayon::prelude::*;
 use sabine_acoustics::{Air, Error, Material};
@@ -63,75 +63,6 @@ pub(crate) struct TracedPair {
     isolated: Vec<u32>,
     /// Group of like hits that each path belongs to, within its slice of time.
     groups: Vec<u8>,
-}
-
-/// Predicted energy of one band in time bins, at the materials of the expansion, and how it changes.
-#[derive(Clone, Debug)]
-pub(crate) struct BandState {
-    pub bins: Bins,
-    pub ln_energy: Vec<f64>,
-    /// Share of the octave's own energy that its filter takes.
-    pub own_share: f64,
-    /// What it lets in of neighbouring octaves: their index, share, and the logarithm of their energy in these bins.
-    pub leaks: Vec<(usize, f64, Vec<f64>)>,
-    /// Groups of paths with like hits: those of bin k are `groups[k]..groups[k + 1]`.
-    pub groups: Vec<usize>,
-    /// Energy of each group.
-    pub group_energy: Vec<f64>,
-    /// Its mean number of hits, `[group * materials + material]`.
-    pub group_hits: Vec<f64>,
-    /// Energy-weighted mean time after the direct sound.
-    pub time_s: Vec<f64>,
-    pub departure: Vec<[f64; 3]>,
-    pub departure_products: Vec<[f64; 6]>,
-    pub arrival: Vec<[f64; 3]>,
-    pub arrival_products: Vec<[f64; 6]>,
-    /// Expected variance of a measured bin about the prediction, as a share of its energy squared: what each bin scatters for itself.
-    /// Without the tracer's part until modes are found.
-    pub variance: Vec<f64>,
-    /// The tracer's own part of it.
-    pub monte_carlo: Vec<f64>,
-    /// What the tracer's chance moves together.
-    pub modes: Modes,
-    /// By how much the logarithm of the energy that is to be expected lies above that of what the rays have found in the bin: these are
-    /// smoothed, and corrected for what chance does to logarithms.
-    pub correction: Vec<f64>,
-    /// What modes are made of, `[bin * batches + batch]`; none once they are.
-    pub batch_deviations: Vec<f32>,
-}
-
-#[cfg(test)]
-impl BandState {
-    /// A decay that falls by a neper in four bins: two groups of paths in each bin, whose hits grow with time.
-    pub fn by_hand(bins: Bins, count: usize, materials: usize, offset: f64) -> Self {
-        let early = |bin: usize| (-0.25 * bin as f64 - offset).exp();
-        let group_energy: Vec<f64> =
-            (0..count).flat_map(|bin| [0.7 * early(bin), 0.3 * early(bin)]).collect();
-        let hits =
-            |group: usize| (0..materials).map(move |m| 0.3 * (group / 2) as f64 + (group % 2 + m) as f64);
-        Self {
-            bins,
-            ln_energy: (0..count).map(|bin| early(bin).ln()).collect(),
-            own_share: 1.0,
-            leaks: Vec::new(),
-            groups: (0..=count).map(|bin| 2 * bin).collect(),
-            group_hits: (0..2 * count).flat_map(hits).collect(),
-            group_energy,
-            time_s: (0..count).map(|bin| bins.centre_s(bin)).collect(),
-            departure: (0..count).map(|bin| [0.5 - 0.1 * bin as f64, 0.2, -0.1]).collect(),
-            departure_products: vec![[0.4, 0.3, 0.3, 0.05, 0.0, -0.02]; count],
-            arrival: (0..count).map(|bin| [-0.2, 0.4 - 0.05 * bin as f64, 0.1]).collect(),
-            arrival_products: vec![[0.3, 0.4, 0.3, -0.04, 0.03, 0.0]; count],
-            variance: (0..count).map(|bin| 0.15 + 0.02 * bin as f64).collect(),
-            monte_carlo: vec![0.0; count],
-            modes: Modes::new(
-                2,
-                (0..count).flat_map(|bin| [0.1 * (0.7 * bin as f64).sin(), 0.004 * bin as f64]).collect(),
-            ),
-            correction: (0..count).map(|bin| 0.002 * bin as f64).collect(),
-            batch_deviations: Vec::new(),
-        }
-    }
 }
 
 impl TracedPair {

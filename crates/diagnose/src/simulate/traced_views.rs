@@ -2,8 +2,9 @@
 
 use crate::error::Error;
 use crate::observe::band_pulse::BandPulse;
+use crate::simulate::band_state::BandState;
 use crate::simulate::simulation::Simulation;
-use crate::simulate::traced_pair::{BandState, TracedPair};
+use crate::simulate::traced_pair::TracedPair;
 use crate::survey::{Survey, SurveyedResponse};
 use rayon::prelude::*;
 use sabine_acoustics::{Air, Material};

@@ -1,9 +1,9 @@
 //! What an effect is shown of a prediction.
 
 use crate::extend::displaced_surface::{DisplacedSurface, Mirror, longer_m, mirrors};
+use crate::simulate::band_state::BandState;
 use crate::simulate::reflection_reweighting::HitChanges;
 use crate::simulate::tables::Tables;
-use crate::simulate::traced_pair::BandState;
 use crate::survey::{Survey, SurveyedResponse};
 
 /// One band of the predicted energy of one source-receiver pair.

@@ -14,7 +14,7 @@ use rand_pcg::Pcg64Mcg;
 use sabine_acoustics::{FilterBank, PerBand};
 use std::f64::consts::PI;
 
-/// Images that are summed for a pair, at most: where more would be heard in time, the last bins are left as they are.
+/// Images that are summed for a pair, at most: where more would be heard in time, the last bins are open.
 const MOST_IMAGES: f64 = 1e6;
 /// Exact paths of a room that is no cuboid count for so long after the direct sound, in seconds: later ones are a choice of all.
 const EXACT_S: f64 = 0.055;
@@ -28,6 +28,10 @@ const SAMPLES_PER_PERIOD: f64 = 10.0;
 const MIN_RATE_HZ: f64 = 1e3;
 /// Cells in which energies are gathered before they are spread over the bins, in seconds.
 const FINE_CELL_S: f64 = 2.5e-4;
+/// Relative variance of a bin in which pressures add, but were not summed: five decibels up or down, or ten where one mode is left.
+const UNSUMMED_VARIANCE: f64 = 4.0;
+/// Summed bins whose mean change stands for those after them, at most.
+const LAST: usize = 10;
 /// Largest change that counts, in nepers of energy: a node is never so deep where it is measured.
 const MAX_CHANGE: f64 = 5.0;
 
@@ -38,6 +42,8 @@ pub(super) struct Interference {
     pub change: Vec<f64>,
     /// Relative variance of that energy by what is not known of places.
     pub open_variance: Vec<f64>,
+    /// Bins in which pressures were summed: the first so many.
+    pub summed: usize,
 }
 
 impl Interference {
@@ -46,6 +52,7 @@ impl Interference {
         Self {
             change: (0..bins).map(|bin| 0.5 * (1.7 * bin as f64 + 0.4).sin()).collect(),
             open_variance: (0..bins).map(|bin| 0.01 + 0.002 * bin as f64).collect(),
+            summed: bins,
         }
     }
 }
@@ -59,6 +66,8 @@ struct SpecularPaths {
     energies: Vec<Vec<f64>>,
     /// All that arrive before, in seconds after the direct sound.
     complete_s: f64,
+    /// Whether those that arrive later are in phase as these are: images of a cuboid, not what a mesh of any shape scatters.
+    is_in_phase_to_the_end: bool,
 }
 
 /// Tabulates by how much sums of pressures differ from those of energies at the materials of the expansion.
@@ -89,6 +98,7 @@ fn specular_paths(pair: &TracedPairView<'_>) -> Result<SpecularPaths, Error> {
         arrivals: Vec::new(),
         energies: vec![Vec::new(); bands.len()],
         complete_s: 0.0,
+        is_in_phase_to_the_end: false,
     };
     if !pair.has_direct() {
         return Ok(found);
@@ -114,6 +124,7 @@ fn specular_paths(pair: &TracedPairView<'_>) -> Result<SpecularPaths, Error> {
     let most_m = (MOST_IMAGES * volume_m3 * 3.0 / (4.0 * PI)).cbrt();
     let max_length_m = ((direct_s + compared_s) * speed_m_s).min(most_m);
     found.complete_s = max_length_m / speed_m_s - direct_s;
+    found.is_in_phase_to_the_end = true;
     let mut reflections: Vec<[u16; 6]> = Vec::new();
     pair.for_each_image(max_length_m, &mut |image| {
         found.lengths_m.push(image.length_m);
@@ -169,6 +180,11 @@ fn moves_m(pair: &TracedPairView<'_>, paths: &SpecularPaths) -> Vec<Vec<f32>> {
     moves
 }
 
+/// By how much a path is longer or shorter at most.
+fn most_moved_m(moves_m: &[Vec<f32>]) -> f64 {
+    moves_m.iter().flatten().fold(0.0f32, |most, moved| most.max(moved.abs())).into()
+}
+
 fn of_band(
     pair: &TracedPairView<'_>,
     band: usize,
@@ -178,8 +194,8 @@ fn of_band(
 ) -> Result<Interference, Error> {
     let bands = pair.room().survey().bands();
     let bins = Bins::new(bands, band);
-    let count =
-        bins.count(pair.compared_s(band).min(paths.complete_s) + 1e-9).min(pair.ln_energy(band).len());
+    let compared = bins.count(pair.compared_s(band) + 1e-9).min(pair.ln_energy(band).len());
+    let count = bins.count(paths.complete_s + 1e-9).min(compared);
     if count == 0 || paths.lengths_m.is_empty() {
         return Ok(Interference::default());
     }
@@ -191,12 +207,15 @@ fn of_band(
     let after_s = |path: usize, longer_m: f32| {
         (paths.lengths_m[path] + f64::from(longer_m)) / speed_m_s - pair.direct_s()
     };
-    let amplitudes: Vec<f64> = paths.energies[band].iter().map(|e| e.sqrt()).collect();
+    // High octaves are compared for a shorter time: what comes after it is heard in none of their bins.
+    let end_m = (pair.direct_s() + end_s) * speed_m_s + most_moved_m(moves_m);
+    let heard: Vec<usize> = (0..paths.lengths_m.len()).filter(|&i| paths.lengths_m[i] < end_m).collect();
+    let amplitudes: Vec<f64> = heard.iter().map(|&path| paths.energies[band][path].sqrt()).collect();
     let sums: Vec<Vec<f64>> = moves_m
         .iter()
         .map(|moves| {
             let mut signal = vec![0.0f64; samples];
-            for (path, &amplitude) in amplitudes.iter().enumerate() {
+            for (&path, &amplitude) in heard.iter().zip(&amplitudes) {
                 add_pulse(&mut signal, (after_s(path, moves[path]) + lead_s) * rate_hz, amplitude);
             }
             let signal: Vec<f32> = signal.into_iter().map(|x| x as f32).collect();
@@ -222,8 +241,14 @@ fn of_band(
         let near = &scatter[about.saturating_sub(SMOOTHED)..(about + SMOOTHED + 1).min(count)];
         near.iter().sum::<f64>() / near.len() as f64
     };
-    let open_variance = (0..count).map(mean).collect();
-    Ok(Interference { change, open_variance })
+    let mut open_variance: Vec<f64> = (0..count).map(mean).collect();
+    if paths.is_in_phase_to_the_end {
+        let last = &change[count.saturating_sub(LAST)..];
+        let held = last.iter().sum::<f64>() / last.len() as f64;
+        change.resize(compared, held);
+        open_variance.resize(compared, UNSUMMED_VARIANCE);
+    }
+    Ok(Interference { change, open_variance, summed: count })
 }
 
 /// Energies of the bins if paths add as energies.

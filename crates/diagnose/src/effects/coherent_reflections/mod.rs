@@ -26,7 +26,7 @@ const LEFT_TO_CHANCE: (f64, f64) = (0.03, 1.0);
 /// Two parameters: the share of the sum of pressures, 0 for energies alone and 1 for pressures alone (the exponent of the ratio of the two
 /// in each bin); and how much of the spread that chance would give is left. What the uncertainty of places leaves open is added: sums are
 /// made at several places drawn within it. In a cuboid (six whole faces, each of one material) all images within the compared time count,
-/// up to a million; in other meshes the exact paths of the tracer, the first 60 ms.
+/// up to a million (later bins keep the mean change of the last, and hardly count); in other meshes the exact paths of the tracer, the first 60 ms.
 ///
 /// Mark: energies of single responses above or below the prediction for many bins together, each response and octave in its own, predictable
 /// way. Mimicked by: `room_modes`, the same thing below the Schroeder frequency in a room of any shape.
@@ -79,8 +79,12 @@ impl DecayTerm for CoherentReflections {
     fn variance(&self, values: &[f64], view: &BandView<'_>, variance: &mut [f64]) {
         let Some(table) = view.table::<Interference>() else { return };
         let predicted = values[0].clamp(0.0, 1.0) * (1.0 - values[1]);
-        for (v, open) in variance.iter_mut().zip(&table.open_variance) {
+        for (v, open) in variance.iter_mut().zip(&table.open_variance).take(table.summed) {
             *v = v.min((1.0 - predicted) * *v + predicted * open);
+        }
+        // Of those that were not summed only the mean is known.
+        for (v, open) in variance.iter_mut().zip(&table.open_variance).skip(table.summed) {
+            *v += values[0].clamp(0.0, 1.0) * open;
         }
     }
 }

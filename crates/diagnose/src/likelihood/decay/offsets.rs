@@ -5,7 +5,7 @@
 //! model has a parameter for them.
 
 use crate::likelihood::laplace::Slopes;
-use crate::simulate::monte_carlo_modes::Modes;
+use crate::simulate::modes::Modes;
 use crate::statistics::{HUBER_LOG_RATIO, exp_all, log_density};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;

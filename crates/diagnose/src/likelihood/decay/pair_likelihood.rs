@@ -5,7 +5,7 @@ use super::{EnergyModel, LN_PER_DB, STEP};
 use crate::effect::DecayTerm;
 use crate::likelihood::laplace::Slopes;
 use crate::likelihood::parameters::ModelTerm;
-use crate::simulate::monte_carlo_modes::Modes;
+use crate::simulate::modes::Modes;
 use crate::simulate::reflection_reweighting::HitChanges;
 use crate::simulate::views::BandView;
 use crate::statistics::HUBER_LOG_RATIO;

@@ -1,13 +1,13 @@
 //! Energy, time, direction and hits of each bin, gathered from the paths.
 
 use super::{
-    BandState, CELL_S, COHERENT_BANDWIDTH_TIMES, COHERENT_SD, ISOLATED_S, MODEL_SD, NOTHING, TIME_SD_S,
-    TracedPair,
+    CELL_S, COHERENT_BANDWIDTH_TIMES, COHERENT_SD, ISOLATED_S, MODEL_SD, NOTHING, TIME_SD_S, TracedPair,
 };
 use crate::observe::band_pulse::BandPulse;
 use crate::observe::time_bins::Bins;
+use crate::simulate::band_state::BandState;
 use crate::simulate::hit_groups;
-use crate::simulate::monte_carlo_modes::{Modes, deviations};
+use crate::simulate::monte_carlo_modes::deviations;
 use crate::simulate::smoothing::smoothed;
 use sabine_paths::PathSet;
 use std::collections::BTreeMap;
@@ -283,31 +283,6 @@ impl Gathered {
             state.variance.push(interference.max(0.0) / (e * e) + model_sd * model_sd);
         }
         state
-    }
-}
-
-impl BandState {
-    /// Without any bin; room for so many.
-    fn empty(bins: Bins, own_share: f64, count: usize) -> Self {
-        Self {
-            bins,
-            ln_energy: Vec::with_capacity(count),
-            own_share,
-            leaks: Vec::new(),
-            groups: vec![0],
-            group_energy: Vec::new(),
-            group_hits: Vec::new(),
-            time_s: Vec::with_capacity(count),
-            departure: Vec::with_capacity(count),
-            departure_products: Vec::with_capacity(count),
-            arrival: Vec::with_capacity(count),
-            arrival_products: Vec::with_capacity(count),
-            variance: Vec::with_capacity(count),
-            monte_carlo: Vec::with_capacity(count),
-            modes: Modes::default(),
-            correction: Vec::with_capacity(count),
-            batch_deviations: Vec::with_capacity(count * usize::from(PathSet::BATCHES)),
-        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{BandState, TracedPair};
 use crate::observe::time_bins::Bins;
-use crate::simulate::monte_carlo_modes::Modes;
+use crate::simulate::modes::Modes;
 use sabine_acoustics::{Error, Material};
 use sabine_paths::Conditions;
 
