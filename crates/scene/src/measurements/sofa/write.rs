@@ -240,6 +240,8 @@ fn attributes(set: &Measurements, convention: SofaConvention, created: &str) -> 
         ("SOFAConventionsVersion", "1.0"),
         ("DataType", data_type),
         ("RoomType", "reverberant"),
+        // Demanded of reverberant rooms.
+        ("RoomDescription", "as measured"),
         ("Title", "Room responses"),
         ("DateCreated", created),
         ("DateModified", created),
