@@ -6,6 +6,7 @@
 mod bad_inputs;
 mod console;
 mod diagnose;
+mod exchange;
 #[cfg(unix)]
 mod faults;
 mod fit;
