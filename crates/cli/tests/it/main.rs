@@ -19,6 +19,7 @@ mod match_room;
 mod process;
 mod replace;
 mod rooms;
+mod sheet;
 mod sweep;
 mod trace;
 

@@ -11,8 +11,9 @@ use std::path::{Path, PathBuf};
 /// Highest volume (m3) and number of lines of remarks that a sheet takes.
 const MAX_VOLUME_M3: f64 = 1e7;
 const MAX_REMARKS: usize = 8;
-/// Most files that the sheet lists by name; more would not fit on one page.
+/// Most files that the sheet lists by name, and most bands with which it lists them: more would not fit on one page.
 const MAX_LISTED: usize = 12;
+const MAX_LISTED_BANDS: usize = 10;
 /// Bandwidth of an octave and of a third octave as a share of their centre, and the number of decays that an integrated impulse
 /// response stands for (ISO 3382-2:2008, 7.1 and 7.2).
 const BANDWIDTH: [f64; 2] = [0.71, 0.23];
@@ -21,8 +22,8 @@ const DECAYS: f64 = 10.0;
 // Colours of print; A4 with margins of 12 mm.
 const STYLE: &str = "@page{size:A4;margin:12mm}*{box-sizing:border-box}body{font:10pt/1.35 system-ui,sans-serif;color:#111;background:#fff;margin:0 auto;max-width:186mm;padding:6mm}\
 @media print{body{padding:0}}h1{font-size:15pt;margin:0 0 2mm}h2{font-size:10.5pt;margin:3.5mm 0 1mm}table{border-collapse:collapse;font-variant-numeric:tabular-nums;width:100%}\
-th,td{border:.2mm solid #888;padding:.6mm 1.2mm;text-align:right}th:first-child,td:first-child{text-align:left}.facts td{border:0;text-align:left;padding:.3mm 2mm .3mm 0}.facts td:first-child{width:38mm;color:#444}\
-.both{display:grid;grid-template-columns:62mm 1fr;gap:5mm;align-items:start}svg{width:100%;height:auto}p{margin:1mm 0}.small{font-size:8.5pt;color:#333}";
+th,td{border:.2mm solid #888;padding:.6mm 1.2mm;text-align:right}th:first-child,td:first-child{text-align:left}.facts td{border:0;text-align:left;padding:.3mm 2mm .3mm 0}.facts td:first-child{width:46mm;color:#444}\
+.both{display:grid;grid-template-columns:88mm 1fr;gap:5mm;align-items:start}svg{width:100%;height:auto}p{margin:1mm 0}.small{font-size:8.5pt;color:#333}";
 
 /// Options of the sheet.
 #[derive(Args)]
@@ -90,7 +91,9 @@ impl SheetArguments {
             table(&t20, &t30),
             chart(&t20, &t30)?
         );
-        body.push_str(&positions(files, rooms));
+        if t20.mean.bands().len() <= MAX_LISTED_BANDS {
+            body.push_str(&positions(files, rooms));
+        }
         body.push_str(
             "<p class=\"small\">Integrated impulse response method. T20 from -5 to -25 dB, T30 from -5 to -35 dB, least squares; noise subtracted. ± is the standard deviation of the mean over positions; \
              u is what is expected of the signal's own chance (ISO 3382-2, equations 1 and 2, with N positions and n = 10). A dash: the decay does not reach far enough above the noise.</p>\n",
