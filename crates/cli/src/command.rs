@@ -2,8 +2,8 @@
 
 use crate::channel;
 use crate::commands::{
-    augment, deconvolve, diagnose, eq, estimate, evaluate, fit, listen, live, match_room, materials, measure,
-    mix, new_room, replace, sweep, trace, train, validate, walk,
+    augment, deconvolve, diagnose, eq, estimate, evaluate, export, fit, import, listen, live, match_room,
+    materials, measure, mix, new_room, replace, sweep, trace, train, validate, walk,
 };
 use crate::console;
 use crate::failure::Failure;
@@ -70,6 +70,10 @@ enum Job {
     Materials(materials::Arguments),
     /// Make a room folder from a size or a floor plan and names of the material library
     NewRoom(new_room::Arguments),
+    /// Make a measured room of files of other programs: SOFA, REW, tables of sound files and positions
+    Import(import::Arguments),
+    /// Write the responses of a measured room as a SOFA file
+    Export(export::Arguments),
     /// Print a completion script for a shell
     Completions(shell::CompletionArguments),
     /// Write manual pages
@@ -168,6 +172,8 @@ impl Job {
             Self::Evaluate(arguments) => evaluate::run(arguments),
             Self::Materials(arguments) => materials::run(arguments),
             Self::NewRoom(arguments) => new_room::run(arguments),
+            Self::Import(arguments) => import::run(arguments),
+            Self::Export(arguments) => export::run(arguments),
             Self::Completions(arguments) => shell::completions(arguments, command()),
             Self::Man(arguments) => shell::manual(arguments, &command()),
         }

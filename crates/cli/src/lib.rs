@@ -30,6 +30,7 @@ mod demo;
 mod failure;
 pub mod output;
 pub mod page;
+mod positions;
 mod room;
 mod shell;
 pub mod spectrogram;

@@ -193,6 +193,71 @@ pub enum Error {
         /// The least distance from floor, ceiling and walls, in metres.
         margin_m: f64,
     },
+    /// A file that is no HDF5, is cut short or damaged, or has parts that are not read.
+    #[error("cannot be read: {source}")]
+    Hdf5 {
+        /// The decoder's cause.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// A SOFA file of something else than room responses.
+    #[error("`{found}` where SingleRoomSRIR 1 or SingleRoomMIMOSRIR 1 can be read{}", if found.contains("FreeField") { ": head-related responses are no room; `sabine walk --head` renders with them" } else { "" })]
+    SofaConvention {
+        /// Convention and version that were found.
+        found: String,
+    },
+    /// Something that a file must have.
+    #[error("is missing")]
+    Missing,
+    /// An array of another shape than it must have.
+    #[error("has the shape {found}, where {expected} is needed")]
+    Shape {
+        /// What can be read.
+        expected: String,
+        /// What was found.
+        found: String,
+    },
+    /// A unit, a type or a word that is not known.
+    #[error("is `{found}`; {expected} can be read")]
+    Unit {
+        /// What was found.
+        found: String,
+        /// What is known.
+        expected: &'static str,
+    },
+    /// A file that claims to hold more than can be meant.
+    #[error("{found} where at most {limit} are taken")]
+    TooManyValues {
+        /// How many the file claims.
+        found: u64,
+        /// The limit.
+        limit: u64,
+    },
+    /// One name for two places.
+    #[error("`{id}` is at {here_m:?} m here and at {before_m:?} m before")]
+    MovedPlace {
+        /// The name.
+        id: String,
+        /// Its position here, in metres.
+        here_m: [f64; 3],
+        /// Its position in a line above, in metres.
+        before_m: [f64; 3],
+    },
+    /// Two names for one place.
+    #[error("`{id}` is where `{other}` is, or within 1 mm of it")]
+    SamePlace {
+        /// The name.
+        id: String,
+        /// The other name.
+        other: String,
+    },
+    /// A grid of responses with a hole.
+    #[error("there is no response from `{source_id}` to `{receiver_id}`, and this convention needs all")]
+    MissingPair {
+        /// The source.
+        source_id: String,
+        /// The receiver.
+        receiver_id: String,
+    },
     /// A line of a text file that is not what it should be.
     #[error("cannot read `{text}` as {expected}")]
     TextLine {

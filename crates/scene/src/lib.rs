@@ -43,7 +43,8 @@
 //! - Theory of diffuse fields, kept apart from measurement: [`DiffuseRoom`] (Sabine, Eyring, Millington, Fitzroy,
 //!   Arau-Puchades, critical distance, mean free path), [`schroeder_frequency_hz`].
 //! - With the feature `rooms`: [`MeasuredRoom`] (a folder with `room.toml`, a mesh and responses), [`Materials`] (tables of
-//!   absorption from file to file), [`DrawnRoom`] (a folder from a floor plan), [`NewRoom`] (a folder from measurements).
+//!   absorption from file to file), [`DrawnRoom`] (a folder from a floor plan), [`NewRoom`] (a folder from measurements),
+//!   [`Measurements`] (responses and places from REW's text, tables and SOFA files), [`RoomModel`] (what to put them into).
 //!
 //! # Does not
 //! - trace: `sabine-paths` has the trait, `sabine-propagate` a tracer.
@@ -59,11 +60,14 @@
 //! |---|---|---|
 //! | OBJ files | as `tobj` reads them | `tests/it/obj_against_tobj.rs` |
 //! | rooms from and to disk | every fault of the format has its error; a written room reads as it was | `tests/it/measured_rooms.rs`, `tests/it/room_reading.rs` |
+//! | SOFA files | those of Python's `sofar` to the bit; written ones read by `sofar`, `netCDF4`, `h5py` | `tests/it/sofa_files.rs`, `docs/validation/peers/sofa_peers.py` |
 //! | hostile sizes | refused before memory is taken | `tests/it/hostile_sizes.rs` |
 //!
 //! # Features
 //! - `rooms` (default): room folders and tables of materials.
 //! - `gltf`: [`Mesh::read`] reads glTF and GLB besides OBJ.
+//! - `sofa`: room responses from and to SOFA files (AES69).
+//! - `tables`: tables of sound files and positions (CSV).
 //!
 //! # References
 //! - H. Kuttruff: Room Acoustics, 6th edition, 2017.
@@ -75,6 +79,8 @@ mod floor_plan;
 mod inside_folder;
 #[cfg(feature = "rooms")]
 mod measured_room;
+#[cfg(feature = "rooms")]
+mod measurements;
 mod mesh_file;
 mod scene;
 mod theory;
@@ -89,8 +95,12 @@ pub use measured_room::materials::{MaterialTable, Materials};
 #[cfg(feature = "rooms")]
 pub use measured_room::{
     DrawnRoom, Levels, MaterialPrior, MeasuredRoom, Measurement, NewResponse, NewRoom, PositionSd,
-    ReadOptions, ResponseEntry, RoomNote, TimeZero,
+    ReadOptions, ResponseEntry, RoomModel, RoomNote, TimeZero,
 };
+#[cfg(feature = "sofa")]
+pub use measurements::SofaConvention;
+#[cfg(feature = "rooms")]
+pub use measurements::{ImportOptions, Measurements};
 pub use mesh_file::Mesh;
 pub use mesh_file::mesh_options::{LengthUnit, MeshOptions};
 pub use mesh_file::up_axis::UpAxis;

@@ -1,17 +1,20 @@
 //! A room as it was measured: mesh, materials as far as they are known, places and responses, from a folder.
 
+mod catt;
 mod drawn_room;
 mod file;
 pub(crate) mod materials;
+mod model;
 mod notes;
 mod other_model;
 mod position_sd;
-mod response_check;
+pub(crate) mod response_check;
 mod tables;
 mod turned;
 mod write;
 
 pub use drawn_room::DrawnRoom;
+pub use model::RoomModel;
 pub use notes::RoomNote;
 pub use position_sd::PositionSd;
 pub use write::{NewResponse, NewRoom};
@@ -58,6 +61,38 @@ pub enum Levels {
     Common,
     /// An unknown gain for each response.
     PerResponse,
+}
+
+impl TimeZero {
+    /// The word that stands for it in `room.toml`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Emission => "emission",
+            Self::Common => "common",
+            Self::PerResponse => "per_response",
+        }
+    }
+
+    /// What a word of `room.toml` stands for.
+    pub fn from_word(word: &str) -> Option<Self> {
+        [Self::Emission, Self::Common, Self::PerResponse].into_iter().find(|meaning| meaning.word() == word)
+    }
+}
+
+impl Levels {
+    /// The word that stands for it in `room.toml`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Absolute => "absolute",
+            Self::Common => "common",
+            Self::PerResponse => "per_response",
+        }
+    }
+
+    /// What a word of `room.toml` stands for.
+    pub fn from_word(word: &str) -> Option<Self> {
+        [Self::Absolute, Self::Common, Self::PerResponse].into_iter().find(|meaning| meaning.word() == word)
+    }
 }
 
 /// What the measurement says about time and level.
@@ -152,6 +187,8 @@ pub struct MeasuredRoom {
     /// Whether the file states the units and the axis of its mesh: then they are not questioned.
     stated: [bool; 2],
     named_as_in_library: Vec<String>,
+    /// Materials whose tables are those of the mesh file.
+    described_by_mesh: Vec<String>,
     priors: Vec<MaterialPrior>,
     air: Air,
     air_assumed: bool,
@@ -226,8 +263,17 @@ impl MeasuredRoom {
             return Err(error.in_file(path, format!("materials.{name}")));
         }
         let mut tables = file.materials.clone();
-        let in_library =
-            |name: &&String| !file.materials.contains_key(*name) && library_material(name).is_ok();
+        let described =
+            |name: &&String| !file.materials.contains_key(*name) && mesh.surfaces().contains_key(*name);
+        let described_by_mesh: Vec<String> =
+            mesh.material_names().iter().filter(described).cloned().collect();
+        for name in &described_by_mesh {
+            let surface = &mesh.surfaces()[name];
+            let column = |values: &PerBand<f64>| Some(values.averaged(bands).values().to_vec());
+            let (absorption, scattering) = (column(surface.absorption()), column(surface.scattering()));
+            tables.insert(name.clone(), MaterialTable { absorption, scattering, ..Default::default() });
+        }
+        let in_library = |name: &&String| !tables.contains_key(*name) && library_material(name).is_ok();
         let named_as_in_library: Vec<String> =
             mesh.material_names().iter().filter(in_library).cloned().collect();
         for name in &named_as_in_library {
@@ -270,6 +316,7 @@ impl MeasuredRoom {
             up_axis,
             stated: [file.room.units.is_some(), file.room.up_axis.is_some()],
             named_as_in_library,
+            described_by_mesh,
             priors,
             air,
             air_assumed: file.air.is_none(),

@@ -50,6 +50,7 @@ pub struct Mesh {
     vertices_m: Vec<[f64; 3]>,
     triangles: Vec<Triangle>,
     material_names: Vec<String>,
+    surfaces: BTreeMap<String, Material>,
     faces_without_area: usize,
     faces_without_material: usize,
     up_axis: UpAxis,
@@ -86,7 +87,8 @@ impl Mesh {
     /// [`Error::InFile`] naming the line or the element, with the cause
     /// [`Error::ObjSyntax`], [`sabine_acoustics::Error::OutOfRange`], [`sabine_acoustics::Error::Length`], [`Error::CrossedPolygon`], [`sabine_acoustics::Error::Index`],
     /// [`Error::MeshTooLarge`], [`Error::BeyondBuffer`], [`Error::BufferUri`], [`Error::UnsupportedMesh`] or
-    /// [`Error::NodeTwice`]; [`Error::MeshFormat`] for what is no glTF.
+    /// [`Error::NodeTwice`]; for extras [`Error::Unit`], [`Error::DuplicateId`], [`sabine_acoustics::Error::BandCount`],
+    /// [`sabine_acoustics::Error::UnknownBand`], [`sabine_acoustics::Error::OutOfRange`]; [`Error::MeshFormat`] for what is no glTF.
     pub fn read_with(path: impl AsRef<Path>, options: &MeshOptions) -> Result<Self, Error> {
         let path = path.as_ref();
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
@@ -134,6 +136,12 @@ impl Mesh {
     /// Names of the materials that faces use, in the order of first use.
     pub fn material_names(&self) -> &[String] {
         &self.material_names
+    }
+
+    /// What the file itself says about the sound of its materials, by name: in glTF the `extras` of a material, with the lists
+    /// `absorption` and, if wanted, `scattering` (0 to 1) and `centres_hz` (absent: octaves from 125 Hz to 8 kHz).
+    pub fn surfaces(&self) -> &BTreeMap<String, Material> {
+        &self.surfaces
     }
 
     /// Faces that are lines or points: left out, since nothing can be reflected by them.
@@ -195,6 +203,7 @@ impl MeshDraft {
             vertices_m: Vec::new(),
             triangles: Vec::new(),
             material_names: Vec::new(),
+            surfaces: BTreeMap::new(),
             faces_without_area: 0,
             faces_without_material: 0,
             up_axis: placement.up_axis,

@@ -1,15 +1,23 @@
-//! The tables of the material library, with their sources.
+//! The tables of the material library, with their sources; tables of materials from and to other programs.
 
 use crate::failure::Failure;
 use clap::Args;
 use sabine::acoustics::{Bands, LibraryMaterial, material_library};
+use sabine::scene::Materials;
+use std::path::{Path, PathBuf};
 
-/// Print the tables of the material library with their sources.
+/// Print the tables of the material library with their sources, or turn tables of materials from one form into another.
 #[derive(Args)]
 pub struct Arguments {
     /// Comma-separated values: name, absorption in each octave, depth of the relief in m, description, source
     #[arg(long)]
     csv: bool,
+    /// Tables to be turned into another form: a materials.toml, or a geometry file of CATT-Acoustic (.geo)
+    #[arg(long, value_name = "FILE", requires = "out", conflicts_with = "csv")]
+    from: Option<PathBuf>,
+    /// The file to be written: its ending says the form, .toml or .geo
+    #[arg(long, value_name = "FILE", requires = "from")]
+    out: Option<PathBuf>,
 }
 
 /// Runs the command.
@@ -17,6 +25,9 @@ pub struct Arguments {
 /// # Errors
 /// The table cannot be encoded.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if let (Some(from), Some(out)) = (&arguments.from, &arguments.out) {
+        return convert(from, out);
+    }
     let surfaces = material_library();
     if arguments.csv {
         print!("{}", csv_table(surfaces)?);
@@ -27,6 +38,26 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         "\nrandom-incidence absorption by octave (Hz); trust each value to a standard deviation of about 0.1\n\
          in room.toml: [materials.floor] library = \"parquet_on_concrete\""
     );
+    Ok(())
+}
+
+/// Tables from one file to another.
+fn convert(from: &Path, out: &Path) -> Result<(), Failure> {
+    let form = |path: &Path| match path.extension().map(|ending| ending.to_ascii_lowercase()) {
+        Some(ending) if ending == "toml" => Ok(false),
+        Some(ending) if ending == "geo" => Ok(true),
+        _ => {
+            Err(format!("{}: tables of materials end in .toml, or in .geo for CATT-Acoustic", path.display()))
+        }
+    };
+    let (catt, to_catt) = (form(from)?, form(out)?);
+    let materials = if catt { Materials::read_catt(from)? } else { Materials::read(from)? };
+    if to_catt {
+        materials.write_catt(out)?;
+    } else {
+        materials.write(out)?;
+    }
+    println!("wrote {}: {} materials", out.display(), materials.tables().len());
     Ok(())
 }
 

@@ -1,6 +1,7 @@
 //! Measures impulse responses: room-acoustic parameters per octave, with the reason where there is no answer.
 
 mod listener;
+mod sheet;
 
 use crate::channel::channel;
 use crate::chart::{Chart, Look, Scale, Series, chart_sheet};
@@ -46,6 +47,8 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR")]
     plots: Option<PathBuf>,
     #[command(flatten)]
+    sheet: sheet::SheetArguments,
+    #[command(flatten)]
     listener: listener::ListenerArguments,
 }
 
@@ -60,6 +63,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Bands::octaves(arguments.from.unwrap_or(62.5), arguments.to.unwrap_or(8000.0))?
     };
     arguments.listener.check(arguments.files.len())?;
+    arguments.sheet.check()?;
     let channel = arguments.listener.channel().or(arguments.channel).unwrap_or_default();
     let (mut results, mut plots, mut rooms) = (Vec::new(), Vec::new(), Vec::new());
     for path in &arguments.files {
@@ -104,6 +108,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             out.write(name, svg.as_bytes())?;
         }
         out.finish()?;
+    }
+    if let Some(path) = &arguments.sheet.sheet {
+        let page = arguments.sheet.html(&arguments.files, &rooms)?;
+        write_atomically(path, |file| file.write_all(page.as_bytes()))?;
     }
     if let Some(path) = &arguments.json {
         let text = serde_json::to_string_pretty(&results)?;

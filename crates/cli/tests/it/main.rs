@@ -6,6 +6,7 @@
 mod bad_inputs;
 mod console;
 mod diagnose;
+mod exchange;
 #[cfg(unix)]
 mod faults;
 mod fit;
@@ -18,6 +19,7 @@ mod match_room;
 mod process;
 mod replace;
 mod rooms;
+mod sheet;
 mod sweep;
 mod trace;
 

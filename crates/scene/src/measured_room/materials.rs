@@ -239,7 +239,9 @@ impl MeasuredRoom {
         let priors = tables.tables.iter().map(MaterialTable::prior).collect();
         let mut named_as_in_library = self.named_as_in_library.clone();
         named_as_in_library.retain(|name| materials.get(name).is_none());
-        Ok(Self { scene, priors, named_as_in_library, ..self.clone() })
+        let mut described_by_mesh = self.described_by_mesh.clone();
+        described_by_mesh.retain(|name| materials.get(name).is_none());
+        Ok(Self { scene, priors, named_as_in_library, described_by_mesh, ..self.clone() })
     }
 
     /// The same with the tables of a file.

@@ -34,6 +34,11 @@ pub enum RoomNote {
         /// Name of the material.
         material: String,
     },
+    /// A material without table takes that of the mesh file.
+    MeshTable {
+        /// Name of the material.
+        material: String,
+    },
     /// The size is unusual in metres.
     UnusualSize {
         /// The longest side in m.
@@ -75,6 +80,9 @@ impl fmt::Display for RoomNote {
             }
             Self::LibraryTable { material } => {
                 write!(f, "{material}: no table; that of the material library is used")
+            }
+            Self::MeshTable { material } => {
+                write!(f, "{material}: no table; that of the mesh file is used")
             }
             Self::UnusualSize { longest_m, unit: Some(unit) } => write!(
                 f,
@@ -148,6 +156,8 @@ impl MeasuredRoom {
         }
         let library = self.named_as_in_library.iter();
         notes.extend(library.map(|name| RoomNote::LibraryTable { material: name.clone() }));
+        let mesh = self.described_by_mesh.iter();
+        notes.extend(mesh.map(|name| RoomNote::MeshTable { material: name.clone() }));
         notes.extend(self.guessed());
         let bands = self.bands();
         let silent = |&(i, _): &(usize, f64)| {

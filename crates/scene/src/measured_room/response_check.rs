@@ -4,7 +4,7 @@ use crate::error::Error;
 use sabine_acoustics::{NoReading, Onset, check_one_onset};
 
 /// Refuses silence, noise without direct sound, and speech or music.
-pub(super) fn check(samples: &[f32], sample_rate_hz: u32) -> Result<(), Error> {
+pub(crate) fn check(samples: &[f32], sample_rate_hz: u32) -> Result<(), Error> {
     if samples.iter().all(|&sample| sample == 0.0) {
         return Err(Error::Silent);
     }

@@ -1,10 +1,11 @@
-//! The part of glTF 2.0 that a room needs: the triangles of the default scene, and the names of their materials.
+//! The part of glTF 2.0 that a room needs: the triangles of the default scene, the names of their materials, and what their extras say.
 //!
 //! The crate `gltf` knows the grammar and the container. Numbers are read here: its accessors take the file at its word, so
 //! that a length or an index past the end overflows or panics. Every size is checked against the bytes that are there, and
 //! against a limit, before memory is taken.
 
 mod buffers;
+mod extras;
 
 use super::MeshDraft;
 use crate::error::Error;
@@ -67,6 +68,7 @@ pub(super) fn parse_gltf(
         let error = Error::UnsupportedMesh { found: name.clone(), expected };
         return Err(error.in_file(path, "extensionsRequired"));
     }
+    draft.mesh.surfaces = extras::surfaces(path, json)?;
     let buffers = Buffers::load(path, &root, blob, folder)?;
     Reader { path, root: &root, buffers, draft, vertices: 0, triangles: 0 }.scene()
 }

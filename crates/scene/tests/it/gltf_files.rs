@@ -420,3 +420,71 @@ proptest! {
         }
     }
 }
+
+/// A document whose first material has these extras, in a room folder without tables.
+fn described(extras: Value) -> TempDir {
+    let folder = TempDir::new().unwrap();
+    let mut document = document();
+    document["materials"][0]["extras"] = extras;
+    document["materials"][1]["extras"] = json!({ "exporter": "of another program" });
+    let data = base64::engine::general_purpose::STANDARD.encode(bytes());
+    document["buffers"][0]["uri"] = format!("data:application/octet-stream;base64,{data}").into();
+    std::fs::write(folder.path().join("room.gltf"), document.to_string()).unwrap();
+    let toml = "room.mesh = \"room.gltf\"\nbands.centres_hz = [500, 1000]\nmaterials.material_1.absorption = [0.4, 0.5]\n";
+    std::fs::write(folder.path().join("room.toml"), toml).unwrap();
+    folder
+}
+
+#[test]
+fn extras_of_a_material_are_its_table() {
+    let extras = json!({ "absorption": [0.1, 0.2, 0.3], "scattering": [0.5, 0.6, 0.7], "centres_hz": [500, 1000, 2000], "cost": 3 });
+    let folder = described(extras.clone());
+    let mesh = Mesh::read(folder.path().join("room.gltf")).unwrap();
+    assert_eq!(
+        mesh.surfaces().keys().collect::<Vec<_>>(),
+        ["wall"],
+        "extras of other programs are left alone"
+    );
+    let wall = &mesh.surfaces()["wall"];
+    assert_eq!(
+        (wall.absorption().values(), wall.scattering().values()),
+        (&[0.1, 0.2, 0.3][..], &[0.5, 0.6, 0.7][..])
+    );
+    #[cfg(feature = "rooms")]
+    {
+        let room = MeasuredRoom::read(folder.path()).unwrap();
+        let wall = room.materials().get("wall").unwrap().clone();
+        assert_eq!(wall.absorption.unwrap().values(), [0.1, 0.2]);
+        assert_eq!(wall.scattering.values(), [0.5, 0.6]);
+        assert!(
+            room.notes()
+                .iter()
+                .any(|note| note.to_string() == "wall: no table; that of the mesh file is used")
+        );
+        // A table of the room file goes before.
+        let path = folder.path().join("room.toml");
+        let own = std::fs::read_to_string(&path).unwrap() + "materials.wall.absorption = [0.8, 0.9]\n";
+        std::fs::write(&path, own).unwrap();
+        let room = MeasuredRoom::read(folder.path()).unwrap();
+        assert_eq!(room.materials().get("wall").unwrap().absorption.as_ref().unwrap().values(), [0.8, 0.9]);
+    }
+}
+
+#[test]
+fn extras_that_are_no_table_are_refused() {
+    for (extras, words) in [
+        (json!({ "absorption": [0.1, 0.2] }), "materials[0].extras.absorption"),
+        (json!({ "absorption": 0.1 }), "materials[0].extras.absorption: is `0.1`; a list of numbers"),
+        (json!({ "absorption": [0.1, null], "centres_hz": [500, 1000] }), "a list of numbers"),
+        (json!({ "absorption": [0.1, 1.2], "centres_hz": [500, 1000] }), "absorption is 1.2"),
+        (json!({ "absorption": [0.1, 0.2], "centres_hz": [500, 900] }), "materials[0].extras.centres_hz"),
+        (
+            json!({ "absorption": [0.1, 0.2], "scattering": [-0.1, 0.2], "centres_hz": [500, 1000] }),
+            "materials[0].extras.scattering",
+        ),
+    ] {
+        let folder = described(extras.clone());
+        let error = Mesh::read(folder.path().join("room.gltf")).unwrap_err().to_string();
+        assert!(error.contains("room.gltf") && error.contains(words), "{extras}: {error}");
+    }
+}

@@ -11,8 +11,12 @@ mod hostile_sizes;
 #[cfg(feature = "rooms")]
 mod measured_rooms;
 mod obj_against_tobj;
+#[cfg(feature = "tables")]
+mod position_tables;
 #[cfg(unix)]
 #[path = "../../../acoustics/tests/faults/process.rs"]
 mod process;
 #[cfg(feature = "rooms")]
 mod room_reading;
+#[cfg(feature = "sofa")]
+mod sofa_files;

@@ -97,6 +97,13 @@ session = "one"
 """,
     )
     shutil.copy(REPOSITORY / "fixtures/room/room.toml", HERE / "room_toml/fixture.toml")
+    (HERE / "sofa").mkdir(exist_ok=True)
+    shutil.copy(REPOSITORY / "crates/scene/tests/sofa/pairs_plain.sofa", HERE / "sofa/pairs_plain.sofa")
+    columns = b"file,source_x_m,source_y_m,source_z_m,receiver,receiver_x_m,receiver_y_m,receiver_z_m\n"
+    write("tables/positions.csv", columns + b"a.wav,1,2,1.5,seat,3,2,1.2\n")
+    rew = b"* Impulse Response data saved by REW V5.31\n3 // Response length\n2,083333E-5 // Sample interval (seconds)\n* Data start\n0\n1\n0,5\n"
+    write("tables/rew.txt", rew)
+    write("tables/room.geo", b"ABS floor = <1 2 3 4 5 6 : 7 8> L <10 11 12 13 14 15 : 16 17> {255 0 10}\nABS1 w = <.1 .2 .3 .4 .5 1>\n")
     # The header of the pretrained weights with the first kilobytes of its arrays: the whole file slows mutation down, and is
     # given to the fuzzer by name instead.
     weights = (REPOSITORY / "crates/estimator/weights/room.safetensors").read_bytes()

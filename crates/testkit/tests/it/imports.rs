@@ -44,11 +44,12 @@ const MAY_IMPORT: [(&str, &[&str]); 16] = [
 ];
 
 /// Libraries that live behind one crate alone, so that nobody else's users compile them.
-const LIVES_IN: [(&str, &str); 5] = [
+const LIVES_IN: [(&str, &str); 6] = [
     ("parry3d", "sabine-propagate"),
     ("candle-core", "sabine-estimator"),
     ("candle-nn", "sabine-estimator"),
     ("gltf", "sabine-scene"),
+    ("hdf5-pure", "sabine-scene"),
     ("hound", "sabine-acoustics"),
 ];
 

@@ -7,6 +7,7 @@
 //! ```
 
 mod arguments;
+mod imports;
 mod outcome;
 mod recordings;
 mod rooms;
@@ -44,6 +45,15 @@ fn rooms_of_all_kinds() {
     recordings::make(folder.path());
     rooms::make(folder.path());
     judge(folder.path(), rooms::cases());
+}
+
+#[test]
+fn imports_of_all_kinds() {
+    let folder = tempfile::tempdir().unwrap();
+    recordings::make(folder.path());
+    rooms::make(folder.path());
+    imports::make(folder.path());
+    judge(folder.path(), imports::cases());
 }
 
 #[test]
