@@ -10,7 +10,7 @@ mod report;
 #[cfg(test)]
 mod report_tests;
 mod residual_map;
-mod words;
+pub(in crate::commands) mod words;
 
 use crate::bar::Bar;
 use crate::demo::Demo;
