@@ -185,6 +185,9 @@ impl Planner {
     ) -> Result<(Vec<CatalogueCase>, Vec<Fit>, Fitted), PlanError> {
         let mut baseline = Baseline::new(room, &[], &self.config.diagnose, &self.tracer, observer)?;
         let mut cases = all_cases(&self.effects, baseline.survey());
+        // Tables of the others would only take time.
+        let asked = || question.sure.iter().chain(&question.leading);
+        cases.retain(|c| asked().any(|h| h.effect == c.id));
         let mut refused = baseline.prepare(&cases)?.into_iter();
         cases.retain(|_| !refused.next().unwrap_or(false));
         let used = vec![true; baseline.pairs()];

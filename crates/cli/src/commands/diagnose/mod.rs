@@ -142,6 +142,9 @@ fn print_findings(findings: &Findings, out: &Path) {
     for measurement in &findings.would_decide {
         println!("would decide: {measurement}");
     }
+    if !findings.would_decide.is_empty() {
+        println!("where, and by how much: {}", words::plan_command(findings, &out.join("diagnosis.json")));
+    }
     if findings.held_out.is_none() {
         println!("note: too few positions to hold any out; gains are those of the data that were fitted");
     }
