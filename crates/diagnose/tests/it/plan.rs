@@ -111,7 +111,7 @@ fn what_cannot_be_planned_is_refused() {
     assert!(matches!(found, PlanError::OneHypothesis { found: 1 }), "{found}");
     let found = refused(config(), &room, Some(&question(&["sound_speed", "ghosts"])));
     assert!(matches!(found, PlanError::UnknownHypothesis { .. }), "{found}");
-    let found = refused(config(), &room, Some(&question(&["channel_fault", "extra_reflector"])));
+    let found = refused(config(), &room, Some(&question(&["channel_fault", "channel_fault"])));
     assert!(matches!(found, PlanError::NotPredicted { .. }), "{found}");
     let found = refused(config(), &nobody, Some(&question(&["sound_speed", "sampling_clock"])));
     assert!(matches!(found, PlanError::Diagnose(sabine_diagnose::Error::NoResponses)), "{found}");
