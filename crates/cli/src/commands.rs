@@ -16,6 +16,7 @@ pub mod materials;
 pub mod measure;
 pub mod mix;
 pub mod new_room;
+pub mod plan;
 pub mod replace;
 pub mod sweep;
 pub mod trace;

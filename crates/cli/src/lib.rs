@@ -28,6 +28,7 @@ mod command;
 mod commands;
 mod demo;
 mod failure;
+mod outline;
 pub mod output;
 pub mod page;
 mod positions;

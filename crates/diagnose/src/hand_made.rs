@@ -178,7 +178,7 @@ impl Tables {
         let materials = materials.expect("absorption between 0 and 1");
         let simulation = Simulation::by_hand(&self.survey, materials, self.states, self.arrivals);
         Baseline {
-            observations: Observations::by_hand(self.survey, self.measured),
+            observations: Observations::without_files(self.survey, self.measured, Vec::new()),
             simulation: simulation.expect("a box that can be traced"),
             config,
             priors: self.priors,

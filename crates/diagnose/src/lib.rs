@@ -80,6 +80,7 @@ mod hand_made;
 mod infer;
 mod likelihood;
 mod observe;
+mod plan;
 mod report;
 mod simulate;
 mod statistics;
@@ -103,6 +104,13 @@ pub use extend::model_change::ModelChange;
 pub use extend::moved_mesh::DisplacementError;
 pub use likelihood::multilateration::{UnassignedPeak, UnassignedPeaks};
 pub use observe::pre_arrival::PreArrival;
+pub use plan::config::PlanConfig;
+pub use plan::cost::CostTable;
+pub use plan::error::PlanError;
+pub use plan::hypothesis::{Hypothesis, OpenQuestion};
+pub use plan::measurement::PlannedMeasurement;
+pub use plan::outcome::{Chosen, Decision, EffectSize, LookAlikes, Plan, Weighing};
+pub use plan::planner::Planner;
 pub use report::diagnosis::{
     CandidateScore, Cause, DecayCurves, Diagnosis, FitTest, FittedMaterial, FoundParameter, HeldOut,
     HeldOutGain, Isolability, LackOfFit, ResidualCell, Verdict,

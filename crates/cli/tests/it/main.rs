@@ -14,6 +14,7 @@ mod listen;
 mod live;
 mod long_files;
 mod match_room;
+mod plan;
 #[cfg(unix)]
 #[path = "../../../acoustics/tests/faults/process.rs"]
 mod process;

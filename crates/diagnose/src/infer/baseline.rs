@@ -377,13 +377,13 @@ pub(crate) fn dispersion(residuals: &[BinResidual], bands: usize) -> Vec<f64> {
 }
 
 /// How far levels may lie off in each band, as a logarithm of energy: as far as is stated, and what few modes leave to chance.
-fn level_sd(room: &MeasuredRoom, config: &DiagnoseConfig) -> Vec<f64> {
+pub(crate) fn level_sd(room: &MeasuredRoom, config: &DiagnoseConfig) -> Vec<f64> {
     let stated = config.level_sd_db * LN_10 / 10.0;
     let modal = modal_variance(room.scene(), &room.air(), &room.bands());
     modal.iter().map(|variance| (stated * stated + variance).sqrt()).collect()
 }
 
-fn absorption_priors(prior: &MaterialPrior) -> Vec<Prior> {
+pub(crate) fn absorption_priors(prior: &MaterialPrior) -> Vec<Prior> {
     let bands = prior.absorption_sd.bands();
     (0..bands.len())
         .map(|b| {

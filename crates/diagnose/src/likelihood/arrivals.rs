@@ -3,6 +3,7 @@
 //! The direct sound comes when it should, give or take; every later peak belongs to one of the predicted specular reflections or to none
 //! (a mixture of normal distributions about the predicted times and an even background).
 
+pub(crate) mod expansion;
 mod unassigned_peaks;
 
 use crate::effect::Case;

@@ -4,6 +4,7 @@
 //! the energy of band-limited noise is (Kuttruff, Room Acoustics, 6th ed., 3.5), and the prediction's own Monte-Carlo error makes it wider.
 
 mod drift;
+mod expansion;
 mod fit;
 mod offsets;
 mod pair_likelihood;

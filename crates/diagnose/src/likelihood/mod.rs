@@ -3,6 +3,7 @@
 pub(crate) mod arrivals;
 pub(crate) mod decay;
 pub(crate) mod discrepancy;
+pub(crate) mod expansion;
 pub(crate) mod laplace;
 pub(crate) mod multilateration;
 pub(crate) mod parameters;

@@ -29,16 +29,15 @@ pub(crate) struct Observations {
     pulses_by_rate: BTreeMap<u32, Vec<BandPulse>>,
 }
 
-#[cfg(test)]
 impl Observations {
-    /// What was measured, without any file.
-    pub fn by_hand(survey: Survey, measured: Vec<Measured>) -> Self {
+    /// Responses that nobody has recorded, without any file: planned ones, and those of tests.
+    pub fn without_files(survey: Survey, measured: Vec<Measured>, pulses: Vec<BandPulse>) -> Self {
         Self {
             fitted: vec![true; survey.responses.len()],
             survey,
             measured,
             pre_arrival: PreArrival::default(),
-            pulses: Vec::new(),
+            pulses,
             notes: Vec::new(),
             samples: Vec::new(),
             pulses_by_rate: BTreeMap::new(),
@@ -151,7 +150,7 @@ impl Observations {
 }
 
 /// What the room file says, without any response.
-fn survey_of(room: &MeasuredRoom, position_sd_m: f64) -> Survey {
+pub(crate) fn survey_of(room: &MeasuredRoom, position_sd_m: f64) -> Survey {
     let vertices = room.scene().vertices();
     let corner = |fold: fn(f64, f64) -> f64, from: f64| {
         std::array::from_fn(|k| vertices.iter().map(|v| v[k]).fold(from, fold))

@@ -16,9 +16,9 @@ const BEFORE_S: f64 = 2e-3;
 /// Peaks this far below the direct sound are not trusted.
 pub(crate) const PEAK_FLOOR_DB: f64 = 26.0;
 /// Peaks closer than this are one.
-const PEAK_DISTANCE_S: f64 = 0.4e-3;
+pub(crate) const PEAK_DISTANCE_S: f64 = 0.4e-3;
 /// Most peaks of a response.
-const MAX_PEAKS: usize = 24;
+pub(crate) const MAX_PEAKS: usize = 24;
 /// Smoothing of the squared samples before peaks are sought.
 const SMOOTHING_S: f64 = 0.08e-3;
 /// Half of the direct pulse that is compared for its sign.

@@ -12,5 +12,6 @@ mod invariances;
 mod look_alikes;
 mod odd_input;
 mod places;
+mod plan;
 mod rendering;
 mod wrong_tables;

@@ -1,6 +1,6 @@
 //! The same measurement with another room model.
 
-use super::MeasuredRoom;
+use super::{MeasuredRoom, ResponseEntry};
 use crate::error::Error;
 use crate::measured_room::MaterialPrior;
 use crate::scene::{Receiver, Scene, Source};
@@ -46,11 +46,39 @@ impl MeasuredRoom {
         }));
         Ok(Self { scene, air, sources, receivers, priors, ..self.clone() })
     }
+
+    /// The same room with those of its responses alone that are wanted; places stay.
+    #[must_use]
+    pub fn with_responses(&self, wanted: impl Fn(&ResponseEntry) -> bool) -> Self {
+        let responses = self.responses.iter().filter(|r| wanted(r)).cloned().collect();
+        Self { responses, ..self.clone() }
+    }
+
+    /// The same room with other receivers and without any response: nothing has been measured at them yet.
+    #[must_use]
+    pub fn unmeasured_at(&self, receivers: Vec<Receiver>) -> Self {
+        Self { receivers, responses: Vec::new(), ..self.clone() }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn at_other_receivers_nothing_is_measured() {
+        let fixture = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/room");
+        let room = MeasuredRoom::read(fixture).unwrap();
+        let planned = vec![Receiver::omni("planned", [1.0, 1.0, 1.0]).unwrap()];
+        let other = room.unmeasured_at(planned.clone());
+        assert_eq!((other.receivers(), other.responses().len()), (&planned[..], 0));
+        assert_eq!((other.scene(), other.sources()), (room.scene(), room.sources()));
+        let some = room.with_responses(|r| r.receiver == room.responses()[0].receiver);
+        assert!(
+            some.responses().len() < room.responses().len() && some.responses()[0] == room.responses()[0]
+        );
+        assert_eq!(some.receivers(), room.receivers());
+    }
 
     #[test]
     fn places_may_move_but_not_change_their_names() {

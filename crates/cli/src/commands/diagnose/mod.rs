@@ -10,7 +10,7 @@ mod report;
 #[cfg(test)]
 mod report_tests;
 mod residual_map;
-mod words;
+pub(in crate::commands) mod words;
 
 use crate::bar::Bar;
 use crate::demo::Demo;
@@ -141,6 +141,9 @@ fn print_findings(findings: &Findings, out: &Path) {
     }
     for measurement in &findings.would_decide {
         println!("would decide: {measurement}");
+    }
+    if !findings.would_decide.is_empty() {
+        println!("where, and by how much: {}", words::plan_command(findings, &out.join("diagnosis.json")));
     }
     if findings.held_out.is_none() {
         println!("note: too few positions to hold any out; gains are those of the data that were fitted");

@@ -5,7 +5,7 @@ use super::findings::Findings;
 use super::residual_map::{self, ResidualMap};
 use super::words::{
     capital, effect, effect_of, headline, hertz, in_band, interval, meaning, named, number, parameter,
-    sentence,
+    plan_command, sentence,
 };
 use super::{held_out, look_alikes};
 use crate::chart::{Chart, Look, Scale, Series};
@@ -71,6 +71,11 @@ fn next_measurements(page: &mut Page, findings: &Findings) {
     let items: String =
         findings.would_decide.iter().map(|w| format!("<li>{}</li>", escape(&sentence(w)))).collect();
     page.markup(&format!("<ul>{items}</ul>"));
+    let command = plan_command(findings, std::path::Path::new("diagnosis.json"));
+    page.markup(&format!(
+        "<p>Where microphones and sources should stand for that, and by how many nats each would decide: <code>{}</code>, in the folder of this page.</p>",
+        escape(&command)
+    ));
 }
 
 fn parameters(page: &mut Page, findings: &Findings) -> Result<()> {

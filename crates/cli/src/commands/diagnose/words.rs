@@ -37,6 +37,16 @@ pub fn hertz(hz: f64) -> String {
     if hz < 1000.0 { format!("{hz} Hz") } else { format!("{} kHz", hz / 1000.0) }
 }
 
+/// The command that says where to measure next, and what that would decide; `file` is the diagnosis.
+pub fn plan_command(findings: &Findings, file: &std::path::Path) -> String {
+    // The demo is what a command takes that is given no room.
+    let room = match findings.room.as_str() {
+        demo if demo.starts_with("demo/") => String::new(),
+        folder => format!(" --room {folder}"),
+    };
+    format!("sabine plan{room} --diagnosis {}", file.display())
+}
+
 /// The verdict in a few words.
 pub fn headline(findings: &Findings) -> String {
     let names: Vec<String> = findings.causes.iter().map(named).collect();

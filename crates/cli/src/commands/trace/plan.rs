@@ -1,26 +1,18 @@
 //! The room from above, with the direct sound and the first reflections.
 
+use crate::outline::outlines;
 use crate::page::escape;
 use sabine::paths::{Conditions, PathSet, Reflection};
 use sabine::scene::{MeasuredRoom, Receiver, Source};
-use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// Width of the drawing in its own units, and the margin about the room.
 const WIDTH: f64 = 720.0;
 const MARGIN: f64 = 50.0;
-/// Edges between triangles whose normals agree so far belong to one face and are not drawn (cosine).
-const FLAT: f64 = 0.9999;
 /// The weakest reflection drawn, below the strongest (dB).
 const RANGE_DB: f64 = 30.0;
 
 type Point = [f64; 3];
-
-/// A side that triangles share, and their normals.
-struct Edge {
-    ends: [Point; 2],
-    normals: Vec<Point>,
-}
 
 /// A reflection of first order.
 struct FirstReflection {
@@ -179,37 +171,4 @@ fn first_reflections(
     }
     found.sort_by(|a, b| a.delay_ms.total_cmp(&b.delay_ms));
     Ok((direct, found))
-}
-
-/// Edges of the mesh at which it bends or ends, by position: neighbouring triangles need not share vertices.
-fn outlines(room: &MeasuredRoom) -> Vec<[Point; 2]> {
-    let scene = room.scene();
-    let key = |p: Point| p.map(|c| (c * 1e4).round() as i64);
-    let mut edges: BTreeMap<[[i64; 3]; 2], Edge> = BTreeMap::new();
-    for i in 0..scene.triangles().len() {
-        let corners = scene.corners_m(i);
-        let side = |a: Point, b: Point| -> Point { std::array::from_fn(|k| b[k] - a[k]) };
-        let (u, v) = (side(corners[0], corners[1]), side(corners[0], corners[2]));
-        let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-        let length = n.iter().map(|c| c * c).sum::<f64>().sqrt();
-        if length < 1e-12 {
-            continue;
-        }
-        let normal = n.map(|c| c / length);
-        for k in 0..3 {
-            let (a, b) = (corners[k], corners[(k + 1) % 3]);
-            let mut ends = [key(a), key(b)];
-            ends.sort_unstable();
-            edges
-                .entry(ends)
-                .or_insert_with(|| Edge { ends: [a, b], normals: Vec::new() })
-                .normals
-                .push(normal);
-        }
-    }
-    let bends = |normals: &[Point]| {
-        let cosine = |n: &Point| (0..3).map(|k| n[k] * normals[0][k]).sum::<f64>().abs();
-        normals.len() == 1 || normals.iter().any(|n| cosine(n) < FLAT)
-    };
-    edges.into_values().filter(|edge| bends(&edge.normals)).map(|edge| edge.ends).collect()
 }

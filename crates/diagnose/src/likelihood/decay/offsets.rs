@@ -86,6 +86,16 @@ impl<'a> Directions<'a> {
         self.moves[band].chunks_exact(self.own[band].len() + self.modes)
     }
 
+    /// What a unit of each direction moves each bin by, `(bin, direction)`, the `bins` of one band after those of another.
+    pub fn matrix(&self, bins: usize) -> DMatrix<f64> {
+        let mut moved = DMatrix::zeros(bins, self.count());
+        let rows = (0..self.bands.len()).flat_map(|band| self.rows(band).map(move |row| (band, row)));
+        for (bin, (band, row)) in rows.enumerate() {
+            self.of_band(band).zip(row).for_each(|(direction, by)| moved[(bin, direction)] = *by);
+        }
+        moved
+    }
+
     /// The most probable offsets.
     pub fn top(&self) -> Offsets {
         let deviates = self.most_probable();

@@ -84,7 +84,12 @@ impl EnergyModel<'_> {
     }
 
     /// Columns that matter in a band, and the change of the predicted logarithm of each bin with each.
-    fn rows(&self, values: &[f64], pair: usize, one: &ComparedBand<'_>) -> (Vec<usize>, Vec<Vec<f64>>) {
+    pub(super) fn rows(
+        &self,
+        values: &[f64],
+        pair: usize,
+        one: &ComparedBand<'_>,
+    ) -> (Vec<usize>, Vec<Vec<f64>>) {
         let (band, (paths, path_slopes)) = (one.band, &one.paths);
         let m = self.data.absorption.len();
         let gain_db = self.gain_db(values, pair);
