@@ -1,0 +1,7 @@
+//! Laws: their grammar, their errors, and what they do to paths.
+
+mod effect_on_paths;
+mod errors;
+mod formulas;
+#[cfg(feature = "serde")]
+mod tables;
