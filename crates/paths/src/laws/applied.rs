@@ -1,6 +1,6 @@
 //! Laws at work on paths.
 
-use crate::laws::blocks::{BLOCK, Program, Slot};
+use crate::laws::blocks::{Argument, Program, Slot};
 use crate::laws::bound::{BoundLaw, BoundLaws};
 use crate::laws::columns::Columns;
 use crate::laws::error::{LawError, LawFault, Place};
@@ -18,7 +18,6 @@ use std::ops::Range;
 /// Laws that act on the energy of paths, prepared for one set of them.
 pub(crate) struct PathLaws<'l> {
     programs: Vec<Program<'l>>,
-    columns: Columns<'l>,
     reflections: Option<ReflectionTables>,
     bands: Bands,
     last: &'l Law,
@@ -29,33 +28,44 @@ impl<'l> PathLaws<'l> {
     /// recorder act on paths by their time of arrival.
     pub fn new(
         laws: &'l BoundLaws,
-        paths: &'l PathSet,
+        paths: &PathSet,
         speed_m_s: f64,
         bands: Bands,
     ) -> Result<Option<Self>, LawError> {
         let mut columns = Columns::new(paths, speed_m_s);
         let of_paths = laws.of(LawTarget::Path).chain(laws.of(LawTarget::Recorder));
-        let programs = of_paths
-            .map(|bound| Program::new(bound, bands, |op| columns.place_of(bound, op)))
-            .collect::<Result<Vec<_>, _>>()?;
+        let programs =
+            of_paths.map(|bound| Program::new(bound, bands, &mut columns)).collect::<Result<Vec<_>, _>>()?;
         let reflections = ReflectionTables::new(laws, paths, bands)?;
         let acting = laws.laws.last().filter(|_| reflections.is_some() || !programs.is_empty());
-        Ok(acting.map(|last| Self { programs, columns, reflections, bands, last: &last.law }))
+        Ok(acting.map(|last| Self { programs, reflections, bands, last: &last.law }))
+    }
+
+    /// The laws of reflections.
+    pub fn reflections(&self) -> Option<&ReflectionTables> {
+        self.reflections.as_ref()
     }
 
     /// What the laws do in the bands from `first` on.
-    pub fn in_bands(&self, paths: &PathSet, first: usize) -> LawLanes<'_> {
-        let sums = self.reflections.as_ref().map(|tables| tables.sums(paths, first));
-        let (along_chains, along_paths) = sums.unzip();
-        LawLanes {
+    pub fn in_bands(&self, paths: &PathSet, first: usize) -> Result<LawLanes<'_>, LawError> {
+        let lanes = LANES.min(self.bands.len() - first);
+        let mut uniform = [0.0; LANES];
+        for program in self.programs.iter().filter(|program| program.is_uniform()) {
+            for (lane, sum) in uniform.iter_mut().enumerate().take(lanes) {
+                let db = program.result(&[], &(0..1), (first, lane)).at(0);
+                let place = Place { path: None, band_hz: Some(self.bands.nominal_hz(first + lane)) };
+                check_gain(&program.bound.law, db, place)?;
+                *sum += nepers(db) as f32;
+            }
+        }
+        Ok(LawLanes {
             laws: self,
             first,
-            lanes: LANES.min(self.bands.len() - first),
-            along_chains,
-            along_paths: along_paths.flatten(),
-            columns: self.columns.new_slots(),
+            lanes,
+            uniform,
+            along_axes: self.reflections.as_ref().and_then(|tables| tables.along_axes(paths, first)),
             slots: self.programs.iter().map(Program::new_slots).collect(),
-        }
+        })
     }
 }
 
@@ -64,55 +74,44 @@ pub(crate) struct LawLanes<'l> {
     laws: &'l PathLaws<'l>,
     first: usize,
     lanes: usize,
-    along_chains: Option<Vec<Lanes>>,
-    along_paths: Option<Vec<Lanes>>,
-    columns: Vec<Slot>,
+    /// What is the same for all paths.
+    uniform: Lanes,
+    along_axes: Option<Vec<Lanes>>,
     slots: Vec<Vec<Slot>>,
 }
 
 impl LawLanes<'_> {
-    /// Adds what laws of reflections do along each chain.
-    pub fn add_to_chains(&self, sums: &mut [Lanes]) {
-        if let Some(added) = &self.along_chains {
-            sums.iter_mut()
-                .zip(added)
-                .for_each(|(sum, added)| *sum = std::array::from_fn(|i| sum[i] + added[i]));
-        }
-    }
-
-    /// Adds what laws do to the logarithm of the energy of some paths: at most [`BLOCK`].
+    /// Adds what laws do to the logarithm of the energy of some paths, at most [`BLOCK`](crate::laws::BLOCK), beside what they do along chains.
     pub fn add_to_paths(&mut self, range: &Range<usize>, block: &mut [Lanes]) -> Result<(), LawError> {
-        let count = range.len().min(BLOCK);
-        if let Some(added) = &self.along_paths {
+        let uniform = self.uniform;
+        block.iter_mut().for_each(|x| *x = std::array::from_fn(|i| x[i] + uniform[i]));
+        if let Some(added) = &self.along_axes {
             let added = &added[range.clone()];
             block.iter_mut().zip(added).for_each(|(x, added)| *x = std::array::from_fn(|i| x[i] + added[i]));
         }
-        self.laws.columns.fill(range, &mut self.columns);
-        for (program, slots) in self.laws.programs.iter().zip(&mut self.slots) {
-            program.run(&self.columns, slots, (range.start, count), (self.first, self.lanes))?;
-            let (columns, slots) = (&self.columns, &*slots);
-            let add = |lane: usize| {
-                let mut greatest = f64::NEG_INFINITY;
-                program.result(columns, slots, count, (self.first, lane), |i, db| {
-                    greatest = greatest.max(db);
-                    block[i][lane] += nepers(db) as f32;
-                });
-                let place =
-                    Place { path: None, band_hz: Some(self.laws.bands.nominal_hz(self.first + lane)) };
-                check_gain(&program.bound.law, greatest, place)
-            };
-            (0..self.lanes).try_for_each(add)?;
+        let varied = self.laws.programs.iter().zip(&mut self.slots).filter(|(p, _)| !p.is_uniform());
+        for (program, slots) in varied {
+            program.in_bands(slots, range, (self.first, self.lanes))?;
+            for lane in 0..self.lanes {
+                let Argument::Many(db) = program.result(slots, range, (self.first, lane)) else { continue };
+                if !db.iter().fold(true, |within, db| within & (*db <= MAX_GAIN_DB)) {
+                    let greatest = db.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                    let band_hz = Some(self.laws.bands.nominal_hz(self.first + lane));
+                    check_gain(&program.bound.law, greatest, Place { path: None, band_hz })?;
+                }
+                block.iter_mut().zip(db).for_each(|(x, &db)| x[lane] += nepers(db) as f32);
+            }
         }
-        self.check_sum(range, &block[..count])
+        self.check_sum(range, block)
     }
 
     /// All laws together, and the geometric weight, leave the exponential in its range.
     fn check_sum(&self, range: &Range<usize>, block: &[Lanes]) -> Result<(), LawError> {
         let most = (MAX_GAIN_DB * NEPERS_PER_DB) as f32;
-        let greatest = block.iter().flatten().fold(f32::NEG_INFINITY, |greatest, &x| greatest.max(x));
-        if greatest <= most {
+        if block.iter().flatten().fold(true, |within, x| within & (*x <= most)) {
             return Ok(());
         }
+        let greatest = block.iter().flatten().fold(f32::NEG_INFINITY, |greatest, &x| greatest.max(x));
         let path = block.iter().position(|x| x.contains(&greatest)).map(|i| range.start + i);
         let found_db = f64::from(greatest) / NEPERS_PER_DB;
         let place = Place { path, band_hz: None };
@@ -129,16 +128,11 @@ pub(crate) fn delays_s(
 ) -> Result<Option<Vec<f64>>, LawError> {
     let mut delays_s: Option<Vec<f64>> = None;
     for bound in laws.of(LawTarget::Delay) {
-        let mut columns = Columns::new(paths, speed_m_s);
-        let program = Program::new(bound, bands, |op| columns.place_of(bound, op))?;
-        let (mut filled, mut slots) = (columns.new_slots(), program.new_slots());
+        let program = Program::new(bound, bands, &mut Columns::new(paths, speed_m_s))?;
         let sum = delays_s.get_or_insert_with(|| vec![0.0; paths.len()]);
-        for start in (0..paths.len()).step_by(BLOCK) {
-            let range = start..paths.len().min(start + BLOCK);
-            columns.fill(&range, &mut filled);
-            program.run(&filled, &mut slots, (start, range.len()), (0, 1))?;
-            program.result(&filled, &slots, range.len(), (0, 0), |i, s| sum[start + i] += s);
-        }
+        // Delays are the same in all bands: all that varies has been computed.
+        let added = program.result(&[], &(0..paths.len()), (0, 0));
+        sum.iter_mut().enumerate().for_each(|(i, sum)| *sum += added.at(i));
         for (path, (delay_s, &length_m)) in sum.iter().zip(paths.lengths_m()).enumerate() {
             if delay_s + f64::from(length_m) / speed_m_s < 0.0 {
                 let place = Place { path: Some(path), band_hz: None };

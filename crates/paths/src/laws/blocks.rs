@@ -5,14 +5,23 @@
 
 use crate::laws::arithmetic::{binary, fault_of, power, resonance, unary};
 use crate::laws::bound::BoundLaw;
+use crate::laws::columns::Columns;
 use crate::laws::error::{LawError, Place};
 use crate::laws::formula::{Binary, Op, Unary};
 use crate::laws::variable::scope;
-use crate::reweighting::LANES;
+use crate::parallel::for_each_index;
+use crate::reweighting::{LANES, exp};
 use sabine_acoustics::Bands;
+use std::ops::Range;
 
 /// Paths that are worked on together.
 pub(crate) const BLOCK: usize = 256;
+
+/// Paths that one thread prepares at a time.
+const STRETCH: usize = 64 * BLOCK;
+
+/// Exponents that single precision holds.
+const SINGLE_EXPONENT: f64 = 86.0;
 
 /// A number for each path of a block.
 pub(crate) type Slot = [f64; BLOCK];
@@ -28,9 +37,11 @@ enum Home {
     Slot(usize),
     /// In as many slots as there are lanes.
     Lanes(usize),
+    /// Nowhere: nobody asks for it.
+    Nowhere,
 }
 
-/// A law prepared for bands and for columns of paths.
+/// A law prepared for bands and for paths.
 pub(crate) struct Program<'l> {
     pub bound: &'l BoundLaw,
     /// `[operation][band]`.
@@ -38,17 +49,19 @@ pub(crate) struct Program<'l> {
     homes: Vec<Home>,
     slots: usize,
     bands: Bands,
+    /// Values of the paths' own parts, the same in all bands, that others are made of: `[part][path]`.
+    parts: Vec<Vec<f64>>,
 }
 
 /// An argument: one number, or one for each path.
 #[derive(Clone, Copy)]
-enum Argument<'s> {
+pub(crate) enum Argument<'s> {
     One(f64),
     Many(&'s [f64]),
 }
 
 impl Argument<'_> {
-    fn at(self, path: usize) -> f64 {
+    pub fn at(self, path: usize) -> f64 {
         match self {
             Self::One(value) => value,
             Self::Many(values) => values[path],
@@ -57,29 +70,93 @@ impl Argument<'_> {
 }
 
 impl<'l> Program<'l> {
-    /// Prepares a law. `column` gives the number of the column that holds a variable.
-    pub fn new(
-        bound: &'l BoundLaw,
-        bands: Bands,
-        mut column: impl FnMut(Op) -> usize,
-    ) -> Result<Self, LawError> {
+    /// Prepares a law and computes what is the same in all bands, on all threads.
+    pub fn new(bound: &'l BoundLaw, bands: Bands, columns: &mut Columns<'_>) -> Result<Self, LawError> {
+        let (ops, scopes) = (&bound.law.formula.ops, &bound.law.scopes);
+        let kind = |scope: u8| (scope & !scope::BAND != 0, scope & scope::BAND != 0);
         let mut slots = 0;
-        let mut homes = Vec::with_capacity(bound.law.scopes.len());
-        for (&op, &depends_on) in bound.law.formula.ops.iter().zip(&bound.law.scopes) {
-            homes.push(match (op, depends_on & !scope::BAND, depends_on & scope::BAND) {
-                (_, 0, _) => Home::Table,
-                (Op::Variable(_) | Op::Hits(_), ..) => Home::Column(column(op)),
-                (_, _, 0) => {
+        let mut homes: Vec<Home> = Vec::with_capacity(ops.len());
+        for (&op, &depends_on) in ops.iter().zip(scopes) {
+            homes.push(match (kind(depends_on), op) {
+                ((false, _), _) => Home::Table,
+                ((true, true), _) => Home::Nowhere,
+                ((true, false), Op::Variable(_) | Op::Hits(_)) => Home::Column(columns.place_of(bound, op)),
+                ((true, false), _) => {
                     slots += 1;
                     Home::Slot(slots - 1)
                 }
-                _ => {
-                    slots += LANES;
-                    Home::Lanes(slots - LANES)
-                }
             });
         }
-        Ok(Self { bound, by_band: bound.values_by_band(bands)?, homes, slots, bands })
+        let by_band = bound.values_by_band(bands)?;
+        let mut program = Self { bound, by_band, homes, slots, bands, parts: Vec::new() };
+        let wanted = program.parts_wanted();
+        program.parts = program.computed(columns, &wanted)?;
+        program.slots = 0;
+        for (at, &depends_on) in scopes.iter().enumerate() {
+            program.homes[at] = match kind(depends_on) {
+                (false, _) => Home::Table,
+                (true, false) => wanted.iter().position(|w| *w == at).map_or(Home::Nowhere, Home::Column),
+                (true, true) => {
+                    program.slots += LANES;
+                    Home::Lanes(program.slots - LANES)
+                }
+            };
+        }
+        Ok(program)
+    }
+
+    /// Operations of the paths alone that are the result, or an argument of what depends on the band too.
+    fn parts_wanted(&self) -> Vec<usize> {
+        let (ops, scopes) = (&self.bound.law.formula.ops, &self.bound.law.scopes);
+        let is_part = |at: usize| scopes[at] & !scope::BAND != 0 && scopes[at] & scope::BAND == 0;
+        let mixed = |at: usize| scopes[at] & !scope::BAND != 0 && !is_part(at);
+        let mut wanted: Vec<usize> = (0..ops.len())
+            .filter(|&at| mixed(at))
+            .flat_map(|at| match ops[at] {
+                Op::Unary(_, a) => vec![a],
+                Op::Binary(_, a, b) => vec![a, b],
+                Op::Resonance(of) => of.to_vec(),
+                _ => Vec::new(),
+            })
+            .map(usize::from)
+            .chain([ops.len() - 1])
+            .filter(|&at| is_part(at))
+            .collect();
+        wanted.sort_unstable();
+        wanted.dedup();
+        wanted
+    }
+
+    /// The wanted operations for all paths.
+    fn computed(&self, columns: &Columns<'_>, wanted: &[usize]) -> Result<Vec<Vec<f64>>, LawError> {
+        if wanted.is_empty() {
+            return Ok(Vec::new());
+        }
+        let (count, paths) = (columns.len().div_ceil(STRETCH), columns.len());
+        let stretch = |stretch: usize| {
+            let (mut filled, mut slots) = (columns.new_slots(), self.new_slots());
+            let mut parts = vec![Vec::with_capacity(STRETCH); wanted.len()];
+            let range = stretch * STRETCH..paths.min((stretch + 1) * STRETCH);
+            for start in range.clone().step_by(BLOCK) {
+                let block = start..range.end.min(start + BLOCK);
+                columns.fill(&block, &mut filled);
+                let filled: Vec<&[f64]> = filled.iter().map(|slot| &slot[..]).collect();
+                self.run(&filled, &mut slots, (start, block.len()), (0, 1))?;
+                for (part, &at) in parts.iter_mut().zip(wanted) {
+                    match self.argument(at, &filled, &slots, block.len(), (0, 0)) {
+                        Argument::One(value) => part.resize(part.len() + block.len(), value),
+                        Argument::Many(values) => part.extend_from_slice(values),
+                    }
+                }
+            }
+            Ok(parts)
+        };
+        let stretches = for_each_index(count, stretch).into_iter().collect::<Result<Vec<_>, LawError>>()?;
+        let mut parts = vec![Vec::with_capacity(paths); wanted.len()];
+        for stretch in stretches {
+            parts.iter_mut().zip(stretch).for_each(|(all, part)| all.extend(part));
+        }
+        Ok(parts)
     }
 
     /// Slots to compute in.
@@ -87,17 +164,48 @@ impl<'l> Program<'l> {
         vec![[0.0; BLOCK]; self.slots]
     }
 
-    /// Computes the law for the first `count` paths of a block, of which the first has the number `path`, in `lanes` bands from `band` on.
-    pub fn run(
+    /// Computes the law for some paths, at most [`BLOCK`], in `lanes` bands from `band` on.
+    pub fn in_bands(
         &self,
-        columns: &[Slot],
+        slots: &mut [Slot],
+        range: &Range<usize>,
+        bands: (usize, usize),
+    ) -> Result<(), LawError> {
+        let columns: Vec<&[f64]> = self.parts.iter().map(|part| &part[range.clone()]).collect();
+        self.run(&columns, slots, (range.start, range.len()), bands)
+    }
+
+    /// The value of the law for each of these paths after [`Program::in_bands`], in one band.
+    pub fn result<'s>(
+        &'s self,
+        slots: &'s [Slot],
+        range: &Range<usize>,
+        (band, lane): (usize, usize),
+    ) -> Argument<'s> {
+        let last = self.homes.len() - 1;
+        match self.homes[last] {
+            Home::Column(part) => Argument::Many(&self.parts[part][range.clone()]),
+            Home::Lanes(slot) => Argument::Many(&slots[slot + lane][..range.len()]),
+            _ => Argument::One(self.by_band[last][band + lane]),
+        }
+    }
+
+    /// Whether the result is the same for all paths.
+    pub fn is_uniform(&self) -> bool {
+        self.homes.last() == Some(&Home::Table)
+    }
+
+    /// Computes all operations that have slots, for `count` paths, of which the first has the number `path`.
+    fn run(
+        &self,
+        columns: &[&[f64]],
         slots: &mut [Slot],
         (path, count): (usize, usize),
         (band, lanes): (usize, usize),
     ) -> Result<(), LawError> {
         for (at, home) in self.homes.iter().enumerate() {
             let (first, lanes) = match home {
-                Home::Table | Home::Column(_) => continue,
+                Home::Table | Home::Column(_) | Home::Nowhere => continue,
                 Home::Slot(slot) => (*slot, 1),
                 Home::Lanes(slot) => (*slot, lanes),
             };
@@ -124,31 +232,17 @@ impl<'l> Program<'l> {
     fn argument<'s>(
         &'s self,
         of: usize,
-        columns: &'s [Slot],
+        columns: &[&'s [f64]],
         slots: &'s [Slot],
         count: usize,
         (band, lane): (usize, usize),
     ) -> Argument<'s> {
         match self.homes[of] {
-            Home::Table => Argument::One(self.by_band[of][band + lane]),
             Home::Column(column) => Argument::Many(&columns[column][..count]),
             Home::Slot(slot) => Argument::Many(&slots[slot][..count]),
             Home::Lanes(slot) => Argument::Many(&slots[slot + lane][..count]),
-        }
-    }
-
-    /// The value of the law for each path after [`Program::run`], in one lane.
-    pub fn result(
-        &self,
-        columns: &[Slot],
-        slots: &[Slot],
-        count: usize,
-        (band, lane): (usize, usize),
-        mut take: impl FnMut(usize, f64),
-    ) {
-        match self.argument(self.homes.len() - 1, columns, slots, count, (band, lane)) {
-            Argument::One(value) => (0..count).for_each(|i| take(i, value)),
-            Argument::Many(values) => values.iter().enumerate().for_each(|(i, &value)| take(i, value)),
+            // What is nowhere is asked for by nobody.
+            Home::Table | Home::Nowhere => Argument::One(self.by_band[of][band + lane]),
         }
     }
 }
@@ -162,6 +256,7 @@ fn compute<'s>(op: Op, argument: impl Fn(u16) -> Argument<'s>, out: &mut [f64]) 
                 Unary::Negate => each(a, out, |x| -x),
                 Unary::Abs => each(a, out, f64::abs),
                 Unary::Sqrt => each(a, out, f64::sqrt),
+                Unary::Exp => exponentials(a, out),
                 other => each(a, out, |x| unary(other, x)),
             }
         }
@@ -188,6 +283,20 @@ fn compute<'s>(op: Op, argument: impl Fn(u16) -> Argument<'s>, out: &mut [f64]) 
         Op::Number(_) | Op::Parameter(_) | Op::Variable(_) | Op::Hits(_) => {}
     }
     out.iter().fold(true, |finite, value| finite & (value.abs() <= f64::MAX))
+}
+
+/// Exponentials, in single precision and four at a time where that holds them: to 2e-7 of their value.
+fn exponentials(a: Argument<'_>, out: &mut [f64]) {
+    let Argument::Many(values) = a else { return each(a, out, f64::exp) };
+    if !values.iter().fold(true, |within, x| within & (x.abs() < SINGLE_EXPONENT)) {
+        return each(a, out, f64::exp);
+    }
+    let (wholes, rest) = values.as_chunks::<LANES>();
+    let (out_wholes, out_rest) = out.as_chunks_mut::<LANES>();
+    for (out, x) in out_wholes.iter_mut().zip(wholes) {
+        *out = exp(x.map(|x| x as f32)).map(f64::from);
+    }
+    out_rest.iter_mut().zip(rest).for_each(|(out, x)| *out = x.exp());
 }
 
 #[inline]

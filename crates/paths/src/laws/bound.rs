@@ -113,15 +113,13 @@ impl BoundLaws {
     /// [`LawError`]: two laws of one identifier, more than [`Law::MAX_LAWS`], a material that the mesh lacks, a variable that this room or traced
     /// paths do not tell, a part that is the same for all paths and has no value.
     pub fn new(laws: &[Law], site: &LawSite) -> Result<Self, LawError> {
-        if let Some(last) = laws.get(Law::MAX_LAWS) {
-            return Err(last.error(None, LawFault::TooMany { max: Law::MAX_LAWS }));
-        }
-        for (i, law) in laws.iter().enumerate() {
-            if laws[..i].iter().any(|other| other.id() == law.id()) {
-                return Err(law.error(None, LawFault::Twice));
-            }
-        }
+        Law::check_together(laws)?;
         Ok(Self { laws: laws.iter().map(|law| BoundLaw::new(law, site)).collect::<Result<_, _>>()? })
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.laws.is_empty()
     }
 
     /// Those of one target.

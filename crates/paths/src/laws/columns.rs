@@ -79,6 +79,11 @@ impl<'p> Columns<'p> {
         })
     }
 
+    /// Number of paths.
+    pub fn len(&self) -> usize {
+        self.paths.len()
+    }
+
     /// Slots to fill.
     pub fn new_slots(&self) -> Vec<Slot> {
         vec![[0.0; crate::laws::blocks::BLOCK]; self.columns.len()]

@@ -296,7 +296,7 @@ impl std::error::Error for LawError {}
 
 impl From<LawError> for sabine_acoustics::Error {
     fn from(error: LawError) -> Self {
-        Self::implementation("paths under laws", error)
+        Self::implementation("a law cannot be applied", error)
     }
 }
 

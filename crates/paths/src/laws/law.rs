@@ -152,6 +152,21 @@ impl Law {
         })
     }
 
+    /// That laws can be at work together.
+    ///
+    /// # Errors
+    /// [`LawFault::TooMany`] and [`LawFault::Twice`].
+    pub fn check_together(laws: &[Self]) -> Result<(), LawError> {
+        if let Some(last) = laws.get(Self::MAX_LAWS) {
+            return Err(last.error(None, LawFault::TooMany { max: Self::MAX_LAWS }));
+        }
+        let twice = |(i, law): (usize, &Self)| laws[..i].iter().any(|other| other.id == law.id);
+        match laws.iter().enumerate().find(|place| twice(*place)) {
+            Some((_, law)) => Err(law.error(None, LawFault::Twice)),
+            None => Ok(()),
+        }
+    }
+
     /// The same law with an explanation in plain words.
     #[must_use]
     pub fn with_words(self, words: impl Into<String>) -> Self {

@@ -48,10 +48,24 @@ impl ReflectionTables {
         Ok(any.then_some(Self { tables, along_axes }))
     }
 
-    /// What the laws add along each chain, and what they add to each path beside that.
-    pub fn sums(&self, paths: &PathSet, first_band: usize) -> (Vec<Lanes>, Option<Vec<Lanes>>) {
-        let table: Vec<Vec<Lanes>> = self.tables.iter().map(|table| lanes(table, first_band)).collect();
-        (paths.sums_by_chain(&table), self.along_axes.then(|| paths.sums_along_axes(&table)))
+    /// Steps of each event at each angle, `[event * 256 + angle]`, from those of each event, `material * 2 + scattered`.
+    pub fn steps(&self, steps: &[Lanes], first_band: usize) -> Vec<Lanes> {
+        let tables: Vec<Vec<Lanes>> = self.tables.iter().map(|table| lanes(table, first_band)).collect();
+        let step = |event: usize, angle: usize| {
+            let law = tables[event / 2].get(angle.min(ANGLES)).copied().unwrap_or_default();
+            std::array::from_fn(|i| steps[event][i] + law[i])
+        };
+        (0..steps.len())
+            .flat_map(|event| (0..256).map(move |angle| step(event, angle)).collect::<Vec<_>>())
+            .collect()
+    }
+
+    /// What the laws add to each path, beside what they add along its chains.
+    pub fn along_axes(&self, paths: &PathSet, first_band: usize) -> Option<Vec<Lanes>> {
+        self.along_axes.then(|| {
+            let tables: Vec<Vec<Lanes>> = self.tables.iter().map(|table| lanes(table, first_band)).collect();
+            paths.sums_along_axes(&tables)
+        })
     }
 }
 

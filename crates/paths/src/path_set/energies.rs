@@ -5,7 +5,7 @@ use crate::conditions::Conditions;
 use crate::laws::{BLOCK, LawError, PathLaws};
 use crate::packed_direction::unpack_direction;
 use crate::parallel::for_each_index;
-use crate::reweighting::{LANES, Lanes, exp, sums_along};
+use crate::reweighting::{LANES, Lanes, exp, sums_along, sums_along_angles};
 use sabine_acoustics::{Bands, Directivity, EnergyResponse, Error, Material, Orientation, OutOfRange};
 
 impl PathSet {
@@ -41,11 +41,15 @@ impl PathSet {
         let columns = for_each_index(groups.len(), |group| {
             let first = groups[group];
             let exponents = lanes(first, bands.len(), |band| exponents.values()[band] as f32);
-            let mut sums = sums_along(&self.parents, &self.events, &log_steps(materials, first, bands.len()));
-            let mut laws = laws.as_ref().map(|laws| laws.in_bands(self, first));
-            if let Some(laws) = &laws {
-                laws.add_to_chains(&mut sums);
-            }
+            let steps = log_steps(materials, first, bands.len());
+            let sums = match laws.as_ref().and_then(PathLaws::reflections) {
+                None => sums_along(&self.parents, &self.events, &steps),
+                Some(tables) => {
+                    let steps = tables.steps(&steps, first);
+                    sums_along_angles(&self.parents, &self.events, &self.incidences, &steps)
+                }
+            };
+            let mut laws = laws.as_ref().map(|laws| laws.in_bands(self, first)).transpose()?;
             let mut columns = [const { Vec::new() }; LANES];
             columns.iter_mut().for_each(|column| column.resize(self.len(), 0.0));
             let mut block = [[0.0; LANES]; BLOCK];

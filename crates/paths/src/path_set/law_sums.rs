@@ -33,19 +33,6 @@ impl PathSet {
         })
     }
 
-    /// Sums along each chain of `table[material][angle]`; the last angle stands for one that is unknown or follows from the departure. Materials
-    /// with an empty table add nothing.
-    pub(crate) fn sums_by_chain(&self, table: &[Vec<Lanes>]) -> Vec<Lanes> {
-        let mut sums = vec![[0.0; 4]; self.parents.len()];
-        for chain in 1..self.parents.len() {
-            let before: Lanes = sums[self.parents[chain] as usize];
-            let rows = &table[usize::from(self.events[chain] >> 1)];
-            let step = rows.get(usize::from(self.incidences[chain]).min(ANGLES));
-            sums[chain] = step.map_or(before, |step| std::array::from_fn(|i| before[i] + step[i]));
-        }
-        sums
-    }
-
     /// Sum for each contribution of `table[material][angle]` less the last angle's, over the meetings whose angle follows from its departure.
     pub(crate) fn sums_along_axes(&self, table: &[Vec<Lanes>]) -> Vec<Lanes> {
         let is_axis = |chain: usize| {

@@ -1,5 +1,6 @@
 //! Laws: their grammar, their errors, and what they do to paths.
 
+mod cost;
 mod effect_on_paths;
 mod errors;
 mod formulas;
