@@ -1,6 +1,6 @@
 //! Laws at work on paths.
 
-use crate::laws::blocks::{Argument, Program, Slot};
+use crate::laws::blocks::{Argument, BLOCK, Program, Slot};
 use crate::laws::bound::{BoundLaw, BoundLaws};
 use crate::laws::columns::Columns;
 use crate::laws::error::{LawError, LawFault, Place};
@@ -92,14 +92,23 @@ impl LawLanes<'_> {
         let varied = self.laws.programs.iter().zip(&mut self.slots).filter(|(p, _)| !p.is_uniform());
         for (program, slots) in varied {
             program.in_bands(slots, range, (self.first, self.lanes))?;
-            for lane in 0..self.lanes {
-                let Argument::Many(db) = program.result(slots, range, (self.first, lane)) else { continue };
+            // Lanes beyond the last band repeat it: nobody reads them.
+            let results: [Argument<'_>; LANES] = std::array::from_fn(|lane| {
+                program.result(slots, range, (self.first, lane.min(self.lanes - 1)))
+            });
+            let [Argument::Many(a), Argument::Many(b), Argument::Many(c), Argument::Many(d)] = results else {
+                continue;
+            };
+            for (lane, db) in [a, b, c, d].into_iter().enumerate().take(self.lanes) {
                 if !db.iter().fold(true, |within, db| within & (*db <= MAX_GAIN_DB)) {
                     let greatest = db.iter().copied().fold(f64::NEG_INFINITY, f64::max);
                     let band_hz = Some(self.laws.bands.nominal_hz(self.first + lane));
                     check_gain(&program.bound.law, greatest, Place { path: None, band_hz })?;
                 }
-                block.iter_mut().zip(db).for_each(|(x, &db)| x[lane] += nepers(db) as f32);
+            }
+            for (x, (((&a, &b), &c), &d)) in block.iter_mut().zip(a.iter().zip(b).zip(c).zip(d)) {
+                let added = [a, b, c, d].map(|db| nepers(db) as f32);
+                *x = std::array::from_fn(|lane| x[lane] + added[lane]);
             }
         }
         self.check_sum(range, block)
@@ -131,8 +140,11 @@ pub(crate) fn delays_s(
         let program = Program::new(bound, bands, &mut Columns::new(paths, speed_m_s))?;
         let sum = delays_s.get_or_insert_with(|| vec![0.0; paths.len()]);
         // Delays are the same in all bands: all that varies has been computed.
-        let added = program.result(&[], &(0..paths.len()), (0, 0));
-        sum.iter_mut().enumerate().for_each(|(i, sum)| *sum += added.at(i));
+        for (block, sums) in sum.chunks_mut(BLOCK).enumerate() {
+            let start = block * BLOCK;
+            let added = program.result(&[], &(start..start + sums.len()), (0, 0));
+            sums.iter_mut().enumerate().for_each(|(i, sum)| *sum += added.at(i));
+        }
         for (path, (delay_s, &length_m)) in sum.iter().zip(paths.lengths_m()).enumerate() {
             if delay_s + f64::from(length_m) / speed_m_s < 0.0 {
                 let place = Place { path: Some(path), band_hz: None };

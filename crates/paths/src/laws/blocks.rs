@@ -3,6 +3,7 @@
 //! What is the same for all paths is computed once for each band, what is the same in all bands once for each path; only the rest is computed for
 //! each path in each band.
 
+use crate::laws::angles::cos_degrees;
 use crate::laws::arithmetic::{binary, fault_of, power, resonance, unary};
 use crate::laws::bound::BoundLaw;
 use crate::laws::columns::Columns;
@@ -19,6 +20,9 @@ pub(crate) const BLOCK: usize = 256;
 
 /// Paths that one thread prepares at a time.
 const STRETCH: usize = 64 * BLOCK;
+
+/// Angles that are brought into one turn without loss.
+const MAX_DEGREES: f64 = 1e6;
 
 /// Exponents that single precision holds.
 const SINGLE_EXPONENT: f64 = 86.0;
@@ -49,8 +53,8 @@ pub(crate) struct Program<'l> {
     homes: Vec<Home>,
     slots: usize,
     bands: Bands,
-    /// Values of the paths' own parts, the same in all bands, that others are made of: `[part][path]`.
-    parts: Vec<Vec<f64>>,
+    /// Values of the paths' own parts, the same in all bands, that others are made of: `[stretch][part][path]`.
+    parts: Vec<Vec<Vec<f64>>>,
 }
 
 /// An argument: one number, or one for each path.
@@ -128,7 +132,7 @@ impl<'l> Program<'l> {
     }
 
     /// The wanted operations for all paths.
-    fn computed(&self, columns: &Columns<'_>, wanted: &[usize]) -> Result<Vec<Vec<f64>>, LawError> {
+    fn computed(&self, columns: &Columns<'_>, wanted: &[usize]) -> Result<Vec<Vec<Vec<f64>>>, LawError> {
         if wanted.is_empty() {
             return Ok(Vec::new());
         }
@@ -151,12 +155,13 @@ impl<'l> Program<'l> {
             }
             Ok(parts)
         };
-        let stretches = for_each_index(count, stretch).into_iter().collect::<Result<Vec<_>, LawError>>()?;
-        let mut parts = vec![Vec::with_capacity(paths); wanted.len()];
-        for stretch in stretches {
-            parts.iter_mut().zip(stretch).for_each(|(all, part)| all.extend(part));
-        }
-        Ok(parts)
+        for_each_index(count, stretch).into_iter().collect()
+    }
+
+    /// A part for some paths of one block.
+    fn part(&self, part: usize, range: &Range<usize>) -> &[f64] {
+        let (stretch, start) = (range.start / STRETCH, range.start % STRETCH);
+        &self.parts[stretch][part][start..start + range.len()]
     }
 
     /// Slots to compute in.
@@ -171,7 +176,8 @@ impl<'l> Program<'l> {
         range: &Range<usize>,
         bands: (usize, usize),
     ) -> Result<(), LawError> {
-        let columns: Vec<&[f64]> = self.parts.iter().map(|part| &part[range.clone()]).collect();
+        let columns: Vec<&[f64]> =
+            (0..self.parts.first().map_or(0, Vec::len)).map(|part| self.part(part, range)).collect();
         self.run(&columns, slots, (range.start, range.len()), bands)
     }
 
@@ -184,7 +190,7 @@ impl<'l> Program<'l> {
     ) -> Argument<'s> {
         let last = self.homes.len() - 1;
         match self.homes[last] {
-            Home::Column(part) => Argument::Many(&self.parts[part][range.clone()]),
+            Home::Column(part) => Argument::Many(self.part(part, range)),
             Home::Lanes(slot) => Argument::Many(&slots[slot + lane][..range.len()]),
             _ => Argument::One(self.by_band[last][band + lane]),
         }
@@ -256,7 +262,10 @@ fn compute<'s>(op: Op, argument: impl Fn(u16) -> Argument<'s>, out: &mut [f64]) 
                 Unary::Negate => each(a, out, |x| -x),
                 Unary::Abs => each(a, out, f64::abs),
                 Unary::Sqrt => each(a, out, f64::sqrt),
-                Unary::Exp => exponentials(a, out),
+                // What lies within single precision is finite.
+                Unary::Exp if exponentials(a, out) => return true,
+                Unary::CosDegrees if within(a, MAX_DEGREES) => each(a, out, cos_degrees),
+                Unary::SinDegrees if within(a, MAX_DEGREES) => each(a, out, |x| cos_degrees(x - 90.0)),
                 other => each(a, out, |x| unary(other, x)),
             }
         }
@@ -266,7 +275,11 @@ fn compute<'s>(op: Op, argument: impl Fn(u16) -> Argument<'s>, out: &mut [f64]) 
                 (Binary::Add, _) => pairs(a, b, out, |a, b| a + b),
                 (Binary::Subtract, _) => pairs(a, b, out, |a, b| a - b),
                 (Binary::Multiply, _) => pairs(a, b, out, |a, b| a * b),
-                // Not by the reciprocal: the same number as one path at a time.
+                // A division takes as long as several products.
+                (Binary::Divide, Argument::One(b)) if (1.0 / b).is_finite() => {
+                    let reciprocal = 1.0 / b;
+                    each(a, out, |a| a * reciprocal);
+                }
                 (Binary::Divide, _) => pairs(a, b, out, |a, b| a / b),
                 (Binary::Power, Argument::One(2.0)) => each(a, out, |x| x * x),
                 (Binary::Power, Argument::One(exponent)) => each(a, out, |x| power(x, exponent)),
@@ -285,11 +298,19 @@ fn compute<'s>(op: Op, argument: impl Fn(u16) -> Argument<'s>, out: &mut [f64]) 
     out.iter().fold(true, |finite, value| finite & (value.abs() <= f64::MAX))
 }
 
-/// Exponentials, in single precision and four at a time where that holds them: to 2e-7 of their value.
-fn exponentials(a: Argument<'_>, out: &mut [f64]) {
-    let Argument::Many(values) = a else { return each(a, out, f64::exp) };
-    if !values.iter().fold(true, |within, x| within & (x.abs() < SINGLE_EXPONENT)) {
-        return each(a, out, f64::exp);
+/// Whether all numbers of an argument are of less than this magnitude.
+fn within(a: Argument<'_>, most: f64) -> bool {
+    match a {
+        Argument::One(a) => a.abs() < most,
+        Argument::Many(a) => a.iter().fold(true, |within, x| within & (x.abs() < most)),
+    }
+}
+
+/// Exponentials, in single precision and four at a time where that holds them, to 2e-7 of their value; false where it does not.
+fn exponentials(a: Argument<'_>, out: &mut [f64]) -> bool {
+    let Argument::Many(values) = a else { return false };
+    if !within(a, SINGLE_EXPONENT) {
+        return false;
     }
     let (wholes, rest) = values.as_chunks::<LANES>();
     let (out_wholes, out_rest) = out.as_chunks_mut::<LANES>();
@@ -297,6 +318,7 @@ fn exponentials(a: Argument<'_>, out: &mut [f64]) {
         *out = exp(x.map(|x| x as f32)).map(f64::from);
     }
     out_rest.iter_mut().zip(rest).for_each(|(out, x)| *out = x.exp());
+    true
 }
 
 #[inline]

@@ -1,5 +1,6 @@
 //! What formulas ask of paths, column by column.
 
+use crate::laws::angles::azimuth_degrees;
 use crate::laws::blocks::Slot;
 use crate::laws::bound::BoundLaw;
 use crate::laws::formula::Op;
@@ -109,7 +110,7 @@ impl<'p> Columns<'p> {
                 }
                 Column::Azimuth(end) => out.zip(range.clone()).for_each(|(out, i)| {
                     let [x, y, _] = direction(*end, i);
-                    *out = y.atan2(x).to_degrees();
+                    *out = azimuth_degrees(x, y);
                 }),
                 Column::Elevation(end) => out.zip(range.clone()).for_each(|(out, i)| {
                     *out = direction(*end, i)[2].clamp(-1.0, 1.0).asin().to_degrees();

@@ -38,6 +38,7 @@
 //! - `delay` is the same in all bands.
 //! - Formulas of at most 2,000 characters, nested 64 deep; 32 laws together; they add at most 200 dB to a path.
 
+mod angles;
 mod applied;
 mod arithmetic;
 mod blocks;
