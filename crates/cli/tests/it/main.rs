@@ -9,6 +9,7 @@ mod diagnose;
 #[cfg(unix)]
 mod faults;
 mod fit;
+mod laws;
 mod listen;
 mod live;
 mod long_files;
