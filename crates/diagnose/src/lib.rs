@@ -100,6 +100,7 @@ pub use error::Error;
 pub use extend::displaced_surface::DisplacedSurface;
 pub use extend::extended_model::{CoupledDecay, Dimensions, ExtendedModel, GainOverTime, ThinPanel};
 pub use extend::extended_room::ExtendedRoom;
+pub use extend::law_file::read_laws;
 pub use extend::model_change::ModelChange;
 pub use extend::moved_mesh::DisplacementError;
 pub use likelihood::multilateration::{UnassignedPeak, UnassignedPeaks};

@@ -1,5 +1,6 @@
 //! What may change without tracing again.
 
+use crate::laws::BoundLaws;
 use sabine_acoustics::{Air, Bands, Directivity, Error, Material, Orientation};
 
 /// All that paths leave open: surfaces, air, and how source and receiver are turned and what they favour.
@@ -27,12 +28,14 @@ pub struct Conditions<'a> {
     pub source: Option<(&'a Directivity, Orientation)>,
     /// How the receiver hears and where it faces; `None` is omnidirectional.
     pub receiver: Option<(&'a Directivity, Orientation)>,
+    /// Formulas that change what paths carry and when they arrive.
+    pub laws: Option<&'a BoundLaws>,
 }
 
 impl<'a> Conditions<'a> {
     /// Omnidirectional source and receiver between these surfaces.
     pub fn new(materials: &'a [Material], air: &'a Air) -> Self {
-        Self { materials, air, attenuation: None, source: None, receiver: None }
+        Self { materials, air, attenuation: None, source: None, receiver: None, laws: None }
     }
 
     /// The same with sound attenuated as by another air; the speed of sound stays.
@@ -51,6 +54,12 @@ impl<'a> Conditions<'a> {
     #[must_use]
     pub fn with_receiver(self, directivity: &'a Directivity, orientation: Orientation) -> Self {
         Self { receiver: Some((directivity, orientation)), ..self }
+    }
+
+    /// The same under laws, bound for this source and receiver.
+    #[must_use]
+    pub fn with_laws(self, laws: &'a BoundLaws) -> Self {
+        Self { laws: Some(laws), ..self }
     }
 
     /// That directivities, if they have bands, have those of the materials.

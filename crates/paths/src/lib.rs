@@ -37,7 +37,7 @@
 //! # Contents
 //! - [`PathSet`]: for every [`Contribution`] length, geometric weight, chain of [`Reflection`]s with material and angle of
 //!   [`Incidence`], departure and arrival; [`EdgeDiffraction`].
-//! - [`Conditions`]: materials, air, directivity and orientation of both ends.
+//! - [`Conditions`]: materials, air, directivity and orientation of both ends, and [`laws`]: formulas that change what paths carry.
 //! - [`conformance::check`]: what any [`Propagator`] must get right, for authors of tracers.
 //! - [`PathParameters`]: parameters of ISO 3382-1 with the standard errors that the rays and the materials' tables leave.
 //! - Traits: [`Propagator`] finds paths, [`RayScene`] answers which surface a ray meets first, [`Encoder`] puts sound from a
@@ -60,6 +60,7 @@
 //!
 //! # Features
 //! - `threads` (default): paths are weighed on all threads (rayon). The numbers are the same without.
+//! - `serde`: laws are read and written as tables of TOML or JSON.
 //!
 //! # References
 //! - ISO 3382-1:2009. H. Kuttruff: Room Acoustics, 6th edition, 2017.
@@ -69,6 +70,7 @@ mod conditions;
 pub mod conformance;
 mod edge_diffraction;
 mod encoder;
+pub mod laws;
 mod packed_direction;
 mod parallel;
 mod path_parameters;

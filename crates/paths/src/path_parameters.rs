@@ -88,14 +88,20 @@ impl PathParameters {
     pub fn read(paths: &PathSet, conditions: &Conditions) -> Result<Self, Error> {
         let energies = paths.energies(conditions)?;
         let bands = conditions.materials[0].bands();
-        let (times_s, duration_s) = arrival_times(paths, conditions);
+        let (times_s, duration_s) = arrival_times(paths, conditions)?;
+        let added = added_energy(paths, conditions, duration_s)?;
         let read: Vec<[Reading; QUANTITIES]> = energies
             .iter()
-            .map(|energies| {
+            .enumerate()
+            .map(|(band, energies)| {
                 if paths.is_empty() || duration_s <= 0.0 {
                     return std::array::from_fn(|_| Err(NoReading::NoOnset));
                 }
-                Batches::of(paths, energies, &times_s, duration_s).estimates()
+                let mut batches = Batches::of(paths, energies, &times_s, duration_s);
+                if let Some(added) = &added {
+                    batches.exact.add_steps(&added[band]);
+                }
+                batches.estimates()
             })
             .collect();
         Ok(Self::of(bands, &read))
@@ -121,12 +127,39 @@ impl PathParameters {
     }
 }
 
-/// When each path arrives after the shortest one, and how long paths were looked for after that (s).
-fn arrival_times(paths: &PathSet, conditions: &Conditions) -> (Vec<f64>, f64) {
+/// When each path arrives after the first one, and how long paths were looked for after that (s).
+fn arrival_times(paths: &PathSet, conditions: &Conditions) -> Result<(Vec<f64>, f64), Error> {
     let first_m = paths.lengths_m().iter().copied().fold(f32::INFINITY, f32::min);
     let speed_m_s = conditions.air.speed_of_sound_m_s();
-    let times_s = paths.lengths_m().iter().map(|&length| f64::from(length - first_m) / speed_m_s).collect();
-    (times_s, (paths.max_length_m() - f64::from(first_m)) / speed_m_s)
+    let duration_s = (paths.max_length_m() - f64::from(first_m)) / speed_m_s;
+    let mut times_s: Vec<f64> =
+        paths.lengths_m().iter().map(|&length| f64::from(length - first_m) / speed_m_s).collect();
+    if let Some(delays_s) = paths.delays_s(conditions)? {
+        times_s.iter_mut().zip(delays_s).for_each(|(time_s, delay_s)| *time_s += delay_s);
+        let first_s = times_s.iter().copied().fold(f64::INFINITY, f64::min);
+        // What a law delays beyond the end never arrives: longer paths would arrive there, too, and were not looked for.
+        let arrives = |time_s: f64| if time_s < duration_s + STEP_S { time_s } else { f64::INFINITY };
+        times_s.iter_mut().for_each(|time_s| *time_s = arrives(*time_s - first_s));
+    }
+    Ok((times_s, duration_s))
+}
+
+/// Steps of the decay curve.
+fn steps_in(duration_s: f64) -> usize {
+    ((duration_s / STEP_S).ceil() as usize).max(1)
+}
+
+/// Energy that laws add in each step after the first arrival, `[band][step]`.
+fn added_energy(
+    paths: &PathSet,
+    conditions: &Conditions,
+    duration_s: f64,
+) -> Result<Option<Vec<Vec<f64>>>, Error> {
+    if conditions.laws.is_none() || paths.is_empty() || duration_s <= 0.0 {
+        return Ok(None);
+    }
+    let first_s = paths.first_arrival_s(conditions)?;
+    paths.added_after(conditions, first_s, (0.0, STEP_S), steps_in(duration_s))
 }
 
 /// What the parameters of one band need to know of energy over time; energies of different rays add up.
@@ -149,6 +182,9 @@ impl Sums {
 
     fn add(&mut self, time_s: f64, energy: f64) {
         // Paths end with their set's length; rounding may carry the last of them one step further.
+        if time_s == f64::INFINITY {
+            return;
+        }
         let step = ((time_s / STEP_S) as usize).min(self.steps.len() - 1);
         self.steps[step] += energy;
         for (sum, limit_s) in self.within.iter_mut().zip(LIMITS_S) {
@@ -157,6 +193,13 @@ impl Sums {
             }
         }
         self.moment += energy * time_s;
+    }
+
+    /// Adds energy that comes evenly within each step.
+    fn add_steps(&mut self, energies: &[f64]) {
+        for (step, &energy) in energies.iter().enumerate() {
+            self.add((step as f64 + 0.5) * STEP_S, energy);
+        }
     }
 
     fn accumulate(&mut self, other: &Self, factor: f64) {
@@ -233,7 +276,7 @@ struct Batches {
 
 impl Batches {
     fn of(paths: &PathSet, energies: &[f32], times_s: &[f64], duration_s: f64) -> Self {
-        let steps = ((duration_s / STEP_S).ceil() as usize).max(1);
+        let steps = steps_in(duration_s);
         let mut batches = Self { exact: Sums::silent(steps), sampled: vec![Sums::silent(steps); BATCHES] };
         for (i, (&energy, &time_s)) in energies.iter().zip(times_s).enumerate() {
             let sums = match paths.batch(i) {

@@ -1,11 +1,14 @@
 //! Traced paths: the seam between a tracer and everything after it.
 
+mod arrivals;
 mod builder;
 mod energies;
 mod incidence;
+mod law_sums;
 mod thinning;
 
 pub use incidence::Incidence;
+pub(crate) use incidence::{ANGLES, angle_cosine};
 
 use crate::edge_diffraction::EdgeDiffraction;
 use crate::packed_direction::unpack_direction;

@@ -21,6 +21,25 @@ pub(crate) fn sums_along(parents: &[u32], events: &[u16], steps: &[Lanes]) -> Ve
     sums
 }
 
+/// As [`sums_along`], the steps depending on the angle of each event too: `steps[events[chain] * 256 + angles[chain]]`.
+pub(crate) fn sums_along_angles(
+    parents: &[u32],
+    events: &[u16],
+    angles: &[u8],
+    steps: &[Lanes],
+) -> Vec<Lanes> {
+    let mut sums: Vec<Lanes> = Vec::with_capacity(parents.len());
+    sums.push([0.0; LANES]);
+    let (mut last, mut last_sum) = (0u32, [0.0; LANES]);
+    for ((&parent, &event), &angle) in parents.iter().zip(events).zip(angles).skip(1) {
+        let before = if parent == last { last_sum } else { sums[parent as usize] };
+        last_sum = add(before, steps[usize::from(event) << 8 | usize::from(angle)]);
+        last = sums.len() as u32;
+        sums.push(last_sum);
+    }
+    sums
+}
+
 fn add(a: Lanes, b: Lanes) -> Lanes {
     std::array::from_fn(|i| a[i] + b[i])
 }

@@ -39,6 +39,10 @@ pub(crate) struct Rendering<'a> {
     paths: &'a PathSet,
     /// `[band][path]`.
     energies: Vec<Vec<f32>>,
+    /// What laws add to the arrival of each path, in samples.
+    delays: Option<Vec<f64>>,
+    /// What laws add to the energy in each step, `[band][step]`: a diffuse field.
+    added: Option<Vec<Vec<f64>>>,
     encoder: &'a dyn Encoder,
     /// The omnidirectional channel: one of the encoder's, or one of our own after them.
     omni: usize,
@@ -57,6 +61,11 @@ struct BandNoise {
     /// Energy that the paths give it, over all directions.
     envelope: EnergyEnvelope,
     channels: Vec<Vec<f32>>,
+}
+
+/// Steps of the envelope of so many samples.
+fn steps_in(samples: usize, rate: f64) -> usize {
+    (samples as f64 / rate / STEP_S).ceil() as usize + 1
 }
 
 impl<'a> Rendering<'a> {
@@ -82,12 +91,21 @@ impl<'a> Rendering<'a> {
         let samples = ((duration_s * rate - 1e-6).ceil() as usize).max(1);
         let margin = (RINGING_PERIODS / bands.exact_hz(0) * rate) as usize + PULSE_REACH as usize;
         let samples_per_m = rate / speed_m_s;
+        let steps = steps_in(samples, rate);
+        let delays = paths.delays_s(conditions)?;
+        let delays = delays.map(|delays_s| delays_s.into_iter().map(|s| s * rate).collect::<Vec<f64>>());
         let first_m = paths.lengths_m().iter().copied().fold(f32::INFINITY, f32::min);
+        let arrival = |(&length_m, delay): (&f32, &f64)| f64::from(length_m) * samples_per_m + delay;
+        let earliest = delays.as_ref().map_or(f64::from(first_m) * samples_per_m, |delays| {
+            paths.lengths_m().iter().zip(delays).map(arrival).fold(f64::INFINITY, f64::min)
+        });
         Ok(Self {
             spectrum: Spectrum::new(samples + 2 * margin, sample_rate_hz),
             masks,
             paths,
             energies,
+            delays,
+            added: paths.added_energy(conditions, STEP_S, steps)?,
             omni: encoder.omnidirectional().unwrap_or(encoder.channels()),
             encoder,
             facing,
@@ -95,7 +113,7 @@ impl<'a> Rendering<'a> {
             rate,
             samples,
             margin,
-            earliest: f64::from(first_m) * samples_per_m,
+            earliest,
         })
     }
 
@@ -123,7 +141,8 @@ impl<'a> Rendering<'a> {
     }
 
     fn position(&self, path: usize) -> f64 {
-        f64::from(self.paths.lengths_m()[path]) * self.samples_per_m
+        let delay = self.delays.as_ref().map_or(0.0, |delays| delays[path]);
+        f64::from(self.paths.lengths_m()[path]) * self.samples_per_m + delay
     }
 
     fn arrival(&self, path: usize) -> Vec3 {
@@ -187,7 +206,7 @@ impl<'a> Rendering<'a> {
 
     /// Independent noise from each cell of directions, with the energy that comes from there.
     fn band_noises(&self, seed: u64) -> Option<Vec<BandNoise>> {
-        let steps = (self.samples as f64 / self.rate / STEP_S).ceil() as usize + 1;
+        let steps = steps_in(self.samples, self.rate);
         let per_sample = 1.0 / (self.rate * STEP_S);
         let step_of = |path: usize| (self.position(path) * per_sample) as usize;
         let first = (self.earliest * per_sample) as usize;
@@ -200,7 +219,7 @@ impl<'a> Rendering<'a> {
                 (i, step_of(i), cells.of(arrival), arrival)
             })
             .collect();
-        if sampled.is_empty() {
+        if sampled.is_empty() && self.added.is_none() {
             return None;
         }
         let carriers: Vec<Vec<Complex<f64>>> = (0..cells.len() as u64)
@@ -217,6 +236,15 @@ impl<'a> Rendering<'a> {
                 let energy = f64::from(self.energies[band][path]);
                 collected[cell][step] += energy;
                 directions[cell] = along(directions[cell], arrival, energy);
+            }
+            if let Some(added) = &self.added {
+                let share = 1.0 / cells.len() as f64;
+                for ((collected, mean), &centre) in
+                    collected.iter_mut().zip(&mut directions).zip(cells.centres())
+                {
+                    collected.iter_mut().zip(&added[band]).for_each(|(sum, energy)| *sum += share * energy);
+                    *mean = along(*mean, centre, share * added[band].iter().sum::<f64>());
+                }
             }
             let mut noise = BandNoise {
                 envelope: EnergyEnvelope { steps: vec![0.0; steps] },

@@ -10,6 +10,7 @@ mod exchange;
 #[cfg(unix)]
 mod faults;
 mod fit;
+mod laws;
 mod listen;
 mod live;
 mod long_files;

@@ -1,6 +1,7 @@
 //! The room with its named causes at work, as a file from which sound can be rendered.
 
 use crate::extend::displaced_surface::DisplacedSurface;
+use sabine_paths::laws::Law;
 use sabine_scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -96,6 +97,9 @@ pub struct ExtendedModel {
     /// Flat surfaces that the mesh lacks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sheets: Vec<ThinPanel>,
+    /// Formulas that change what paths carry, with the 90 % intervals of their parameters.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub laws: Vec<Law>,
 }
 
 /// A flat rectangle that reflects on both sides: a panel, or (just before its wall, absorbing all) a hole.

@@ -4,6 +4,7 @@ use crate::config::CUBOID_PATHS;
 use crate::error::Error;
 use crate::extend::displaced_surface::DisplacedSurface;
 use crate::extend::extended_model::{Dimensions, ExtendedModel, ThinPanel};
+use crate::extend::laws_of_pairs::{bound_laws, check_laws};
 use crate::extend::moved_mesh::{check_places, displaced};
 use crate::extend::recording_chain::RecordingChain;
 use crate::survey::planes::dot;
@@ -13,6 +14,7 @@ use sabine_acoustics::{
     write_atomically,
 };
 use sabine_paths::Conditions;
+use sabine_paths::laws::BoundLaws;
 use sabine_scene::{MeasuredRoom, NamedMaterial, Receiver, Scene, Source, Triangle};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
@@ -50,11 +52,13 @@ pub struct ExtendedRoom {
     pub directivities: Vec<Option<(Directivity, Orientation)>>,
     /// The same of each receiver.
     pub receiver_directivities: Vec<Option<(Directivity, Orientation)>>,
+    /// Laws of each source and receiver, `[source][receiver]`; empty where there are none.
+    laws: Vec<Vec<BoundLaws>>,
     chain: RecordingChain,
 }
 
 impl ExtendedRoom {
-    /// Materials, air and the patterns of a source and a receiver (indices). Energies are relative to the direct sound on both axes;
+    /// Materials, air, laws and the patterns of a source and a receiver (indices). Energies are relative to the direct sound on both axes;
     /// [`ExtendedRoom::finish`] makes up for it, so that the source's power and the receiver's sensitivity in a diffuse field are those of
     /// omnidirectional ones.
     ///
@@ -72,6 +76,9 @@ impl ExtendedRoom {
         }
         if let Some((pattern, orientation)) = &self.receiver_directivities[receiver] {
             conditions = conditions.with_receiver(pattern, *orientation);
+        }
+        if let Some(laws) = self.laws.get(source) {
+            conditions = conditions.with_laws(&laws[receiver]);
         }
         conditions
     }
@@ -229,6 +236,7 @@ impl ExtendedModel {
         let receiver_directivities =
             receivers.iter().map(|r| of_receiver(r).transpose()).collect::<Result<_, Fault>>()?;
         let chain = RecordingChain::new(self.clone(), own);
+        let laws = bound_laws(&self.laws, &scene, (&sources, &receivers), &air)?;
         let diffraction = self.diffraction;
         let cuboid_paths = if self.coherent_reflections { CUBOID_PATHS } else { 0 };
         Ok(ExtendedRoom {
@@ -242,6 +250,7 @@ impl ExtendedModel {
             wave_below_hz: self.wave_below_hz,
             directivities,
             receiver_directivities,
+            laws,
             chain,
         })
     }
@@ -290,6 +299,7 @@ impl ExtendedModel {
 
     /// Everything that can be said without the room; the bands.
     fn check(&self) -> Result<Bands, Fault> {
+        check_laws(&self.laws)?;
         let bands = Bands::from_centres_hz(&self.centres_hz).map_err(|e| ("centres_hz".to_owned(), e))?;
         let check = Checks { bands: bands.len() };
         let empty = Vec::new();

@@ -4,6 +4,8 @@ pub(crate) mod displaced_surface;
 pub(crate) mod extended_model;
 pub(crate) mod extended_room;
 pub(crate) mod extension;
+pub(crate) mod law_file;
+pub(crate) mod laws_of_pairs;
 pub(crate) mod model_change;
 pub(crate) mod moved_mesh;
 pub(crate) mod recording_chain;

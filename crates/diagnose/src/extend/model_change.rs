@@ -2,6 +2,7 @@
 
 use crate::extend::displaced_surface::{DisplacedSurface, put};
 use crate::extend::extended_model::{CoupledDecay, Dimensions, ExtendedModel, GainOverTime, ThinPanel};
+use sabine_paths::laws::Law;
 use std::collections::BTreeMap;
 
 /// One change of the model. [`ExtendedModel`] holds all of them and renders; those that move paths are traced again while the search goes
@@ -80,6 +81,8 @@ pub enum ModelChange {
     Exchanged([String; 2]),
     /// Gain of all responses over the time of the file.
     GainOverTime(GainOverTime),
+    /// A formula that changes what paths carry; of one identifier the last counts.
+    Law(Box<Law>),
 }
 
 impl ModelChange {
@@ -118,6 +121,10 @@ impl ExtendedModel {
             ModelChange::Panel(panel) => self.sheets.push(panel),
             ModelChange::Diffraction => self.diffraction = true,
             ModelChange::CoherentReflections => self.coherent_reflections = true,
+            ModelChange::Law(law) => {
+                self.laws.retain(|known| known.id() != law.id());
+                self.laws.push(*law);
+            }
             ModelChange::Latency(seconds) => self.latency_s = Some(seconds),
             ModelChange::Position { id, position_m } => {
                 self.position_m.insert(id, position_m);

@@ -2,6 +2,7 @@
 
 mod any_tracer;
 mod channel_gains;
+mod extended_laws;
 mod hidden_distortion;
 mod hidden_edges;
 mod hidden_effects;

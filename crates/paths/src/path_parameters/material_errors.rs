@@ -1,6 +1,6 @@
 //! What uncertain absorption leaves open in the parameters of paths.
 
-use super::{PathParameters, QUANTITIES, STEP_S, Sums, arrival_times};
+use super::{PathParameters, QUANTITIES, Sums, added_energy, arrival_times, steps_in};
 use crate::conditions::Conditions;
 use crate::parallel::for_each_index;
 use crate::path_set::PathSet;
@@ -109,16 +109,20 @@ impl PathParameters {
 /// The parameters of each band without errors.
 fn values(paths: &PathSet, conditions: &Conditions) -> Result<Values, Error> {
     let energies = paths.energies(conditions)?;
-    let (times_s, duration_s) = arrival_times(paths, conditions);
-    let of_band = |energies: &Vec<f32>| {
+    let (times_s, duration_s) = arrival_times(paths, conditions)?;
+    let added = added_energy(paths, conditions, duration_s)?;
+    let of_band = |(band, energies): (usize, &Vec<f32>)| {
         if paths.is_empty() || duration_s <= 0.0 {
             return std::array::from_fn(|_| Err(NoReading::NoOnset));
         }
-        let mut sums = Sums::silent(((duration_s / STEP_S).ceil() as usize).max(1));
+        let mut sums = Sums::silent(steps_in(duration_s));
         energies.iter().zip(&times_s).for_each(|(&energy, &time_s)| sums.add(time_s, f64::from(energy)));
+        if let Some(added) = &added {
+            sums.add_steps(&added[band]);
+        }
         sums.quantities()
     };
-    Ok(energies.iter().map(of_band).collect())
+    Ok(energies.iter().enumerate().map(of_band).collect())
 }
 
 /// Mean and standard deviation of a normal distribution cut at 0 and 1.

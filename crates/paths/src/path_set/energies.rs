@@ -2,13 +2,11 @@
 
 use super::{EXACT, PathSet};
 use crate::conditions::Conditions;
+use crate::laws::{BLOCK, LawError, PathLaws};
 use crate::packed_direction::unpack_direction;
 use crate::parallel::for_each_index;
-use crate::reweighting::{LANES, Lanes, exp, sums_along};
+use crate::reweighting::{LANES, Lanes, exp, sums_along, sums_along_angles};
 use sabine_acoustics::{Bands, Directivity, EnergyResponse, Error, Material, Orientation, OutOfRange};
-
-/// Paths that are weighed at a time.
-const BLOCK: usize = 256;
 
 impl PathSet {
     /// Logarithm of what the surfaces leave of the energy of each chain in one band.
@@ -34,11 +32,24 @@ impl PathSet {
         let bands = self.check_materials(materials)?;
         conditions.check_bands(bands)?;
         let exponents = attenuation.unwrap_or(air).energy_exponent_per_m(bands);
+        let speed_m_s = air.speed_of_sound_m_s();
+        let laws = match conditions.laws {
+            Some(laws) => PathLaws::new(laws, self, speed_m_s, bands)?,
+            None => None,
+        };
         let groups: Vec<usize> = (0..bands.len()).step_by(LANES).collect();
-        let mut energies: Vec<Vec<f32>> = for_each_index(groups.len(), |group| {
+        let columns = for_each_index(groups.len(), |group| {
             let first = groups[group];
             let exponents = lanes(first, bands.len(), |band| exponents.values()[band] as f32);
-            let sums = sums_along(&self.parents, &self.events, &log_steps(materials, first, bands.len()));
+            let steps = log_steps(materials, first, bands.len());
+            let sums = match laws.as_ref().and_then(PathLaws::reflections) {
+                None => sums_along(&self.parents, &self.events, &steps),
+                Some(tables) => {
+                    let steps = tables.steps(&steps, first);
+                    sums_along_angles(&self.parents, &self.events, &self.incidences, &steps)
+                }
+            };
+            let mut laws = laws.as_ref().map(|laws| laws.in_bands(self, first)).transpose()?;
             let mut columns = [const { Vec::new() }; LANES];
             columns.iter_mut().for_each(|column| column.resize(self.len(), 0.0));
             let mut block = [[0.0; LANES]; BLOCK];
@@ -51,17 +62,19 @@ impl PathSet {
                     let (out, back) = (sums[chain as usize], sums[tail as usize]);
                     *x = std::array::from_fn(|i| log_weight + out[i] + back[i] - exponents[i] * length);
                 }
+                if let Some(laws) = &mut laws {
+                    laws.add_to_paths(&range, &mut block[..range.len()])?;
+                }
                 block.iter_mut().for_each(|x| *x = exp(*x));
                 for (i, column) in columns.iter_mut().enumerate() {
                     column[range.clone()].iter_mut().zip(&block).for_each(|(e, lanes)| *e = lanes[i]);
                 }
             }
             let used = LANES.min(bands.len() - first);
-            columns.into_iter().take(used)
-        })
-        .into_iter()
-        .flatten()
-        .collect();
+            Ok(columns.into_iter().take(used))
+        });
+        let columns = columns.into_iter().collect::<Result<Vec<_>, LawError>>()?;
+        let mut energies: Vec<Vec<f32>> = columns.into_iter().flatten().collect();
         for (ends, directed) in [(&self.departures, conditions.source), (&self.arrivals, conditions.receiver)]
         {
             if let Some((directivity, orientation)) = directed {
@@ -92,11 +105,15 @@ impl PathSet {
         let batches = usize::from(Self::BATCHES);
         let mut energy = Vec::with_capacity(bins * bands.len());
         let mut standard_error = Vec::with_capacity(bins * bands.len());
+        let delays_s = self.delays_s(conditions)?;
+        let mut added = self.added_energy(conditions, bin_s, bins)?.map(Vec::into_iter);
         for column in self.energies(conditions)? {
-            let mut exact = vec![0.0f64; bins];
+            let none = || vec![0.0f64; bins];
+            let mut exact = added.as_mut().and_then(Iterator::next).unwrap_or_else(none);
             let mut sampled = vec![0.0f64; bins * batches];
             for (i, &e) in column.iter().enumerate() {
-                let bin = (f64::from(self.lengths_m[i]) / speed / bin_s) as usize;
+                let late_s = delays_s.as_ref().map_or(0.0, |delays_s| delays_s[i]);
+                let bin = ((f64::from(self.lengths_m[i]) / speed + late_s) / bin_s) as usize;
                 if bin >= bins {
                     continue;
                 }
@@ -117,7 +134,7 @@ impl PathSet {
         EnergyResponse::new(bands, bin_s, energy, standard_error)
     }
 
-    fn check_materials(&self, materials: &[Material]) -> Result<Bands, Error> {
+    pub(super) fn check_materials(&self, materials: &[Material]) -> Result<Bands, Error> {
         if materials.len() != self.materials || materials.is_empty() {
             return Err(Error::MaterialCount { expected: self.materials, found: materials.len() });
         }

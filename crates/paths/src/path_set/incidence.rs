@@ -16,7 +16,18 @@ pub enum Incidence {
 
 /// Cosines that are told apart.
 const STEPS: u8 = 252;
-const UNKNOWN: u8 = u8::MAX;
+pub(crate) const ANGLES: usize = STEPS as usize;
+pub(super) const UNKNOWN: u8 = u8::MAX;
+
+/// The cosine of an angle that is told apart.
+pub(crate) fn angle_cosine(angle: usize) -> f64 {
+    (angle as f64 + 0.5) / f64::from(STEPS)
+}
+
+/// The angle of a cosine, below [`ANGLES`].
+pub(super) fn angle_of(cosine: f64) -> usize {
+    usize::from(code(Incidence::Cosine(cosine)))
+}
 
 /// Incidence in a byte.
 pub(super) fn code(incidence: Incidence) -> u8 {
@@ -55,9 +66,8 @@ impl PathSet {
     /// cosine being that of the angle to the surface's normal. `step` is asked for 252 cosines of each material, not for each reflection.
     pub fn sums_by_angle<const N: usize>(&self, step: impl Fn(usize, f64) -> [f64; N]) -> Vec<[f32; N]> {
         let steps = usize::from(STEPS);
-        let cosine = |code: usize| (code as f64 + 0.5) / f64::from(STEPS);
         let table: Vec<[f32; N]> = (0..self.materials)
-            .flat_map(|material| (0..steps).map(move |code| (material, cosine(code))))
+            .flat_map(|material| (0..steps).map(move |code| (material, angle_cosine(code))))
             .map(|(material, cosine)| step(material, cosine).map(|x| x as f32))
             .collect();
         // Hits on each material along each axis: few sets have any.

@@ -9,6 +9,7 @@ mod box_room;
 mod conformance;
 mod diffraction;
 mod directivity;
+mod laws;
 mod moving;
 mod octave_filter;
 mod placement;

@@ -74,7 +74,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (mut diffraction, mut cuboid_paths) = (false, 0);
     let mut wave_below_hz = arguments.wave_below;
     if let Some(model) = &arguments.model {
-        let extended = ExtendedModel::read(model)?.room(&room)?;
+        let read = ExtendedModel::read(model)?;
+        if !read.laws.is_empty() {
+            println!("note: the laws of {} are left out: materials are fitted without them", model.display());
+        }
+        let extended = read.room(&room)?;
         wave_below_hz = wave_below_hz.or(extended.wave_below_hz);
         (diffraction, cuboid_paths) = (extended.diffraction, extended.cuboid_paths);
         room = extended.measured_room(&room)?;

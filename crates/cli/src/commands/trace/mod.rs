@@ -15,7 +15,8 @@ use clap::{Args, ValueEnum};
 use sabine::acoustics::{
     Directivity, NoReading, Orientation, PerBand, Reading, SampleFormat, Signal, encode_wav, write_atomically,
 };
-use sabine::diagnose::ExtendedModel;
+use sabine::diagnose::{ExtendedModel, ModelChange, read_laws};
+use sabine::paths::laws::{BoundLaws, LawError, LawSite};
 use sabine::paths::{Conditions, PathParameters, PathSet, Propagator};
 use sabine::propagate::{
     AmbisonicRenderer, MeshReport, PathTracer, PressureRenderer, RenderConfig, TracerConfig,
@@ -42,6 +43,10 @@ pub struct Arguments {
     /// plan and parameters are those of the room, without loudspeaker response, noise and recorder
     #[arg(long, value_name = "F.toml")]
     model: Option<PathBuf>,
+    /// Formulas that change what paths carry, `[[laws]]` in TOML: response, ambisonics, plan and parameters are those under them; beside
+    /// those of --model. See docs/how-to/own-law.md
+    #[arg(long, value_name = "F.toml")]
+    laws: Option<PathBuf>,
     #[command(flatten)]
     place: PlaceArguments,
     /// Number of rays
@@ -126,6 +131,22 @@ fn use_threads(asked: usize) -> Result<(), Failure> {
 /// # Errors
 /// Whatever stands in the way, in words for the user.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let file = arguments.laws.as_ref().or(arguments.model.as_ref());
+    trace_room(arguments).map_err(|failure| naming_laws(failure, file))
+}
+
+/// A failure of laws, with the file that they came from.
+fn naming_laws(failure: Failure, file: Option<&PathBuf>) -> Failure {
+    let first: &(dyn std::error::Error + 'static) = &*failure;
+    let of_law =
+        std::iter::successors(Some(first), |error| error.source()).any(|error| error.is::<LawError>());
+    match file.map(|path| path.display().to_string()) {
+        Some(file) if of_law && !failure.to_string().contains(&file) => format!("{file}: {failure}").into(),
+        _ => failure,
+    }
+}
+
+fn trace_room(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(threads) = arguments.threads {
         use_threads(threads)?;
     }
@@ -133,7 +154,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let out = arguments.out.as_deref().map(OutputFolder::create).transpose()?;
     let (stated, room_name) = arguments.room.read(&mut Demo::default())?;
     let model = arguments.model.as_ref();
-    let extended = model.map(|path| ExtendedModel::read(path)?.room(&stated)).transpose()?;
+    let own_laws = arguments.laws.as_ref().map(read_laws).transpose()?.unwrap_or_default();
+    let under_own_laws = |path: &PathBuf| {
+        let mut model = ExtendedModel::read(path)?;
+        own_laws.iter().for_each(|law| model.apply(ModelChange::Law(Box::new(law.clone()))));
+        model.room(&stated)
+    };
+    let extended = model.map(under_own_laws).transpose()?;
     let room = extended.as_ref().map_or_else(|| Ok(stated.clone()), |model| model.measured_room(&stated))?;
     let (source, receiver) = arguments.place.of(&room)?;
     let renderer =
@@ -150,6 +177,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         (Some(model), Some(from), Some(to)) => model.conditions(&materials, from, to),
         _ => Conditions::new(&materials, &air),
     };
+    let laws = match &extended {
+        None => Some(BoundLaws::new(&own_laws, &LawSite::new(room.scene(), source, receiver, &air))?),
+        // The model has them.
+        Some(_) => None,
+    };
+    if let Some(laws) = laws.as_ref().filter(|laws| !laws.is_empty()) {
+        conditions = conditions.with_laws(laws);
+    }
     let towards = |from: [f64; 3], to: [f64; 3]| Orientation::towards([0, 1, 2].map(|i| to[i] - from[i]));
     if let Some(pattern) = &pattern {
         let axis =
@@ -214,6 +249,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     result["waves"] = json!(waves.as_ref().map(Waves::as_json));
     result["room"] = json!(room_name);
     result["model"] = json!(model.map(|path| path.display().to_string()));
+    result["laws"] = json!(arguments.laws.as_ref().map(|path| path.display().to_string()));
     result["source"] = json!(source.id);
     result["receiver"] = json!(receiver.id);
     result["contributions"] = json!(paths.len());

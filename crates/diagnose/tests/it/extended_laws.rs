@@ -1,0 +1,156 @@
+//! Laws in an extended model: as a file, in a room, and what is wrong with them.
+
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
+use sabine_diagnose::{Error, ExtendedModel, ModelChange, read_laws};
+use sabine_paths::Propagator;
+use sabine_propagate::{PathTracer, TracerConfig};
+use sabine_scene::MeasuredRoom;
+use std::path::PathBuf;
+
+const MODEL: &str = r#"centres_hz = [125, 250, 500, 1000, 2000, 4000, 8000]
+causes = ["background_noise"]
+relative_humidity_percent = 40.0
+
+[absorption]
+carpet = [0.1, 0.1, 0.1, 0.1, 0.2, 0.2, 0.2]
+
+[[laws]]
+id = "carpet_takes_grazing_sound"
+target = "reflection"
+surface = "carpet"
+formula = "-a * (1 - cos_incidence)^2 * above(frequency_hz, f0)"
+words = "Each meeting with the carpet takes up to 4.1 dB more the more it grazes, from 2 kHz up."
+[laws.parameters]
+a  = { value = 4.1, low = 2.9, high = 5.4, unit = "dB" }
+f0 = { value = 2000, low = 1000, high = 2800, unit = "Hz" }
+
+[[laws]]
+id = "near_receivers_are_loud"
+target = "path"
+formula = "a * exp(-distance_m / d)"
+parameters = { a = { value = 3, low = 2, high = 4, unit = "dB" }, d = { value = 1.5, low = 1, high = 2, unit = "m" } }
+"#;
+
+fn fixture() -> MeasuredRoom {
+    MeasuredRoom::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/room")).unwrap()
+}
+
+fn in_file(text: &str) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("model.toml");
+    std::fs::write(&path, text).unwrap();
+    (folder, path)
+}
+
+fn read(text: &str) -> Result<ExtendedModel, Error> {
+    let (_folder, path) = in_file(text);
+    ExtendedModel::read(path)
+}
+
+#[test]
+fn laws_come_back_to_the_byte_with_their_intervals() {
+    let model = read(MODEL).unwrap();
+    let intervals: Vec<[f64; 2]> = model.laws[0].parameters().map(|(_, p)| [p.low, p.high]).collect();
+    assert_eq!(intervals, [[2.9, 5.4], [1000.0, 2800.0]]);
+    let written = model.to_toml().unwrap();
+    let again = read(&written).unwrap();
+    assert_eq!(again, model);
+    assert_eq!(again.to_toml().unwrap(), written);
+    // A model without laws is written as before there were any.
+    let without = ExtendedModel::default().to_toml().unwrap();
+    assert!(!without.contains("laws"), "{without}");
+}
+
+#[test]
+fn a_law_of_the_model_weighs_the_paths_of_each_pair() {
+    let (room, model) = (fixture(), read(MODEL).unwrap());
+    let mut without = model.clone();
+    without.laws.clear();
+    let (under, plain) = (model.room(&room).unwrap(), without.room(&room).unwrap());
+    let (source, receiver) = (&under.sources[0], &under.receivers[0]);
+    let config = TracerConfig { rays: 500, duration_s: 0.3, image_order: 2, ..Default::default() };
+    let paths =
+        PathTracer::new(config).unwrap().trace(&under.scene, source, receiver, &under.air, &()).unwrap();
+    let materials: Vec<_> = under.scene.materials().iter().map(|named| named.material.clone()).collect();
+    let energies =
+        |room: &sabine_diagnose::ExtendedRoom| paths.energies(&room.conditions(&materials, 0, 0)).unwrap();
+    let (under, plain) = (energies(&under), energies(&plain));
+    let distance_m =
+        (0..3).map(|k| (source.position_m[k] - receiver.position_m[k]).powi(2)).sum::<f64>().sqrt();
+    let near_db = 3.0 * (-distance_m / 1.5).exp();
+    let carpet = room.scene().materials().iter().position(|named| named.name == "carpet").unwrap() as u32;
+    let (mut on_carpet, mut elsewhere) = (0, 0);
+    for i in 0..paths.len() {
+        let mut hits = 0;
+        for mut chain in [paths.chains()[i], paths.tails()[i]] {
+            while let Some((before, material, _)) = paths.last_reflection(chain) {
+                hits += u32::from(material == carpet);
+                chain = before;
+            }
+        }
+        for (band, (under, plain)) in under.iter().zip(&plain).enumerate() {
+            if plain[i] < 1e-30 {
+                continue;
+            }
+            let db = 10.0 * f64::from(under[i] / plain[i]).log10() - near_db;
+            if hits == 0 || band < 4 {
+                assert!(db.abs() < 1e-4, "{db} dB in band {band} after {hits} hits");
+                elsewhere += 1;
+            } else {
+                let range = -4.1 * f64::from(hits) - 1e-4..1e-4;
+                assert!(range.contains(&db), "{db} dB in band {band} after {hits} hits");
+                on_carpet += usize::from(db < -0.1);
+            }
+        }
+    }
+    assert!(on_carpet > 1000 && elsewhere > 1000, "{on_carpet} {elsewhere}");
+}
+
+#[test]
+fn a_change_replaces_the_law_of_its_name() {
+    let mut model = read(MODEL).unwrap();
+    let stronger = model.laws[1].with_values(&[3.5, 1.2]).unwrap();
+    model.apply(ModelChange::Law(Box::new(stronger.clone())));
+    assert_eq!((model.laws.len(), &model.laws[1]), (2, &stronger));
+}
+
+#[test]
+fn what_is_wrong_with_a_law_names_it() {
+    for (from, to, words) in [
+        ("cos_incidence)", "cos_incidense)", "law `carpet_takes_grazing_sound`, column 11 of its formula"),
+        ("value = 4.1", "value = 6.1", "parameters.a: 6.1 lies outside its interval from 2.9 to 5.4"),
+        ("id = \"near_receivers_are_loud\"", "id = \"carpet_takes_grazing_sound\"", "two laws have it"),
+        ("relative_humidity_percent", "relative_humidity", "unknown field `relative_humidity`"),
+        (
+            "distance_m / d",
+            "distance_m",
+            "law `near_receivers_are_loud`, column 5 of its formula: exp needs a pure number",
+        ),
+    ] {
+        assert!(MODEL.contains(from));
+        let error = read(&MODEL.replacen(from, to, 1)).unwrap_err().to_string();
+        assert!(error.contains(words) && error.contains("model.toml"), "{error}");
+    }
+    let model = read(&MODEL.replacen("surface = \"carpet\"", "surface = \"lawn\"", 1)).unwrap();
+    let error = model.room(&fixture()).unwrap_err().to_string();
+    assert!(
+        error.contains("extended model: laws:") && error.contains("the mesh has no material `lawn`"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_file_of_laws_holds_nothing_else() {
+    let laws = &MODEL[MODEL.find("[[laws]]").unwrap()..];
+    let (_folder, path) = in_file(laws);
+    assert_eq!(read_laws(path).unwrap(), read(MODEL).unwrap().laws);
+    let (_folder, path) = in_file(MODEL);
+    assert!(read_laws(path).unwrap_err().to_string().contains("unknown field `"));
+    let (_folder, path) = in_file(&format!("{laws}{laws}"));
+    let error = read_laws(path).unwrap_err().to_string();
+    assert!(error.contains("model.toml: laws:") && error.contains("two laws have it"), "{error}");
+    let (_folder, path) = in_file(&format!("{laws}# {}", "x".repeat(1 << 20)));
+    assert!(read_laws(path).unwrap_err().to_string().contains("at most 1 MiB"));
+    assert!(matches!(read_laws("/nowhere/laws.toml").unwrap_err(), Error::Acoustics(_)));
+}

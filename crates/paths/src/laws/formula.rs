@@ -1,0 +1,175 @@
+//! A formula as a list of operations, arguments before what uses them, and its printing.
+
+use crate::laws::variable::{HITS, Variable};
+use std::fmt::Write;
+
+/// Longest formula in characters.
+pub(crate) const MAX_LENGTH: usize = 2_000;
+/// Deepest nesting of brackets, functions, signs and powers.
+pub(crate) const MAX_DEPTH: usize = 64;
+
+/// Place of an operation in its formula.
+pub(crate) type Index = u16;
+
+/// Functions of one argument.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Unary {
+    Negate,
+    Sqrt,
+    Ln,
+    Exp,
+    Abs,
+    Cos,
+    Sin,
+    /// Cosine and sine of degrees: the check of units tells which.
+    CosDegrees,
+    SinDegrees,
+}
+
+/// Operators, and functions of two arguments.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Binary {
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    Power,
+    Min,
+    Max,
+    /// One where the first is not below the second, else zero.
+    Above,
+    /// One where the first is below the second, else zero.
+    Below,
+}
+
+/// One operation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Op {
+    Number(f64),
+    Parameter(Index),
+    Variable(Variable),
+    /// Meetings with the material of this number among [`Formula::surfaces`].
+    Hits(Index),
+    Unary(Unary, Index),
+    Binary(Binary, Index, Index),
+    /// 1 / (1 + q^2 (f/f0 - f0/f)^2) of f, f0 and q.
+    Resonance([Index; 3]),
+}
+
+impl Unary {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Negate => "-",
+            Self::Sqrt => "sqrt",
+            Self::Ln => "ln",
+            Self::Exp => "exp",
+            Self::Abs => "abs",
+            Self::Cos | Self::CosDegrees => "cos",
+            Self::Sin | Self::SinDegrees => "sin",
+        }
+    }
+}
+
+impl Binary {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Add => "+",
+            Self::Subtract => "-",
+            Self::Multiply => "*",
+            Self::Divide => "/",
+            Self::Power => "^",
+            Self::Min => "min",
+            Self::Max => "max",
+            Self::Above => "above",
+            Self::Below => "below",
+        }
+    }
+
+    /// How tightly an operator binds; `None` for a function.
+    fn binding(self) -> Option<u8> {
+        match self {
+            Self::Add | Self::Subtract => Some(1),
+            Self::Multiply | Self::Divide => Some(2),
+            Self::Power => Some(4),
+            Self::Min | Self::Max | Self::Above | Self::Below => None,
+        }
+    }
+}
+
+/// Binding of a sign: below that of a power, above that of a product.
+const SIGN: u8 = 3;
+
+/// A formula: operations, each after its arguments; the last is the result.
+#[derive(Clone, Debug)]
+pub(crate) struct Formula {
+    pub ops: Vec<Op>,
+    /// Where each stands in the text, the first character being 1.
+    pub columns: Vec<u16>,
+    /// Materials that it names.
+    pub surfaces: Vec<String>,
+}
+
+impl Formula {
+    /// The formula as text that reads as the same formula.
+    pub fn print(&self, parameters: &[String]) -> String {
+        let mut text = String::new();
+        self.print_op(self.ops.len() - 1, 0, parameters, &mut text);
+        text
+    }
+
+    fn print_op(&self, at: usize, outside: u8, parameters: &[String], text: &mut String) {
+        let arguments = |name: &str, of: &[Index], text: &mut String| {
+            text.push_str(name);
+            text.push('(');
+            for (i, &argument) in of.iter().enumerate() {
+                if i > 0 {
+                    text.push_str(", ");
+                }
+                self.print_op(argument.into(), 0, parameters, text);
+            }
+            text.push(')');
+        };
+        match self.ops[at] {
+            Op::Number(value) => text.push_str(&number(value)),
+            Op::Parameter(index) => text.push_str(&parameters[usize::from(index)]),
+            Op::Variable(variable) => text.push_str(variable.name()),
+            Op::Hits(index) => {
+                let _ = write!(text, "{HITS}({})", self.surfaces[usize::from(index)]);
+            }
+            Op::Unary(Unary::Negate, of) => self.bracketed(outside > SIGN, text, |text| {
+                text.push('-');
+                self.print_op(of.into(), SIGN, parameters, text);
+            }),
+            Op::Unary(function, of) => arguments(function.name(), &[of], text),
+            Op::Binary(binary, a, b) => match binary.binding() {
+                None => arguments(binary.name(), &[a, b], text),
+                Some(binding) => self.bracketed(outside > binding, text, |text| {
+                    // Powers bind to the right and take a sign on that side, the others bind to the left.
+                    let power = binary == Binary::Power;
+                    let (left, right) = if power { (binding + 1, SIGN) } else { (binding, binding + 1) };
+                    self.print_op(a.into(), left, parameters, text);
+                    let blank = if power { "" } else { " " };
+                    let _ = write!(text, "{blank}{}{blank}", binary.name());
+                    self.print_op(b.into(), right, parameters, text);
+                }),
+            },
+            Op::Resonance(of) => arguments("resonance", &of, text),
+        }
+    }
+
+    #[allow(clippy::unused_self)] // reads as the other printing does
+    fn bracketed(&self, brackets: bool, text: &mut String, inside: impl FnOnce(&mut String)) {
+        if brackets {
+            text.push('(');
+        }
+        inside(text);
+        if brackets {
+            text.push(')');
+        }
+    }
+}
+
+/// A number as the shortest text that reads as it.
+fn number(value: f64) -> String {
+    if value == 0.0 || (1e-5..1e15).contains(&value) { format!("{value}") } else { format!("{value:e}") }
+}

@@ -1,0 +1,347 @@
+//! A law: one formula with its parameters.
+
+use crate::laws::arithmetic::{Dual, evaluate, fault_of};
+use crate::laws::check::check;
+use crate::laws::error::{LawError, LawFault, Place};
+use crate::laws::formula::{Binary, Formula, Op};
+use crate::laws::parser::{is_name, is_reserved, parse};
+use crate::laws::target::LawTarget;
+use crate::laws::unit::{Dimension, Unit};
+use crate::laws::variable::HITS;
+use std::collections::BTreeMap;
+
+/// Longest identifier.
+const MAX_ID: usize = 64;
+
+/// A parameter of a law: its value, the interval that it lies in (a 90 % interval where it was fitted) and its unit.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct LawParameter {
+    /// The value, in its unit.
+    pub value: f64,
+    /// Lower end of the interval, in the same unit.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// The unit, as it is written: `dB/m`.
+    pub unit: String,
+}
+
+impl LawParameter {
+    /// A value in an interval, in a unit.
+    pub fn new(value: f64, [low, high]: [f64; 2], unit: impl Into<String>) -> Self {
+        Self { value, low, high, unit: unit.into() }
+    }
+}
+
+/// A short formula that changes what the model predicts.
+///
+/// The grammar is closed: numbers, parameters, the variables of the target, `+ - * / ^`, `sqrt ln exp abs cos sin min max`,
+/// `above(x, x0)` (1 from `x0` on, else 0), `below(x, x0)` (the rest), `resonance(f, f0, q)` = 1 / (1 + q² (f/f0 - f0/f)²), and `hits(MATERIAL)`.
+/// Units are checked: sums need the same unit, `exp`, `ln`, exponents a pure number, `cos` and `sin` degrees or a pure number (radians), and the
+/// whole has the unit of the target. Variables are in the unit that their name ends in; a frequency is one over a time.
+///
+/// ```
+/// use sabine_paths::laws::{Law, LawParameter, LawTarget};
+/// let parameters = [("a", LawParameter::new(4.1, [2.9, 5.4], "dB")), ("f0", LawParameter::new(2.0, [1.0, 2.8], "kHz"))];
+/// let law = Law::new(
+///     "floor_takes_grazing_sound", LawTarget::Reflection, Some("floor"),
+///     "-a * (1 - cos_incidence)^2 * above(frequency_hz, f0)", parameters)?;
+/// let at = |cosine: f64, hz: f64| law.value(|name| Some(if name == "frequency_hz" { hz } else { cosine }));
+/// assert_eq!(at(0.0, 2000.0)?, -4.1);
+/// assert_eq!(at(0.0, 1000.0)?, 0.0);
+/// let error = Law::new("wrong", LawTarget::Path, None, "a * lenght_m", [("a", LawParameter::new(1.0, [0.0, 2.0], "dB/m"))]);
+/// assert_eq!(error.unwrap_err().to_string(),
+///     "law `wrong`, column 5 of its formula: `lenght_m` is neither a variable nor a parameter of this law; the nearest name is `length_m`");
+/// # Ok::<(), sabine_paths::laws::LawError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Law {
+    id: String,
+    target: LawTarget,
+    surface: Option<String>,
+    text: String,
+    words: String,
+    names: Vec<String>,
+    parameters: Vec<LawParameter>,
+    units: Vec<Unit>,
+    pub(crate) formula: Formula,
+    /// What each operation depends on.
+    pub(crate) scopes: Vec<u8>,
+}
+
+/// The same law as text: identifier, target, surface, formula, words and parameters.
+impl PartialEq for Law {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.id, self.target, &self.surface, &self.text, &self.words, &self.names, &self.parameters)
+            == (
+                &other.id,
+                other.target,
+                &other.surface,
+                &other.text,
+                &other.words,
+                &other.names,
+                &other.parameters,
+            )
+    }
+}
+
+impl Law {
+    /// Most laws at work together.
+    pub const MAX_LAWS: usize = 32;
+
+    /// Reads and checks a law. Parameters are kept by name, in the order of the alphabet.
+    ///
+    /// # Errors
+    /// [`LawError`]: whatever is wrong with the formula, with its column; with a parameter; with the surface, which a law of reflections needs and
+    /// no other may have.
+    pub fn new<N: Into<String>>(
+        id: impl Into<String>,
+        target: LawTarget,
+        surface: Option<&str>,
+        formula: &str,
+        parameters: impl IntoIterator<Item = (N, LawParameter)>,
+    ) -> Result<Self, LawError> {
+        let id: String = id.into();
+        let wrong = |fault| LawError { law: id.chars().take(MAX_ID).collect(), column: None, fault };
+        let letters = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
+        if id.is_empty() || id.len() > MAX_ID || !id.chars().all(letters) {
+            return Err(wrong(LawFault::BadIdentifier));
+        }
+        match (surface, target) {
+            (None, LawTarget::Reflection) => return Err(wrong(LawFault::NoSurface)),
+            (Some(_), other) if other != LawTarget::Reflection => {
+                return Err(wrong(LawFault::SurfaceNotWanted(other)));
+            }
+            _ => {}
+        }
+        let table: BTreeMap<String, LawParameter> =
+            parameters.into_iter().map(|(name, parameter)| (name.into(), parameter)).collect();
+        let (names, parameters): (Vec<String>, Vec<LawParameter>) = table.into_iter().unzip();
+        let mut units = Vec::with_capacity(names.len());
+        for (name, parameter) in names.iter().zip(&parameters) {
+            if !is_name(name) || is_reserved(name) {
+                return Err(wrong(LawFault::BadParameterName(name.clone())));
+            }
+            check_interval(name, parameter).map_err(wrong)?;
+            let unit = Unit::parse(&parameter.unit).ok_or_else(|| {
+                wrong(LawFault::UnknownUnit { parameter: name.clone(), unit: parameter.unit.clone() })
+            })?;
+            units.push(unit);
+        }
+        let located = |(column, fault)| LawError { law: id.clone(), column, fault };
+        let mut tree = parse(formula, &names).map_err(located)?;
+        let dimensions: Vec<Dimension> = units.iter().map(|unit| unit.dimension).collect();
+        let scopes = check(&mut tree, target, &dimensions).map_err(located)?;
+        let uses = |index: usize| tree.ops.contains(&Op::Parameter(index as u16));
+        if let Some(unused) = (0..names.len()).find(|&index| !uses(index)) {
+            return Err(wrong(LawFault::UnusedParameter(names[unused].clone())));
+        }
+        let (text, surface) = (formula.to_owned(), surface.map(str::to_owned));
+        Ok(Self {
+            id,
+            target,
+            surface,
+            text,
+            words: String::new(),
+            names,
+            parameters,
+            units,
+            formula: tree,
+            scopes,
+        })
+    }
+
+    /// That laws can be at work together.
+    ///
+    /// # Errors
+    /// [`LawFault::TooMany`] and [`LawFault::Twice`].
+    pub fn check_together(laws: &[Self]) -> Result<(), LawError> {
+        if let Some(last) = laws.get(Self::MAX_LAWS) {
+            return Err(last.error(None, LawFault::TooMany { max: Self::MAX_LAWS }));
+        }
+        let twice = |(i, law): (usize, &Self)| laws[..i].iter().any(|other| other.id == law.id);
+        match laws.iter().enumerate().find(|place| twice(*place)) {
+            Some((_, law)) => Err(law.error(None, LawFault::Twice)),
+            None => Ok(()),
+        }
+    }
+
+    /// The same law with an explanation in plain words.
+    #[must_use]
+    pub fn with_words(self, words: impl Into<String>) -> Self {
+        Self { words: words.into(), ..self }
+    }
+
+    /// The same law with other values of its parameters, in their order and units; intervals stay.
+    ///
+    /// # Errors
+    /// [`LawFault::OutsideInterval`].
+    ///
+    /// # Panics
+    /// If there are not as many values as parameters.
+    pub fn with_values(&self, values: &[f64]) -> Result<Self, LawError> {
+        assert_eq!(values.len(), self.parameters.len(), "values of the parameters of law {}", self.id);
+        let mut law = self.clone();
+        for ((name, parameter), &value) in law.names.iter().zip(&mut law.parameters).zip(values) {
+            parameter.value = value;
+            check_interval(name, parameter).map_err(|fault| self.error(None, fault))?;
+        }
+        Ok(law)
+    }
+
+    /// The same law with other values and intervals of its parameters, in their order; units stay: what a fit found.
+    ///
+    /// # Errors
+    /// [`LawFault::OutsideInterval`] and [`LawFault::BadInterval`].
+    ///
+    /// # Panics
+    /// If there are not as many values and intervals as parameters.
+    pub fn with_fitted(&self, values: &[f64], intervals: &[[f64; 2]]) -> Result<Self, LawError> {
+        assert_eq!(intervals.len(), self.parameters.len(), "intervals of the parameters of law {}", self.id);
+        let mut law = self.clone();
+        for (parameter, [low, high]) in law.parameters.iter_mut().zip(intervals) {
+            (parameter.low, parameter.high) = (*low, *high);
+        }
+        law.with_values(values)
+    }
+
+    /// Its identifier.
+    pub fn id(&self) -> &str {
+        &self.id
+    }
+
+    /// What it changes.
+    pub fn target(&self) -> LawTarget {
+        self.target
+    }
+
+    /// The surface whose reflections it changes.
+    pub fn surface(&self) -> Option<&str> {
+        self.surface.as_deref()
+    }
+
+    /// The formula as it was written.
+    pub fn formula(&self) -> &str {
+        &self.text
+    }
+
+    /// The formula without needless brackets and blanks; it reads as the same formula.
+    pub fn printed(&self) -> String {
+        self.formula.print(&self.names)
+    }
+
+    /// What it says in plain words; empty where nobody said it.
+    pub fn words(&self) -> &str {
+        &self.words
+    }
+
+    /// Its parameters by name.
+    pub fn parameters(&self) -> impl ExactSizeIterator<Item = (&str, &LawParameter)> {
+        self.names.iter().map(String::as_str).zip(&self.parameters)
+    }
+
+    /// The value in dB, or in ms for a delay, where variables have these values, in the unit that their name ends in. Meetings with a material
+    /// are asked for as `hits(NAME)`.
+    ///
+    /// # Errors
+    /// [`LawFault::NotKnown`] for a variable without a value, [`LawFault::DivisionByZero`], [`LawFault::NotFinite`].
+    pub fn value(&self, variable: impl Fn(&str) -> Option<f64>) -> Result<f64, LawError> {
+        Ok(self.evaluated(&variable, None)?.value)
+    }
+
+    /// The value, and its derivative by each parameter in the parameter's unit (forward mode; exact but for rounding). Steps have derivative zero.
+    ///
+    /// # Errors
+    /// As [`Law::value`].
+    pub fn value_and_gradient(
+        &self,
+        variable: impl Fn(&str) -> Option<f64>,
+    ) -> Result<(f64, Vec<f64>), LawError> {
+        let by = |index| Ok(self.evaluated(&variable, Some(index))?.slope);
+        Ok((self.value(&variable)?, (0..self.names.len()).map(by).collect::<Result<_, LawError>>()?))
+    }
+
+    fn evaluated(
+        &self,
+        variable: &impl Fn(&str) -> Option<f64>,
+        by: Option<usize>,
+    ) -> Result<Dual, LawError> {
+        let values = self.variable_values(variable)?;
+        let leaf = |op: Op| {
+            let (value, slope) = match op {
+                Op::Number(value) => (value, 0.0),
+                Op::Parameter(index) => {
+                    let index = usize::from(index);
+                    (self.base_value(index), if by == Some(index) { self.units[index].scale } else { 0.0 })
+                }
+                other => (values.iter().find(|(op, _)| *op == other).map_or(f64::NAN, |(_, v)| *v), 0.0),
+            };
+            Dual { value, slope }
+        };
+        let factor = self.factor();
+        match evaluate(&self.formula, leaf) {
+            Ok(found) => Ok(Dual { value: factor * found.value, slope: factor * found.slope }),
+            Err(at) => {
+                let zero = self.divisor_is_zero(at, leaf);
+                Err(self.error_at(at, fault_of(&self.formula, at, zero, Place::default())))
+            }
+        }
+    }
+
+    /// Whether the division at this place divides by zero.
+    fn divisor_is_zero(&self, at: usize, leaf: impl Fn(Op) -> Dual) -> bool {
+        let Op::Binary(Binary::Divide, _, divisor) = self.formula.ops[at] else { return false };
+        let part =
+            Formula { ops: self.formula.ops[..=usize::from(divisor)].to_vec(), ..self.formula.clone() };
+        evaluate(&part, leaf).is_ok_and(|divisor| divisor.value == 0.0)
+    }
+
+    fn variable_values(&self, variable: &impl Fn(&str) -> Option<f64>) -> Result<Vec<(Op, f64)>, LawError> {
+        let mut values = Vec::new();
+        for (at, &op) in self.formula.ops.iter().enumerate() {
+            let (name, known) = match op {
+                Op::Variable(of) => (of.name(), variable(of.name())),
+                Op::Hits(index) => {
+                    (HITS, variable(&format!("{HITS}({})", self.formula.surfaces[usize::from(index)])))
+                }
+                _ => continue,
+            };
+            let why = "nobody gave its value";
+            let value = known.ok_or_else(|| self.error_at(at, LawFault::NotKnown { variable: name, why }))?;
+            values.push((op, value));
+        }
+        Ok(values)
+    }
+
+    /// Value of a parameter in base units.
+    pub(crate) fn base_value(&self, index: usize) -> f64 {
+        self.parameters[index].value * self.units[index].scale
+    }
+
+    /// From base units to the unit of the target.
+    fn factor(&self) -> f64 {
+        if self.target == LawTarget::Delay { 1e3 } else { 1.0 }
+    }
+
+    pub(crate) fn error(&self, column: Option<usize>, fault: LawFault) -> LawError {
+        LawError { law: self.id.clone(), column, fault }
+    }
+
+    /// An error of the operation at this place.
+    pub(crate) fn error_at(&self, at: usize, fault: LawFault) -> LawError {
+        self.error(Some(usize::from(self.formula.columns[at])), fault)
+    }
+}
+
+fn check_interval(name: &str, parameter: &LawParameter) -> Result<(), LawFault> {
+    let LawParameter { value, low, high, .. } = *parameter;
+    if !(low.is_finite() && high.is_finite() && low <= high) {
+        return Err(LawFault::BadInterval(name.to_owned()));
+    }
+    if value >= low && value <= high {
+        Ok(())
+    } else {
+        Err(LawFault::OutsideInterval { parameter: name.to_owned(), value, low, high })
+    }
+}

@@ -1,0 +1,8 @@
+//! Laws: their grammar, their errors, and what they do to paths.
+
+mod cost;
+mod effect_on_paths;
+mod errors;
+mod formulas;
+#[cfg(feature = "serde")]
+mod tables;
