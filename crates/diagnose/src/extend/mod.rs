@@ -7,5 +7,6 @@ pub(crate) mod extension;
 pub(crate) mod law_file;
 pub(crate) mod laws_of_pairs;
 pub(crate) mod model_change;
+mod model_checks;
 pub(crate) mod moved_mesh;
 pub(crate) mod recording_chain;

@@ -238,12 +238,8 @@ impl<'a> ArrivalModel<'a> {
         let sloping = slopes.is_some();
         // Of weighted residuals and their weights.
         let mut push = |found: &[(usize, f64)], [pull, weight]: [f64; 2]| {
-            let Some(slopes) = slopes.as_deref_mut() else { return };
-            for &(a, x) in found {
-                slopes.gradient[a] += pull * x;
-                for &(b, y) in found {
-                    slopes.information[(a, b)] += weight * x * y;
-                }
+            if let Some(slopes) = slopes.as_deref_mut() {
+                slopes.add_one(found, pull, weight);
             }
         };
         let weighed = |residual: f64, sd: f64, share: f64| [residual, 1.0].map(|r| r * share / (sd * sd));

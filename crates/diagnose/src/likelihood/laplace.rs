@@ -41,6 +41,16 @@ impl Slopes {
         self.gradient += &other.gradient;
         self.information += &other.information;
     }
+
+    /// Adds what one reading says that changes with some parameters (indices) by so much: the pull of its residual, and its weight.
+    pub fn add_one(&mut self, changes: &[(usize, f64)], pull: f64, weight: f64) {
+        for &(a, x) in changes {
+            self.gradient[a] += pull * x;
+            for &(b, y) in changes {
+                self.information[(a, b)] += weight * x * y;
+            }
+        }
+    }
 }
 
 /// A log-likelihood of parameters with priors.

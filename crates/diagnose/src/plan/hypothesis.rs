@@ -176,7 +176,7 @@ mod tests {
         let ranked = [a.clone(), b.clone(), c.clone(), d.clone()];
         let found = OpenQuestion::of_diagnosis(&[d.clone(), b.clone()], &["b".into(), "c".into()], &ranked);
         assert_eq!(found, OpenQuestion { sure: vec![d.clone()], leading: vec![b.clone(), c.clone()] });
-        let found = OpenQuestion::of_diagnosis(&[b.clone()], &[], &ranked);
+        let found = OpenQuestion::of_diagnosis(std::slice::from_ref(&b), &[], &ranked);
         assert_eq!(found.leading, [b, a.clone(), c.clone()]);
         let found = OpenQuestion::of_diagnosis(&[], &[], &ranked[2..]);
         assert_eq!(found, OpenQuestion { sure: Vec::new(), leading: vec![c, d] });

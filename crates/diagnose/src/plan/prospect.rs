@@ -10,12 +10,12 @@ use crate::observe::observations::{Observations, survey_of};
 use crate::observe::observed_response::Measured;
 use crate::observe::time_bins::Bins;
 use crate::plan::candidates::Variation;
+use crate::simulate::band_state::BandState;
 use crate::simulate::scene_tracer::SceneTracer;
 use crate::simulate::simulation::Simulation;
-use crate::simulate::traced_pair::BandState;
 use crate::survey::SurveyedResponse;
 use sabine_scene::{DiffuseRoom, MeasuredRoom};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Decays are followed for so much longer than a diffuse field would take: few rooms are diffuse.
@@ -149,6 +149,7 @@ impl<'a> Setting<'a> {
             observations,
             simulation,
             seconds: BTreeMap::new(),
+            stale: BTreeSet::new(),
         };
         baseline.prepare(cases)?;
         Ok(baseline)

@@ -3,6 +3,7 @@
 //! The rooms and their physics are those of `sabine_testkit`, which shares no code with the tracer or the diagnosis.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
+use crate::rivals::diagnoser_among;
 use sabine_acoustics::{Bands, FilterBank, ImpulseResponse};
 use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, ExtendedModel, Verdict};
 use sabine_paths::{Conditions, Propagator};
@@ -14,12 +15,55 @@ fn lab(seed: u64) -> Laboratory {
     Laboratory::new(LabConfig { seed, receivers: 8, ..LabConfig::default() }).unwrap()
 }
 
+fn few_rays() -> DiagnoseConfig {
+    DiagnoseConfig { rays: 2000, ..DiagnoseConfig::default() }
+}
+
+/// Weighs the whole catalogue.
 fn diagnose(lab: &Laboratory, hidden: &[Hidden]) -> Diagnosis {
+    diagnose_by(&Diagnoser::new(few_rays()).unwrap(), lab, hidden)
+}
+
+/// Weighs these effects, and all at night.
+fn diagnose_among(lab: &Laboratory, hidden: &[Hidden], effects: &[&str]) -> Diagnosis {
+    diagnose_by(&diagnoser_among(few_rays(), effects), lab, hidden)
+}
+
+fn diagnose_by(diagnoser: &Diagnoser, lab: &Laboratory, hidden: &[Hidden]) -> Diagnosis {
     let folder = tempfile::tempdir().unwrap();
     let room = lab.write(hidden, &folder.path().join("room"), None).unwrap();
-    let config = DiagnoseConfig { rays: 2000, ..DiagnoseConfig::default() };
-    Diagnoser::new(config).unwrap().diagnose(&room, &[], &()).unwrap()
+    diagnoser.diagnose(&room, &[], &()).unwrap()
 }
+
+/// What moves arrival times.
+const ON_TIMES: [&str; 7] = [
+    "time_zero",
+    "sound_speed",
+    "sampling_clock",
+    "position_error",
+    "room_dimensions",
+    "surface_displacement",
+    "extra_reflector",
+];
+/// What bends decays or lifts their ends, the same for all responses.
+const ON_DECAYS: [&str; 7] = [
+    "air_absorption",
+    "surface_absorption",
+    "scattering",
+    "coupled_volume",
+    "background_noise",
+    "truncation",
+    "transducer_response",
+];
+/// What changes levels by direction or channel.
+const ON_LEVELS: [&str; 6] = [
+    "source_directivity",
+    "receiver_directivity",
+    "channel_response",
+    "channel_fault",
+    "transducer_response",
+    "surface_absorption",
+];
 
 /// The one cause that is named, with a gain at positions not seen.
 fn only_cause(found: &Diagnosis, effect: &str) -> sabine_diagnose::Cause {
@@ -58,14 +102,14 @@ fn a_room_without_effects_is_adequate() {
 
 #[test]
 fn a_latency_is_found() {
-    let found = diagnose(&lab(511), &[Hidden::TimeZero { latency_s: 4e-3 }]);
+    let found = diagnose_among(&lab(511), &[Hidden::TimeZero { latency_s: 4e-3 }], &ON_TIMES);
     holds(&only_cause(&found, "time_zero"), "latency", 4.0);
 }
 
 #[test]
 fn another_temperature_is_found() {
     let lab = lab(512);
-    let found = diagnose(&lab, &[Hidden::SoundSpeed { temperature_offset_k: 8.0 }]);
+    let found = diagnose_among(&lab, &[Hidden::SoundSpeed { temperature_offset_k: 8.0 }], &ON_TIMES);
     let cause = only_cause(&found, "sound_speed");
     let p = &cause.parameters[0];
     // The laboratory jitters places by 5 mm: the interval may miss by little.
@@ -77,7 +121,7 @@ fn a_source_that_stands_elsewhere_is_found() {
     let lab = lab(513);
     let hidden = Hidden::random("position_error", 1.0, &lab, 513).unwrap();
     let Hidden::PositionError { index, end, offset_m } = hidden else { panic!("{hidden:?}") };
-    let found = diagnose(&lab, &[Hidden::PositionError { end, index, offset_m }]);
+    let found = diagnose_among(&lab, &[Hidden::PositionError { end, index, offset_m }], &ON_TIMES);
     let cause = only_cause(&found, "position_error");
     for (p, truth) in cause.parameters.iter().zip(offset_m) {
         assert!((p.value - truth).abs() < 0.03, "{p:?} {truth}");
@@ -86,7 +130,7 @@ fn a_source_that_stands_elsewhere_is_found() {
 
 #[test]
 fn a_room_of_other_size_is_found() {
-    let found = diagnose(&lab(514), &[Hidden::RoomDimensions { scale: [1.03, 1.0, 0.975] }]);
+    let found = diagnose_among(&lab(514), &[Hidden::RoomDimensions { scale: [1.03, 1.0, 0.975] }], &ON_TIMES);
     let cause = only_cause(&found, "room_dimensions");
     for (name, truth) in [("scale_x", 3.0), ("scale_z", -2.5)] {
         let p = cause.parameters.iter().find(|p| p.name == name).unwrap();
@@ -97,7 +141,7 @@ fn a_room_of_other_size_is_found() {
 fn a_face_that_stands_elsewhere_is_found(seed: u64, face: usize, offset_m: f64) {
     let lab = lab(seed);
     let hidden = [Hidden::SurfaceDisplacement { face, offset_m }];
-    let found = diagnose(&lab, &hidden);
+    let found = diagnose_among(&lab, &hidden, &ON_TIMES);
     let cause = only_cause(&found, "surface_displacement");
     let offset = &cause.parameters[0];
     assert!(offset.name == "offset" && (offset.value - offset_m).abs() < 0.01, "{offset:?} {offset_m}");
@@ -142,7 +186,7 @@ fn a_cut_end_is_found() {
     let lab = lab(515);
     let hidden = Hidden::random("truncation", 1.0, &lab, 515).unwrap();
     let Hidden::Truncation { end_s, .. } = hidden else { panic!("{hidden:?}") };
-    let found = diagnose(&lab, &[hidden]);
+    let found = diagnose_among(&lab, &[hidden], &ON_DECAYS);
     let cause = only_cause(&found, "truncation");
     assert!((cause.parameters[0].value - end_s).abs() < 0.005, "{:?} {end_s}", cause.parameters[0]);
 }
@@ -162,7 +206,7 @@ fn dry_air_is_found() {
     let lab = Laboratory::new(LabConfig { seed: 45, ..LabConfig::default() }).unwrap();
     let hidden = Hidden::random("air_absorption", 1.0, &lab, 45).unwrap();
     let Hidden::AirAbsorption { relative_humidity_percent } = hidden else { panic!("{hidden:?}") };
-    let cause = only_cause(&diagnose(&lab, &[hidden]), "air_absorption");
+    let cause = only_cause(&diagnose_among(&lab, &[hidden], &ON_DECAYS), "air_absorption");
     holds(&cause, "relative_humidity", relative_humidity_percent);
 }
 
@@ -172,7 +216,7 @@ fn a_directional_source_is_found() {
     let hidden = Hidden::random("source_directivity", 1.0, &lab, 522).unwrap();
     let Hidden::SourceDirectivity { ref omni_share, .. } = hidden else { panic!("{hidden:?}") };
     let truth = 1.0 - omni_share[3];
-    let cause = only_cause(&diagnose(&lab, &[hidden]), "source_directivity");
+    let cause = only_cause(&diagnose_among(&lab, &[hidden], &ON_LEVELS), "source_directivity");
     assert!((cause.parameters[0].value - truth).abs() < 0.06, "{:?} {truth}", cause.parameters[0]);
 }
 
@@ -182,7 +226,7 @@ fn the_axis_of_a_directional_source_is_found_where_the_room_file_states_none() {
     let lab = Laboratory::new(config).unwrap();
     let hidden = Hidden::random("source_directivity", 1.0, &lab, 530).unwrap();
     let truth = lab.truth(std::slice::from_ref(&hidden)).unwrap().sources[0].axis;
-    let found = diagnose(&lab, &[hidden]);
+    let found = diagnose_among(&lab, &[hidden], &ON_LEVELS);
     only_cause(&found, "source_directivity");
     let axis = found.model.axis.values().next().unwrap();
     let cosine: f64 = axis.iter().zip(truth).map(|(a, b)| a * b).sum();
@@ -193,7 +237,7 @@ fn the_axis_of_a_directional_source_is_found_where_the_room_file_states_none() {
 fn rough_walls_are_found() {
     let lab = lab(523);
     let hidden = Hidden::random("scattering", 1.0, &lab, 523).unwrap();
-    only_cause(&diagnose(&lab, &[hidden]), "scattering");
+    only_cause(&diagnose_among(&lab, &[hidden], &ON_DECAYS), "scattering");
 }
 
 #[test]
@@ -216,7 +260,7 @@ fn noise_is_found() {
 fn a_second_room_is_found() {
     let lab = lab(526);
     let hidden = Hidden::random("coupled_volume", 1.0, &lab, 526).unwrap();
-    only_cause(&diagnose(&lab, &[hidden]), "coupled_volume");
+    only_cause(&diagnose_among(&lab, &[hidden], &ON_DECAYS), "coupled_volume");
 }
 
 #[test]
@@ -225,7 +269,7 @@ fn a_loudspeaker_that_is_not_flat_is_found() {
     let hidden = Hidden::random("transducer_response", 1.0, &lab, 527).unwrap();
     let Hidden::TransducerResponse { ref gains_db } = hidden else { panic!("{hidden:?}") };
     let truth = gains_db.clone();
-    let cause = only_cause(&diagnose(&lab, &[hidden]), "transducer_response");
+    let cause = only_cause(&diagnose_among(&lab, &[hidden], &ON_DECAYS), "transducer_response");
     // Relative to 1 kHz, for the common gain is unknown.
     for (band, hz) in [(2, 500), (4, 2000), (5, 4000), (6, 8000)] {
         let name = format!("gain_{hz}_hz");
@@ -241,7 +285,7 @@ fn faults_of_single_channels_are_found() {
     let lab = lab(528);
     for (kind, subject) in [("polarity", "polarity"), ("gain", "gain"), ("swap", "exchanged")] {
         let hidden = Hidden::random(&format!("channel_fault.{kind}"), 1.0, &lab, 528).unwrap();
-        let found = diagnose(&lab, &[hidden]);
+        let found = diagnose_among(&lab, &[hidden], &ON_LEVELS);
         let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
         assert_eq!(named, ["channel_fault"], "{kind}: {:?}", found.verdict);
         assert!(found.causes[0].subject.as_ref().unwrap().contains(subject), "{kind} {:?}", found.causes[0]);
@@ -281,8 +325,7 @@ fn directional_microphones_are_found(seed: u64, microphone_axes: bool, axis: Opt
     let hidden = Hidden::ReceiverDirectivity { omni_share: vec![0.55; 7], axis };
     let folder = tempfile::tempdir().unwrap();
     let room = lab.write(std::slice::from_ref(&hidden), &folder.path().join("room"), None).unwrap();
-    let config = DiagnoseConfig { rays: 2000, ..DiagnoseConfig::default() };
-    let found = Diagnoser::new(config).unwrap().diagnose(&room, &[], &()).unwrap();
+    let found = diagnoser_among(few_rays(), &ON_LEVELS).diagnose(&room, &[], &()).unwrap();
     let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
     assert_eq!(found.verdict, Verdict::Explained, "{named:?} {:?}", found.lack_of_fit);
     assert_eq!(named, ["receiver_directivity"]);
@@ -325,8 +368,7 @@ fn channels_with_responses_of_their_own_are_found(seed: u64, levels: Levels) {
     let truth = gains_db.clone();
     let folder = tempfile::tempdir().unwrap();
     let room = lab.write(&[hidden], &folder.path().join("room"), None).unwrap();
-    let config = DiagnoseConfig { rays: 2000, ..DiagnoseConfig::default() };
-    let found = Diagnoser::new(config).unwrap().diagnose(&room, &[], &()).unwrap();
+    let found = diagnoser_among(few_rays(), &ON_LEVELS).diagnose(&room, &[], &()).unwrap();
     let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
     assert_eq!(found.verdict, Verdict::Explained, "{named:?} {:?}", found.lack_of_fit);
     assert_eq!(named, ["channel_response"]);

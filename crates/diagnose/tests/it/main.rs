@@ -15,4 +15,5 @@ mod odd_input;
 mod places;
 mod plan;
 mod rendering;
+mod rivals;
 mod wrong_tables;

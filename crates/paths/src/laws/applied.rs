@@ -1,8 +1,8 @@
 //! Laws at work on paths.
 
-use crate::laws::blocks::{Argument, BLOCK, Program, Slot};
+use crate::laws::blocks::{Argument, Program};
 use crate::laws::bound::{BoundLaw, BoundLaws};
-use crate::laws::columns::Columns;
+use crate::laws::columns::{BLOCK, Columns, Slot};
 use crate::laws::error::{LawError, LawFault, Place};
 use crate::laws::formula::Op;
 use crate::laws::gain::{MAX_GAIN_DB, NEPERS_PER_DB, check_gain, nepers};

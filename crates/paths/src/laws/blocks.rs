@@ -6,7 +6,7 @@
 use crate::laws::angles::cos_degrees;
 use crate::laws::arithmetic::{binary, fault_of, power, resonance, unary};
 use crate::laws::bound::BoundLaw;
-use crate::laws::columns::Columns;
+use crate::laws::columns::{BLOCK, Columns, Slot};
 use crate::laws::error::{LawError, Place};
 use crate::laws::formula::{Binary, Op, Unary};
 use crate::laws::variable::scope;
@@ -14,9 +14,6 @@ use crate::parallel::for_each_index;
 use crate::reweighting::{LANES, exp};
 use sabine_acoustics::Bands;
 use std::ops::Range;
-
-/// Paths that are worked on together.
-pub(crate) const BLOCK: usize = 256;
 
 /// Paths that one thread prepares at a time.
 const STRETCH: usize = 64 * BLOCK;
@@ -26,9 +23,6 @@ const MAX_DEGREES: f64 = 1e6;
 
 /// Exponents that single precision holds.
 const SINGLE_EXPONENT: f64 = 86.0;
-
-/// A number for each path of a block.
-pub(crate) type Slot = [f64; BLOCK];
 
 /// Where the value of an operation is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

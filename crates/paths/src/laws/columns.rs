@@ -1,12 +1,17 @@
 //! What formulas ask of paths, column by column.
 
 use crate::laws::angles::azimuth_degrees;
-use crate::laws::blocks::Slot;
 use crate::laws::bound::BoundLaw;
 use crate::laws::formula::Op;
 use crate::laws::variable::Variable;
 use crate::path_set::PathSet;
 use std::ops::Range;
+
+/// Paths that are worked on together.
+pub(crate) const BLOCK: usize = 256;
+
+/// A number for each path of a block.
+pub(crate) type Slot = [f64; BLOCK];
 
 /// One column.
 #[derive(Clone, Debug, PartialEq)]
@@ -87,7 +92,7 @@ impl<'p> Columns<'p> {
 
     /// Slots to fill.
     pub fn new_slots(&self) -> Vec<Slot> {
-        vec![[0.0; crate::laws::blocks::BLOCK]; self.columns.len()]
+        vec![[0.0; BLOCK]; self.columns.len()]
     }
 
     /// Fills the slots with what is known of some paths.

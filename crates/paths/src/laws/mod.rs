@@ -58,8 +58,8 @@ mod unit;
 mod variable;
 
 pub(crate) use applied::{AddedEnergy, PathLaws, delays_s};
-pub(crate) use blocks::BLOCK;
 pub use bound::{BoundLaws, LawSite};
+pub(crate) use columns::BLOCK;
 pub(crate) use columns::Counted;
 pub use error::{LawError, LawFault, Place};
 pub use law::{Law, LawParameter};

@@ -169,7 +169,7 @@ fn chart(t20: &SpatialMean, t30: &SpatialMean) -> Result<String, Failure> {
         series: vec![Series::new("T30", Look::Line, 5, long), Series::new("T20", Look::Dashed, 1, short)],
         small: false,
     };
-    Ok(chart.plain_svg()?)
+    chart.plain_svg()
 }
 
 /// T20 of each position, so that one that differs is seen; the first ones where there are many.

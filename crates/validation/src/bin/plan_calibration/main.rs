@@ -56,12 +56,19 @@ struct Arguments {
 /// One place in one room.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Trial {
+    /// Seed of the room.
     pub seed: u64,
+    /// Effect that is hidden in it.
     pub hidden: String,
+    /// Effect that it is told from.
     pub rival: String,
+    /// Size of the hidden effect, 1 being typical.
     pub strength: f64,
+    /// Number of the place among the candidates.
     pub place: usize,
+    /// Nats that the plan promises.
     pub expected_nats: f64,
+    /// Nats that a measurement there gave.
     pub realised_nats: f64,
 }
 

@@ -1,0 +1,17 @@
+//! Which effects a test weighs. In the gate it is those that could pass for the hidden one; at night, and where a test is about telling
+//! nothing or several things apart, the whole catalogue.
+
+use sabine_diagnose::{DiagnoseConfig, Diagnoser};
+
+/// Set by `cargo xtask nightly`: every test weighs the whole catalogue.
+const WHOLE_CATALOGUE: &str = "SABINE_WHOLE_CATALOGUE";
+
+/// Weighs these effects, or the whole catalogue at night.
+pub(crate) fn diagnoser_among(config: DiagnoseConfig, effects: &[&str]) -> Diagnoser {
+    let whole = Diagnoser::new(config).expect("settings of a test are in their ranges");
+    if std::env::var_os(WHOLE_CATALOGUE).is_some() {
+        return whole;
+    }
+    let effects: Vec<String> = effects.iter().map(ToString::to_string).collect();
+    whole.with_only(&effects).expect("effects of a test are in the catalogue")
+}
