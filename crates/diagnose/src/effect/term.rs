@@ -38,6 +38,12 @@ pub trait DecayTerm: Send + Sync {
         Ok(Tables::default())
     }
 
+    /// Whether its tables change with absorption by more than fits allow for, which follow energies along the traced paths: predictions are
+    /// then expanded about the fit again and again until absorption stays. Not by default.
+    fn depends_on_expansion(&self) -> bool {
+        false
+    }
+
     /// Whether it adds sound of the source that does not come along the traced paths: the gain of the response acts on it too
     /// ([`BandView::gain`]).
     fn adds_sound_of_source(&self) -> bool {

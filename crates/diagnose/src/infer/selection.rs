@@ -1,6 +1,6 @@
 //! The search for causes, one name after the other.
 
-use crate::effect::{Case, Observable};
+use crate::effect::{Case, DecayTerm, Observable};
 use crate::error::Error;
 use crate::extend::extension::changes;
 use crate::extend::model_change::ModelChange;
@@ -132,8 +132,8 @@ pub(crate) fn select(
     Ok(named)
 }
 
-/// With a cause at work the materials are others: what is compared, and with which spread, follows them. Expands about their fit until it
-/// stays or explains less than before, and gives the changes of the cause named last.
+/// With a cause at work the materials are others: what is compared, and with which spread, follows them. Expands about their fit, where a
+/// cause's tables ask for it until it stays or explains less than before, and gives the changes of the cause named last.
 fn expand_about_fit(
     baseline: &mut Baseline,
     cases: &[CatalogueCase],
@@ -142,6 +142,8 @@ fn expand_about_fit(
     (used, arrival_fits): (&[bool], &Arc<ArrivalFits>),
 ) -> Result<Vec<ModelChange>, Error> {
     let Some(&last) = chosen.last() else { return Ok(Vec::new()) };
+    let again =
+        chosen.iter().any(|&c| cases[c].case.decay_term().is_some_and(DecayTerm::depends_on_expansion));
     // Of the expansion before: evidence, absorption, changes.
     let mut before: Option<(f64, Vec<Vec<f64>>, Vec<ModelChange>)> = None;
     let mut round = 0;
@@ -166,10 +168,10 @@ fn expand_about_fit(
         if round > 0 {
             before = Some((evidence, baseline.simulation.absorption.clone(), changes.clone()));
         }
-        // Sums of pressures follow absorption otherwise than the sums of energies that fits step by: where a whole step overshoots to and
-        // fro, half of it does not.
+        // Where a whole step overshoots to and fro, half of it does not.
         let share = if round == 0 { 1.0 } else { 0.5 };
-        if baseline.expand_towards((&fitted, share), cases, chosen)? < baseline::TOLERANCE {
+        let moved = baseline.expand_towards((&fitted, share), cases, chosen)?;
+        if !again || moved < baseline::TOLERANCE {
             return Ok(changes);
         }
         round += 1;

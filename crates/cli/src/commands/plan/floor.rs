@@ -18,7 +18,8 @@ const COLOURS: [[f64; 3]; 5] =
 
 /// A colour between those of the scale; 0 to 1.
 fn colour(share: f64) -> String {
-    let at = share.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
+    let share = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) };
+    let at = share * (COLOURS.len() - 1) as f64;
     let low = (at as usize).min(COLOURS.len() - 2);
     let mix = |k: usize| COLOURS[low][k] + (at - low as f64) * (COLOURS[low + 1][k] - COLOURS[low][k]);
     format!("rgb({:.0},{:.0},{:.0})", mix(0), mix(1), mix(2))

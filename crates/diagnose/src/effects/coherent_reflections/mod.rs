@@ -64,6 +64,11 @@ impl DecayTerm for CoherentReflections {
         interference::prepare(room)
     }
 
+    /// Sums of pressures cancel, sums of energies do not: each follows absorption in its own way.
+    fn depends_on_expansion(&self) -> bool {
+        true
+    }
+
     #[cfg(test)]
     fn by_hand(&self, bins: usize) -> Option<Box<dyn std::any::Any + Send + Sync>> {
         Some(Box::new(Interference::by_hand(bins)))
