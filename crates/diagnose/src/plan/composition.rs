@@ -140,9 +140,11 @@ impl Parts<'_> {
                 let information =
                     |sizes: &Option<Sizes>| sizes.as_ref().map_or(0.0, |s| s.information[place]);
                 let information = [information(&sizes[0]), information(&sizes[1])];
-                let (parameter, unit, typical) = typical(case);
-                let named_from =
-                    information.map(|i| typical * size_that_reaches(nats, i, prior_variance(case)));
+                let (parameter, unit, typical, most) = typical(case);
+                let reaches = |i: f64| typical * size_that_reaches(nats, i, prior_variance(case));
+                // A size that the parameter cannot have is none.
+                let named_from = information
+                    .map(|i| Some(reaches(i)).filter(|size| *size <= most).unwrap_or(f64::INFINITY));
                 found.push(EffectSize {
                     effect: id.to_owned(),
                     subject: case.subject.clone(),
@@ -186,15 +188,16 @@ impl Parts<'_> {
     }
 }
 
-/// Name, unit and typical size of what a case is measured by: its first parameter that is not neutral, or what its prior opens.
-fn typical(case: &Case) -> (String, String, f64) {
+/// Name, unit, typical and largest size of what a case is measured by: its first parameter that is not neutral, or what its prior opens.
+fn typical(case: &Case) -> (String, String, f64, f64) {
     let own = case.parameters.iter().find(|p| p.typical != p.neutral);
     if let Some(p) = own {
-        return (p.name.clone(), p.unit.to_owned(), (p.typical - p.neutral).abs());
+        let most = (p.neutral - p.bounds.0).max(p.bounds.1 - p.neutral);
+        return (p.name.clone(), p.unit.to_owned(), (p.typical - p.neutral).abs(), most);
     }
     match case.relaxes.first() {
-        Some((Nuisance::Absorption(_), sd)) => ("absorption".to_owned(), String::new(), *sd),
-        Some((_, sd)) => ("distance".to_owned(), "m".to_owned(), *sd),
-        None => ("size".to_owned(), String::new(), 1.0),
+        Some((Nuisance::Absorption(_), sd)) => ("absorption".to_owned(), String::new(), *sd, 1.0),
+        Some((_, sd)) => ("distance".to_owned(), "m".to_owned(), *sd, f64::INFINITY),
+        None => ("size".to_owned(), String::new(), 1.0, f64::INFINITY),
     }
 }

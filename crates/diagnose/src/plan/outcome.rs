@@ -63,7 +63,8 @@ pub struct EffectSize {
     pub typical: f64,
     /// The typical size in standard deviations of what is found of it: with the positions of the room file, and with those chosen as well.
     pub d_prime: [f64; 2],
-    /// The size from which its evidence is expected to reach a name, likewise; infinite, and null in JSON, where nothing shows it.
+    /// The size from which its evidence is expected to reach a name, likewise; infinite, and null in JSON, where no size that the parameter can
+    /// have does.
     #[serde(deserialize_with = "infinite")]
     pub named_from: [f64; 2],
 }
