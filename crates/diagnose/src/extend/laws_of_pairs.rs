@@ -21,7 +21,7 @@ pub(crate) fn bound_laws(
     sources.iter().map(from).collect::<Result<_, _>>().map_err(in_laws)
 }
 
-/// That the laws can be at work together.
+/// Checks that the laws can be applied together.
 pub(crate) fn check_laws(laws: &[Law]) -> Result<(), (String, Cause)> {
     Law::check_together(laws).map_err(in_laws)
 }

@@ -44,10 +44,10 @@ impl std::fmt::Display for Hypothesis {
     }
 }
 
-/// What a diagnosis leaves open: causes that are sure, and those of which one is at work.
+/// What a diagnosis leaves open: causes that are sure, and those of which one is true.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct OpenQuestion {
-    /// Causes that are at work whatever the answer.
+    /// Causes that are true whatever the answer.
     pub sure: Vec<Hypothesis>,
     /// The leading hypotheses beside them.
     pub leading: Vec<Hypothesis>,

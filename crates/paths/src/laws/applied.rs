@@ -1,4 +1,4 @@
-//! Laws at work on paths.
+//! Laws applied to paths.
 
 use crate::laws::blocks::{Argument, Program};
 use crate::laws::bound::{BoundLaw, BoundLaws};
@@ -69,7 +69,7 @@ impl<'l> PathLaws<'l> {
     }
 }
 
-/// Laws at work in a few bands.
+/// Laws applied in a few bands.
 pub(crate) struct LawLanes<'l> {
     laws: &'l PathLaws<'l>,
     first: usize,

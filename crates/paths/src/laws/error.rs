@@ -269,7 +269,7 @@ impl LawFault {
         }
     }
 
-    /// Faults of a law at work in a room.
+    /// Faults of a law applied in a room.
     fn fmt_at_work(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::UnknownSurface { name, nearest } => {

@@ -87,7 +87,7 @@ impl PartialEq for Law {
 }
 
 impl Law {
-    /// Most laws at work together.
+    /// Maximum number of laws applied together.
     pub const MAX_LAWS: usize = 32;
 
     /// Reads and checks a law. Parameters are kept by name, in the order of the alphabet.
@@ -152,7 +152,7 @@ impl Law {
         })
     }
 
-    /// That laws can be at work together.
+    /// Checks that laws can be applied together.
     ///
     /// # Errors
     /// [`LawFault::TooMany`] and [`LawFault::Twice`].

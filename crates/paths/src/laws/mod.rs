@@ -1,6 +1,6 @@
 //! Laws: short formulas that change what the model predicts.
 //!
-//! A [`Law`] is read, unit-checked, printed, differentiated and applied by the code of this module, whoever wrote it. [`BoundLaws`] are laws whose
+//! A [`Law`] is read, unit-checked, printed, differentiated and applied by the code of this module, no matter who wrote it. [`BoundLaws`] are laws whose
 //! names have been found in a room ([`LawSite`]); [`Conditions`](crate::Conditions) carry them, so that energies, pressure, ambisonics and
 //! parameters of paths have them.
 //!

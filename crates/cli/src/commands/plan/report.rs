@@ -16,7 +16,7 @@ pub fn html(room: &MeasuredRoom, name: &str, plan: &Plan) -> String {
         std::path::Path::new(name).file_name().map_or(name.to_owned(), |n| n.to_string_lossy().into_owned());
     page.paragraph(&format!("The room \"{name}\". {}", asked(plan)));
     page.paragraph(if plan.question.is_some() {
-        "A nat is a unit of evidence: three nats are odds of 20 to 1. What is expected is the mean over whichever of the causes is at work, everything else (absorption, gains, places) being fitted again. It is a mean: chance adds or takes a few nats."
+        "A nat is a unit of evidence: three nats are odds of 20 to 1. What is expected is the mean over whichever of the causes is true, everything else (absorption, gains, places) being fitted again. It is a mean: chance adds or takes a few nats."
     } else {
         "Nats say how much is learned of the size of each cause by itself, everything else (absorption, gains, places) being fitted, added up over all causes of the catalogue."
     });
@@ -45,7 +45,7 @@ fn asked(plan: &Plan) -> String {
     match &plan.question {
         Some(question) => {
             let names: Vec<String> = question.leading.iter().map(|h| decided(&h.to_string())).collect();
-            format!("After its diagnosis the question is which of these is at work: {}.", names.join("; "))
+            format!("After its diagnosis the question is which of these is the cause: {}.", names.join("; "))
         }
         None if plan.stated_responses == 0 => "Nothing stands in it yet but the sources.".to_owned(),
         None => format!(

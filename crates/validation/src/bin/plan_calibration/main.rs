@@ -1,6 +1,6 @@
 //! Whether a plan keeps its word: nats that a measurement was expected to bring between two hypotheses, and those that it brought.
 //!
-//! Each room of the laboratory is drawn anew, with one effect hidden in it. Three of its microphones are measured; each of the others is a
+//! Each room of the laboratory is drawn independently, with one effect hidden in it. Three of its microphones are measured; each of the others is a
 //! place where the next one could stand. The plan says how many nats it would bring between the hidden effect and a look-alike; then it is
 //! brought in, both hypotheses are fitted once more, and the change of the evidence between them is what was realised.
 //!
