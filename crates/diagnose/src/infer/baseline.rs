@@ -397,3 +397,51 @@ pub(crate) fn absorption_priors(prior: &MaterialPrior) -> Vec<Prior> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::DecayTerm;
+    use crate::hand_made;
+    use crate::simulate::views::BandView;
+    use sabine_scene::{Levels, TimeZero};
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    /// Counts how often its tables are prepared.
+    struct Counted(Arc<AtomicUsize>);
+
+    impl DecayTerm for Counted {
+        fn prepare(&self, _: &TracedRoomView<'_>) -> Result<Tables, Unprepared> {
+            self.0.fetch_add(1, Ordering::Relaxed);
+            Ok(Tables::of_bins(vec![vec![0u8]]))
+        }
+
+        fn apply(&self, _: &[f64], _: &BandView<'_>, _: &mut [f64]) {}
+    }
+
+    #[test]
+    fn an_expansion_prepares_the_tables_that_are_asked_for_and_the_rest_once_they_are() {
+        let counts: Vec<Arc<AtomicUsize>> = (0..3).map(|_| Arc::default()).collect();
+        let one = |(effect, count): (usize, &Arc<AtomicUsize>)| {
+            let mut case = Case::decay(Vec::new(), Counted(Arc::clone(count)));
+            // Slots have gaps: cases that refused to be prepared are gone.
+            case.slot = Some(2 * effect + 1);
+            CatalogueCase { effect, id: "counted", case }
+        };
+        let cases: Vec<CatalogueCase> = counts.iter().enumerate().map(one).collect();
+        let mut baseline =
+            hand_made::Tables::new(Levels::Absolute, TimeZero::Emission).baseline(DiagnoseConfig::default());
+        let state = |baseline: &Baseline| -> Vec<(usize, bool)> {
+            let known = |slot: usize| baseline.simulation.tables[slot].of(0, 0, false).is_some();
+            counts.iter().enumerate().map(|(i, c)| (c.load(Ordering::Relaxed), known(2 * i + 1))).collect()
+        };
+        baseline.prepare(&cases).expect("tables");
+        assert_eq!(state(&baseline), [(1, true), (1, true), (1, true)]);
+        baseline.expand(&cases, &[1]).expect("an expansion");
+        assert_eq!(state(&baseline), [(1, false), (2, true), (1, false)]);
+        for _ in 0..2 {
+            baseline.prepare_rest(&cases).expect("tables");
+            assert_eq!(state(&baseline), [(2, true), (2, true), (2, true)]);
+        }
+    }
+}
