@@ -1,12 +1,13 @@
 //! A mesh as lines, for plans.
 
-use sabine::scene::MeasuredRoom;
+use sabine::scene::Scene;
 use std::collections::BTreeMap;
 
 /// Edges between triangles whose normals agree so far belong to one face and are not drawn (cosine).
 const FLAT: f64 = 0.9999;
 
-type Point = [f64; 3];
+/// A place in metres.
+pub type Point = [f64; 3];
 
 /// A side that triangles share, and their normals.
 struct Edge {
@@ -14,10 +15,15 @@ struct Edge {
     normals: Vec<Point>,
 }
 
+/// What tells a line from others, to a tenth of a millimetre and in either direction.
+pub fn key(line: [Point; 2]) -> [[i64; 3]; 2] {
+    let mut ends = line.map(|p| p.map(|c| (c * 1e4).round() as i64));
+    ends.sort_unstable();
+    ends
+}
+
 /// Edges of the mesh at which it bends or ends, by position: neighbouring triangles need not share vertices.
-pub fn outlines(room: &MeasuredRoom) -> Vec<[Point; 2]> {
-    let scene = room.scene();
-    let key = |p: Point| p.map(|c| (c * 1e4).round() as i64);
+pub fn outlines(scene: &Scene) -> Vec<[Point; 2]> {
     let mut edges: BTreeMap<[[i64; 3]; 2], Edge> = BTreeMap::new();
     for i in 0..scene.triangles().len() {
         let corners = scene.corners_m(i);
@@ -31,10 +37,8 @@ pub fn outlines(room: &MeasuredRoom) -> Vec<[Point; 2]> {
         let normal = n.map(|c| c / length);
         for k in 0..3 {
             let (a, b) = (corners[k], corners[(k + 1) % 3]);
-            let mut ends = [key(a), key(b)];
-            ends.sort_unstable();
             edges
-                .entry(ends)
+                .entry(key([a, b]))
                 .or_insert_with(|| Edge { ends: [a, b], normals: Vec::new() })
                 .normals
                 .push(normal);

@@ -1,6 +1,7 @@
 //! The room as plain arrays: what any tracer can take.
 
 use sabine_acoustics::{Error, Material, OutOfRange};
+use std::fmt::Write;
 
 /// A triangle: three indices into the vertices, and one into the materials.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -166,6 +167,32 @@ impl Scene {
         used.fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], p| {
             [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
         })
+    }
+
+    /// The mesh in the form of Wavefront OBJ, in metres and z up, each triangle under the name of its material.
+    ///
+    /// ```
+    /// use sabine_acoustics::{Bands, Material};
+    /// use sabine_scene::Scene;
+    /// let wall = Material::uniform(Bands::T60, 0.1, 0.1)?;
+    /// let room = Scene::shoebox([6.0, 5.0, 3.0], std::array::from_fn(|_| wall.clone()))?;
+    /// assert_eq!(room.to_obj().lines().filter(|line| line.starts_with("f ")).count(), 12);
+    /// # Ok::<(), sabine_acoustics::Error>(())
+    /// ```
+    pub fn to_obj(&self) -> String {
+        let mut text = String::from("# metres, z up\n");
+        for [x, y, z] in &self.vertices {
+            // Writing to a String cannot fail.
+            let _ = writeln!(text, "v {x} {y} {z}");
+        }
+        for (index, named) in self.materials.iter().enumerate() {
+            let _ = writeln!(text, "usemtl {}", named.name);
+            for triangle in self.triangles.iter().filter(|t| t.material as usize == index) {
+                let [a, b, c] = triangle.vertices.map(|v| v + 1);
+                let _ = writeln!(text, "f {a} {b} {c}");
+            }
+        }
+        text
     }
 
     /// Total surface in square metres, each triangle counted once.

@@ -2,7 +2,7 @@
 
 use super::file::{BandsTable, MaterialTable, RoomFile, RoomTable};
 use super::tables::DEFAULT_SCATTERING;
-use super::write::{obj, place, write_folder};
+use super::write::{place, write_folder};
 use super::{MaterialPrior, MeasuredRoom};
 use crate::error::Error;
 use crate::floor_plan::FloorPlan;
@@ -83,7 +83,7 @@ impl DrawnRoom {
             receivers: self.receivers.iter().map(|r| place(&r.id, r.position_m, r.axis, None)).collect(),
             responses: Vec::new(),
         };
-        write_folder(folder.as_ref(), &file, &obj(&scene), &[])
+        write_folder(folder.as_ref(), &file, &scene.to_obj(), &[])
     }
 
     /// The mesh, and the library name of each of its materials.

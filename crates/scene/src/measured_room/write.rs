@@ -10,7 +10,6 @@ use sabine_acoustics::{
     Air, Error as ValueError, ImpulseResponse, SampleFormat, create_folder_beside, write_atomically,
     write_wav,
 };
-use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -105,7 +104,7 @@ impl NewRoom {
         let names =
             (self.sources.iter().map(|s| s.id.as_str()), self.receivers.iter().map(|r| r.id.as_str()));
         self.position_sd.check_names(names.0, names.1)?;
-        write_folder(folder, &self.tables(), &obj(&self.scene), &self.responses)
+        write_folder(folder, &self.tables(), &self.scene.to_obj(), &self.responses)
     }
 
     fn tables(&self) -> RoomFile {
@@ -196,23 +195,6 @@ fn fill(draft: &Path, file: &RoomFile, obj: &str, responses: &[NewResponse]) -> 
     write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
     // What cannot be read back is refused before the folder gets its name.
     MeasuredRoom::read(draft).map(|_| ())
-}
-
-/// The mesh as text.
-pub(super) fn obj(scene: &Scene) -> String {
-    let mut text = String::from("# metres, z up\n");
-    for [x, y, z] in scene.vertices() {
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "v {x} {y} {z}");
-    }
-    for (index, named) in scene.materials().iter().enumerate() {
-        let _ = writeln!(text, "usemtl {}", named.name);
-        for triangle in scene.triangles().iter().filter(|t| t.material as usize == index) {
-            let [a, b, c] = triangle.vertices.map(|v| v + 1);
-            let _ = writeln!(text, "f {a} {b} {c}");
-        }
-    }
-    text
 }
 
 /// A source or receiver as the file has it.

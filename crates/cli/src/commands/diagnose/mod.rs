@@ -3,6 +3,7 @@
 //! Without arguments it runs on the built-in demo, whose two responses show what can be said with that little.
 
 mod bars;
+mod drawing;
 mod findings;
 mod held_out;
 mod look_alikes;
@@ -48,7 +49,7 @@ pub struct Arguments {
     /// Stop after so many seconds, write nothing, and say how far it came
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..))]
     time_limit: Option<u64>,
-    /// Folder for diagnosis.json, report.html and extended_model.toml
+    /// Folder for diagnosis.json, report.html, extended_model.toml and extended_mesh.obj
     #[arg(long, value_name = "DIR", default_value = "out/diagnose")]
     out: PathBuf,
 }
@@ -81,7 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut out = OutputFolder::create(&arguments.out)?;
     let (room, name) = arguments.room.read(&mut demo)?;
     let bar = Bar::stopped_on_request(arguments.time_limit.map(Duration::from_secs))?;
-    let diagnosis = diagnoser.diagnose(&room, &arguments.hold_out, &bar).map_err(|error| -> Failure {
+    let mut diagnosis = diagnoser.diagnose(&room, &arguments.hold_out, &bar).map_err(|error| -> Failure {
         // An error of its own may come first, and counts then.
         match (&error, bar.stopped()) {
             (DiagnoseError::Acoustics(ValueError::Cancelled { .. }), Some(place)) => {
@@ -96,12 +97,22 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     receivers.sort_unstable();
     receivers.dedup();
     let model = diagnosis.model.to_toml()?;
+    let found = diagnosis.model.room(&room);
+    if let Err(error) = &found {
+        // What took minutes to find is not withheld for a drawing.
+        diagnosis.notes.push(format!("the room as found cannot be drawn: {error}"));
+    }
     let (responses, receivers) = (room.responses().len(), receivers.len());
     let json = findings::json(&diagnosis, &name, responses, receivers, threshold_nats)?;
     out.write("diagnosis.json", json.as_bytes())?;
+    let drawn = found.as_ref().ok().filter(|_| drawing::has_a_place(&diagnosis.model));
+    let drawing = drawn.map(|found| drawing::svg(&room, found));
     let findings = Findings::new(diagnosis, name, responses, receivers, threshold_nats);
-    out.write("report.html", report::html(&findings)?.as_bytes())?;
+    out.write("report.html", report::html(&findings, drawing.as_deref())?.as_bytes())?;
     out.write("extended_model.toml", model.as_bytes())?;
+    if let Ok(found) = &found {
+        out.write("extended_mesh.obj", found.scene.to_obj().as_bytes())?;
+    }
     out.finish()?;
     print_findings(&findings, &arguments.out);
     Ok(())

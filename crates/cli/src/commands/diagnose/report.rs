@@ -26,8 +26,8 @@ const WORTH_SAYING_NATS: f64 = 0.5;
 /// 1.645 standard errors either side: a 90 % interval.
 const NORMAL_90: f64 = 1.645;
 
-/// The report as one HTML file.
-pub fn html(findings: &Findings) -> Result<String> {
+/// The report as one HTML file, with a drawing of the room where what was found has a place.
+pub fn html(findings: &Findings, drawing: Option<&str>) -> Result<String> {
     let mut page = Page::new("What the simulation gets wrong");
     page.markup(bars::STYLE);
     page.paragraph(&format!(
@@ -49,6 +49,11 @@ pub fn html(findings: &Findings) -> Result<String> {
     page.warnings(&findings.notes);
     next_measurements(&mut page, findings);
     parameters(&mut page, findings)?;
+    if let Some(drawing) = drawing {
+        page.heading("Where to look in the room");
+        page.markup(drawing);
+        page.paragraph("The mesh as found is in extended_mesh.obj, in metres and z up.");
+    }
     held_out::section(&mut page, findings);
     residuals(&mut page, findings)?;
     evidence(&mut page, findings);

@@ -34,7 +34,7 @@ fn findings(verdict: &str, changes: &Value) -> Findings {
 
 #[test]
 fn a_named_cause_is_told_with_its_figures() {
-    let page = html(&findings("explained", &json!({}))).unwrap();
+    let page = html(&findings("explained", &json!({})), None).unwrap();
     for part in [
         "Found: Air drier or more humid than stated.",
         "It was &lt;dry&gt;.",
@@ -56,20 +56,20 @@ fn a_named_cause_is_told_with_its_figures() {
 fn what_a_cause_may_concern_as_well_is_told() {
     let cause = json!({ "effect": "surface_absorption", "subject": "carpet", "other_subjects": ["board"],
         "explanation": "One material.", "probability": 0.99, "nats": 30.0, "parameters": [], "held_out_gain": null });
-    let page = html(&findings("explained", &json!({ "causes": [cause] }))).unwrap();
+    let page = html(&findings("explained", &json!({ "causes": [cause] })), None).unwrap();
     assert!(page.contains("Found: Absorption of one material is wrong (carpet or board)."), "{page}");
 }
 
 #[test]
 fn each_verdict_says_what_it_means() {
-    let page = html(&findings("adequate", &json!({ "causes": [] }))).unwrap();
+    let page = html(&findings("adequate", &json!({ "causes": [] })), None).unwrap();
     assert!(page.contains("The simulation explains this measurement.") && !page.contains("What was found"));
     let set = json!({ "alternatives": ["surface_absorption"], "would_decide": ["measure on a damp day"] });
-    let page = html(&findings("ambiguous", &set)).unwrap();
+    let page = html(&findings("ambiguous", &set), None).unwrap();
     assert!(page.contains("which of 2 causes it is") && page.contains("<li>Measure on a damp day.</li>"));
     let fit = json!({ "p_value": 1e-4, "p_value_explained": 1e-4, "discrepancy_nats": 30.0, "discrepancy_nats_explained": 30.0,
         "dispersion": [1.0, 1.0], "tests": [{ "name": "odd bins", "subject": "s1-r2", "p_value": 3e-5 }, { "name": "levels", "p_value": 0.4 }] });
-    let page = html(&findings("unexplained", &json!({ "causes": [], "lack_of_fit": fit }))).unwrap();
+    let page = html(&findings("unexplained", &json!({ "causes": [], "lack_of_fit": fit })), None).unwrap();
     assert!(page.contains("What chance does not explain: odd bins (most: s1-r2)."));
     assert!(page.contains("<td>Odd bins</td><td>s1-r2</td><td>below 0.001</td>"));
     assert!(page.contains("<td>Levels</td><td></td><td>0.400</td>"));

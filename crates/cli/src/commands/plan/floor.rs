@@ -59,7 +59,7 @@ pub fn svg(room: &MeasuredRoom, plan: &Plan) -> String {
         depth + LEGEND
     );
     let (low, high) = heat(&mut text, &view, plan);
-    for [a, b] in outlines(room) {
+    for [a, b] in outlines(room.scene()) {
         let ((x1, y1), (x2, y2)) = (view.at(a), view.at(b));
         let _ = write!(
             text,

@@ -52,7 +52,7 @@ pub fn svg(
         width.max(520.0),
         depth + legend + 30.0
     );
-    for [a, b] in outlines(room) {
+    for [a, b] in outlines(room.scene()) {
         let ((x1, y1), (x2, y2)) = (at(a), at(b));
         let _ = write!(
             text,

@@ -1,0 +1,268 @@
+//! The room as stated and as found, from above and from two sides: where a person with a tape measure would look.
+
+use crate::outline::{Point, key, outlines};
+use crate::page::escape;
+use sabine::diagnose::{ExtendedModel, ExtendedRoom};
+use sabine::scene::MeasuredRoom;
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+/// Width of the drawing in its own units, the margin about each view, and the height of a line of the legend.
+const WIDTH: f64 = 760.0;
+const MARGIN: f64 = 40.0;
+const LINE: f64 = 22.0;
+/// Most receivers whose names are drawn: of more, one name would lie on another.
+const MOST_NAMES: usize = 12;
+/// Length of an axis of a directional source or microphone, in metres.
+const AXIS_M: f64 = 0.5;
+/// What moved less than this, in metres, is where it is stated.
+const MOVED_M: f64 = 0.002;
+/// Lines of the mesh as stated, as it is found, and of what it does not have there.
+const STATED: &str = "stroke=\"var(--ink)\" stroke-width=\"1\"";
+const GONE: &str = "stroke=\"var(--ink)\" stroke-width=\"1\" stroke-dasharray=\"3 4\" opacity=\"0.6\"";
+const FOUND: &str = "stroke=\"#d55e00\" stroke-width=\"2.5\"";
+const ADDED: &str = "fill=\"#d55e00\" fill-opacity=\"0.3\"";
+
+/// Whether what was found has a place in the room.
+pub fn has_a_place(model: &ExtendedModel) -> bool {
+    let axes = model.axis.is_empty() && model.receiver_axis.is_empty();
+    let places = model.position_m.is_empty() && model.surfaces.is_empty() && model.sheets.is_empty();
+    !(axes && places && model.dimensions.is_none())
+}
+
+/// One view: the axes of the room that go to the right and up, and where it lies in the drawing.
+struct View {
+    name: &'static str,
+    axes: [usize; 2],
+    left: f64,
+    bottom: f64,
+    low: Point,
+    scale: f64,
+}
+
+impl View {
+    fn at(&self, place: Point) -> (f64, f64) {
+        let [right, up] = self.axes.map(|axis| (place[axis] - self.low[axis]) * self.scale);
+        (self.left + right, self.bottom - up)
+    }
+
+    fn line(&self, text: &mut String, ends: [Point; 2], look: &str) {
+        let [(x1, y1), (x2, y2)] = ends.map(|p| self.at(p));
+        // A line along the view is a point.
+        if (x1 - x2).abs() + (y1 - y2).abs() > 0.1 {
+            let _ = write!(
+                text,
+                "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" stroke-linecap=\"round\" {look}/>"
+            );
+        }
+    }
+}
+
+/// A source or receiver, as stated and as found.
+struct Placed<'a> {
+    id: &'a str,
+    is_source: bool,
+    stated_m: Point,
+    found_m: Point,
+    /// Its axis, if it has a pattern.
+    axis: Option<Point>,
+}
+
+impl Placed<'_> {
+    fn is_moved(&self) -> bool {
+        (0..3).map(|k| (self.stated_m[k] - self.found_m[k]).powi(2)).sum::<f64>().sqrt() > MOVED_M
+    }
+
+    fn mark(&self, (x, y): (f64, f64), colour: &str) -> String {
+        match self.is_source {
+            true => format!(
+                "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"9\" height=\"9\" fill=\"{colour}\"/>",
+                x - 4.5,
+                y - 4.5
+            ),
+            false => format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"{colour}\"/>"),
+        }
+    }
+}
+
+/// The drawing as one `<svg>` element for a page, whose inks it takes.
+pub fn svg(room: &MeasuredRoom, found: &ExtendedRoom) -> String {
+    let (lines, placed) = (Lines::of(room, found), all_placed(room, found));
+    let [stated, now] = [room.scene(), &found.scene].map(sabine::scene::Scene::bounds_m);
+    let low: Point = std::array::from_fn(|k| stated[0][k].min(now[0][k]));
+    let size: Point = std::array::from_fn(|k| stated[1][k].max(now[1][k]) - low[k]);
+    let scale = (WIDTH - 4.0 * MARGIN) / (size[0] + size[1]);
+    let [x, y, z] = size.map(|s| s * scale);
+    let view = |name, axes, left, bottom| View { name, axes, left, bottom, low, scale };
+    let upper = 2.0 * MARGIN + z;
+    let lower = upper + 1.5 * MARGIN + y;
+    let views = [
+        view("from the front", [0, 2], MARGIN, upper - MARGIN),
+        view("from the right", [1, 2], 3.0 * MARGIN + x, upper - MARGIN),
+        view("from above", [0, 1], MARGIN, lower - MARGIN),
+    ];
+    let keys = keys(&lines, &placed);
+    let height = lower + LINE * (keys.len() as f64 + 1.0);
+    let mut text = format!(
+        "<svg class=\"chart\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH:.0} {height:.0}\" font-family=\"sans-serif\" font-size=\"13\" role=\"img\" aria-label=\"The room as stated and as found\">"
+    );
+    for view in &views {
+        draw(&mut text, view, &lines, &placed);
+    }
+    let (left, top) = (MARGIN, lower - 0.2 * MARGIN);
+    let _ = write!(
+        text,
+        "<line x1=\"{left}\" y1=\"{top:.1}\" x2=\"{:.1}\" y2=\"{top:.1}\" stroke=\"var(--ink)\" stroke-width=\"2\"/><text x=\"{:.1}\" y=\"{:.1}\" fill=\"var(--ink)\">1 m</text>",
+        left + scale,
+        left + scale + 6.0,
+        top + 5.0
+    );
+    for (row, (mark, words)) in (1..).zip(keys) {
+        let _ = write!(
+            text,
+            "<g transform=\"translate({left},{:.1})\">{mark}<text x=\"34\" y=\"5\" fill=\"var(--ink)\">{words}</text></g>",
+            top + LINE * f64::from(row)
+        );
+    }
+    text.push_str("</svg>\n");
+    text
+}
+
+/// Lines of the mesh: those that stay, those that are not where they were stated, and where they are instead.
+struct Lines {
+    kept: Vec<[Point; 2]>,
+    gone: Vec<[Point; 2]>,
+    found: Vec<[Point; 2]>,
+    /// Triangles of materials that the mesh as stated does not have: panels and holes.
+    added: Vec<[Point; 3]>,
+}
+
+impl Lines {
+    fn of(room: &MeasuredRoom, found: &ExtendedRoom) -> Self {
+        let (stated, now) = (outlines(room.scene()), outlines(&found.scene));
+        let keys = |lines: &[[Point; 2]]| lines.iter().map(|l| key(*l)).collect::<BTreeSet<_>>();
+        let (before, after) = (keys(&stated), keys(&now));
+        let (kept, gone) = stated.into_iter().partition(|l| after.contains(&key(*l)));
+        let own = room.scene().materials().len();
+        let triangles = found.scene.triangles().iter().enumerate();
+        let added = triangles.filter(|(_, t)| t.material as usize >= own);
+        Self {
+            kept,
+            gone,
+            found: now.into_iter().filter(|l| !before.contains(&key(*l))).collect(),
+            added: added.map(|(i, _)| found.scene.corners_m(i)).collect(),
+        }
+    }
+}
+
+fn all_placed<'a>(room: &'a MeasuredRoom, found: &'a ExtendedRoom) -> Vec<Placed<'a>> {
+    let sources = room.sources().iter().zip(&found.sources).zip(&found.directivities);
+    let sources = sources.map(|((stated, now), pattern)| Placed {
+        id: &stated.id,
+        is_source: true,
+        stated_m: stated.position_m,
+        found_m: now.position_m,
+        axis: pattern.as_ref().and(now.axis),
+    });
+    let receivers = room.receivers().iter().zip(&found.receivers).zip(&found.receiver_directivities);
+    let receivers = receivers.map(|((stated, now), pattern)| Placed {
+        id: &stated.id,
+        is_source: false,
+        stated_m: stated.position_m,
+        found_m: now.position_m,
+        axis: pattern.as_ref().and(now.axis),
+    });
+    sources.chain(receivers).collect()
+}
+
+fn draw(text: &mut String, view: &View, lines: &Lines, placed: &[Placed<'_>]) {
+    let (x, y) = (view.left, view.bottom + 20.0);
+    let _ = write!(text, "<text x=\"{x:.1}\" y=\"{y:.1}\" fill=\"var(--ink)\">{}</text>", view.name);
+    for (all, look) in [(&lines.kept, STATED), (&lines.gone, GONE), (&lines.found, FOUND)] {
+        all.iter().for_each(|line| view.line(text, *line, look));
+    }
+    for corners in &lines.added {
+        let points = corners.map(|c| view.at(c)).map(|(x, y)| format!("{x:.1},{y:.1}")).join(" ");
+        let _ = write!(text, "<polygon points=\"{points}\" {ADDED}/>");
+    }
+    let names = placed.iter().filter(|p| !p.is_source).count() <= MOST_NAMES;
+    for one in placed {
+        let here = view.at(one.found_m);
+        if one.is_moved() {
+            view.line(text, [one.stated_m, one.found_m], FOUND);
+            text.push_str(&one.mark(view.at(one.stated_m), "var(--ink)"));
+        }
+        if let Some(axis) = one.axis {
+            let tip = std::array::from_fn(|k| one.found_m[k] + AXIS_M * axis[k]);
+            view.line(text, [one.found_m, tip], FOUND);
+        }
+        let is_found = one.is_moved() || one.axis.is_some();
+        text.push_str(&one.mark(here, if is_found { "#d55e00" } else { "var(--ink)" }));
+        if one.is_source || names || one.is_moved() {
+            let _ = write!(
+                text,
+                "<text x=\"{:.1}\" y=\"{:.1}\" font-size=\"11\" fill=\"var(--ink)\">{}</text>",
+                here.0 + 7.0,
+                here.1 - 5.0,
+                escape(one.id)
+            );
+        }
+    }
+}
+
+/// Marks of the legend with their words: only of what is drawn.
+fn keys(lines: &Lines, placed: &[Placed<'_>]) -> Vec<(String, &'static str)> {
+    let line = |look: &str| format!("<line x1=\"0\" y1=\"0\" x2=\"24\" y2=\"0\" {look}/>");
+    let sheet = format!("<rect x=\"2\" y=\"-6\" width=\"20\" height=\"12\" {ADDED}/>");
+    let of =
+        |is_source: bool| Placed { id: "", is_source, stated_m: [0.0; 3], found_m: [0.0; 3], axis: None };
+    let marks = of(true).mark((6.0, 0.0), "var(--ink)") + &of(false).mark((19.0, 0.0), "var(--ink)");
+    let moves = !lines.gone.is_empty();
+    [
+        (true, marks, "source, microphone"),
+        (moves, line(GONE), "the mesh as stated, where it stands elsewhere"),
+        (!lines.found.is_empty() && moves, line(FOUND), "the mesh as found"),
+        (!lines.added.is_empty(), sheet, "a surface that the mesh lacks, or a hole"),
+        (placed.iter().any(Placed::is_moved), line(FOUND), "from where it is stated to where it was found"),
+        (placed.iter().any(|p| p.axis.is_some()), line(FOUND), "axis of a directional source or microphone"),
+    ]
+    .into_iter()
+    .filter_map(|(shown, mark, words)| shown.then_some((mark, words)))
+    .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)] // a panic is how a test fails
+    use super::*;
+    use crate::demo::Demo;
+    use crate::room::read_room;
+    use sabine::diagnose::{Dimensions, ThinPanel};
+
+    #[test]
+    fn what_was_found_is_drawn_where_it_is() {
+        let mut demo = Demo::default();
+        let room = read_room(&demo.or(None, "room").unwrap(), false, None).unwrap();
+        let mut model = ExtendedModel::default();
+        model.centres_hz = room.bands().iter_hz().collect();
+        assert!(!has_a_place(&model));
+        let [low, high] = room.scene().bounds_m();
+        let source = &room.sources()[0];
+        let mut there = source.position_m;
+        there[0] += 0.2 * (0.5 * (low[0] + high[0]) - there[0]).signum();
+        model.position_m.insert(source.id.clone(), there);
+        let unaltered = svg(&room, &model.room(&room).unwrap());
+        assert!(has_a_place(&model) && unaltered.contains("from where it is stated"));
+        assert!(!unaltered.contains("<polygon") && !unaltered.contains("the mesh as found"));
+
+        model.sheets.push(ThinPanel::rectangle(there, [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], [0.2, 0.1], 0.1));
+        model.dimensions = Some(Dimensions::new([1.05, 1.0, 1.0], [0.0; 3]));
+        let drawn = svg(&room, &model.room(&room).unwrap());
+        // Two triangles in each of three views.
+        assert_eq!(drawn.matches("<polygon").count(), 6);
+        for part in ["the mesh as stated", "the mesh as found", "a surface that the mesh lacks", &source.id] {
+            assert!(drawn.contains(part), "{part}");
+        }
+        assert!(!drawn.contains("NaN") && !drawn.contains("inf"));
+    }
+}
