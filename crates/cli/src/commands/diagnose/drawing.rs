@@ -17,6 +17,8 @@ const MOST_NAMES: usize = 12;
 const AXIS_M: f64 = 0.5;
 /// What moved less than this, in metres, is where it is stated.
 const MOVED_M: f64 = 0.002;
+/// A line that is no farther from another than this, in metres, lies on it.
+const BESIDE_M: f64 = 1e-4;
 /// Lines of the mesh as stated, as it is found, and of what it does not have there.
 const STATED: &str = "stroke=\"var(--ink)\" stroke-width=\"1\"";
 const GONE: &str = "stroke=\"var(--ink)\" stroke-width=\"1\" stroke-dasharray=\"3 4\" opacity=\"0.6\"";
@@ -102,14 +104,14 @@ pub fn svg(room: &MeasuredRoom, found: &ExtendedRoom) -> String {
         view("from above", [0, 1], MARGIN, lower - MARGIN),
     ];
     let keys = keys(&lines, &placed);
-    let height = lower + LINE * (keys.len() as f64 + 1.0);
+    let height = lower + LINE * (keys.len() as f64 + 1.5);
     let mut text = format!(
         "<svg class=\"chart\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH:.0} {height:.0}\" font-family=\"sans-serif\" font-size=\"13\" role=\"img\" aria-label=\"The room as stated and as found\">"
     );
     for view in &views {
         draw(&mut text, view, &lines, &placed);
     }
-    let (left, top) = (MARGIN, lower - 0.2 * MARGIN);
+    let (left, top) = (MARGIN, lower + 6.0);
     let _ = write!(
         text,
         "<line x1=\"{left}\" y1=\"{top:.1}\" x2=\"{:.1}\" y2=\"{top:.1}\" stroke=\"var(--ink)\" stroke-width=\"2\"/><text x=\"{:.1}\" y=\"{:.1}\" fill=\"var(--ink)\">1 m</text>",
@@ -142,17 +144,38 @@ impl Lines {
         let (stated, now) = (outlines(room.scene()), outlines(&found.scene));
         let keys = |lines: &[[Point; 2]]| lines.iter().map(|l| key(*l)).collect::<BTreeSet<_>>();
         let (before, after) = (keys(&stated), keys(&now));
-        let (kept, gone) = stated.into_iter().partition(|l| after.contains(&key(*l)));
+        let (mut kept, gone): (Vec<_>, Vec<_>) = stated.into_iter().partition(|l| after.contains(&key(*l)));
+        // A wall that only grew or shrank along itself, beside one that moved, is where it was.
+        let moved = now.into_iter().filter(|l| !before.contains(&key(*l)));
+        let (longer, elsewhere): (Vec<_>, Vec<_>) =
+            moved.partition(|l| gone.iter().any(|stated| is_along(*stated, *l)));
+        kept.extend(longer);
         let own = room.scene().materials().len();
         let triangles = found.scene.triangles().iter().enumerate();
         let added = triangles.filter(|(_, t)| t.material as usize >= own);
-        Self {
-            kept,
-            gone,
-            found: now.into_iter().filter(|l| !before.contains(&key(*l))).collect(),
-            added: added.map(|(i, _)| found.scene.corners_m(i)).collect(),
-        }
+        Self { kept, gone, found: elsewhere, added: added.map(|(i, _)| found.scene.corners_m(i)).collect() }
     }
+}
+
+/// Whether two lines lie on one and overlap.
+fn is_along(stated: [Point; 2], line: [Point; 2]) -> bool {
+    let minus = |a: Point, b: Point| -> Point { std::array::from_fn(|k| a[k] - b[k]) };
+    let dot = |a: Point, b: Point| (0..3).map(|k| a[k] * b[k]).sum::<f64>();
+    let way = minus(stated[1], stated[0]);
+    let length2 = dot(way, way);
+    if length2 == 0.0 {
+        return false;
+    }
+    // How far along the stated line each end is, as a share of its length, and how far beside it.
+    let ends = line.map(|p| {
+        let from = minus(p, stated[0]);
+        let share = dot(from, way) / length2;
+        (share, (dot(from, from) - share * share * length2).max(0.0).sqrt())
+    });
+    let shares = ends.map(|(share, _)| share);
+    ends.iter().all(|(_, beside_m)| *beside_m < BESIDE_M)
+        && shares[0].max(shares[1]) > 0.0
+        && shares[0].min(shares[1]) < 1.0
 }
 
 fn all_placed<'a>(room: &'a MeasuredRoom, found: &'a ExtendedRoom) -> Vec<Placed<'a>> {
@@ -260,6 +283,9 @@ mod tests {
         let drawn = svg(&room, &model.room(&room).unwrap());
         // Two triangles in each of three views.
         assert_eq!(drawn.matches("<polygon").count(), 6);
+        assert!(is_along([[0.0; 3], [1.0, 0.0, 0.0]], [[1.5, 0.0, 0.0], [0.2, 0.0, 0.0]]));
+        assert!(!is_along([[0.0; 3], [1.0, 0.0, 0.0]], [[1.5, 0.0, 0.0], [1.2, 0.0, 0.0]]));
+        assert!(!is_along([[0.0; 3], [1.0, 0.0, 0.0]], [[0.0; 3], [1.0, 0.01, 0.0]]));
         for part in ["the mesh as stated", "the mesh as found", "a surface that the mesh lacks", &source.id] {
             assert!(drawn.contains(part), "{part}");
         }
