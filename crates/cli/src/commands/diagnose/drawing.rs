@@ -19,6 +19,8 @@ const AXIS_M: f64 = 0.5;
 const MOVED_M: f64 = 0.002;
 /// A line that is no farther from another than this, in metres, lies on it.
 const BESIDE_M: f64 = 1e-4;
+/// Most lines of each kind that are drawn, the longest: a scan has more than a page holds, and a person sees.
+const MOST_LINES: usize = 2000;
 /// Lines of the mesh as stated, as it is found, and of what it does not have there.
 const STATED: &str = "stroke=\"var(--ink)\" stroke-width=\"1\"";
 const GONE: &str = "stroke=\"var(--ink)\" stroke-width=\"1\" stroke-dasharray=\"3 4\" opacity=\"0.6\"";
@@ -144,17 +146,26 @@ impl Lines {
         let (stated, now) = (outlines(room.scene()), outlines(&found.scene));
         let keys = |lines: &[[Point; 2]]| lines.iter().map(|l| key(*l)).collect::<BTreeSet<_>>();
         let (before, after) = (keys(&stated), keys(&now));
-        let (mut kept, gone): (Vec<_>, Vec<_>) = stated.into_iter().partition(|l| after.contains(&key(*l)));
+        let (kept, gone): (Vec<_>, Vec<_>) = stated.into_iter().partition(|l| after.contains(&key(*l)));
+        let (mut kept, gone) = (longest(kept), longest(gone));
         // A wall that only grew or shrank along itself, beside one that moved, is where it was.
-        let moved = now.into_iter().filter(|l| !before.contains(&key(*l)));
+        let moved = longest(now.into_iter().filter(|l| !before.contains(&key(*l))).collect());
         let (longer, elsewhere): (Vec<_>, Vec<_>) =
-            moved.partition(|l| gone.iter().any(|stated| is_along(*stated, *l)));
+            moved.into_iter().partition(|l| gone.iter().any(|stated| is_along(*stated, *l)));
         kept.extend(longer);
         let own = room.scene().materials().len();
         let triangles = found.scene.triangles().iter().enumerate();
         let added = triangles.filter(|(_, t)| t.material as usize >= own);
         Self { kept, gone, found: elsewhere, added: added.map(|(i, _)| found.scene.corners_m(i)).collect() }
     }
+}
+
+/// The longest lines, [`MOST_LINES`] of them.
+fn longest(mut lines: Vec<[Point; 2]>) -> Vec<[Point; 2]> {
+    let length2 = |[a, b]: &[Point; 2]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>();
+    lines.sort_by(|a, b| length2(b).total_cmp(&length2(a)));
+    lines.truncate(MOST_LINES);
+    lines
 }
 
 /// Whether two lines lie on one and overlap.
@@ -283,6 +294,9 @@ mod tests {
         let drawn = svg(&room, &model.room(&room).unwrap());
         // Two triangles in each of three views.
         assert_eq!(drawn.matches("<polygon").count(), 6);
+        let lines = (0..=MOST_LINES).map(|i| [[0.0; 3], [i as f64, 0.0, 0.0]]).collect();
+        let drawn_first = longest(lines);
+        assert_eq!((drawn_first.len(), drawn_first[0][1][0]), (MOST_LINES, MOST_LINES as f64));
         assert!(is_along([[0.0; 3], [1.0, 0.0, 0.0]], [[1.5, 0.0, 0.0], [0.2, 0.0, 0.0]]));
         assert!(!is_along([[0.0; 3], [1.0, 0.0, 0.0]], [[1.5, 0.0, 0.0], [1.2, 0.0, 0.0]]));
         assert!(!is_along([[0.0; 3], [1.0, 0.0, 0.0]], [[0.0; 3], [1.0, 0.01, 0.0]]));
