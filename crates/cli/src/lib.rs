@@ -28,6 +28,7 @@ mod command;
 mod commands;
 mod demo;
 mod failure;
+mod laws;
 mod outline;
 pub mod output;
 pub mod page;

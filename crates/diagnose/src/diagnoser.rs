@@ -2,7 +2,7 @@
 
 use crate::config::DiagnoseConfig;
 use crate::effect::Effect;
-use crate::effects::catalogue;
+use crate::effects::{LawEffect, catalogue};
 use crate::error::Error;
 use crate::infer::baseline::Baseline;
 use crate::infer::candidates;
@@ -14,6 +14,7 @@ use crate::report::composition::compose;
 use crate::report::diagnosis::Diagnosis;
 use crate::simulate::scene_tracer::{Rays, SceneTracer};
 use sabine_acoustics::Observer;
+use sabine_paths::laws::Law;
 use sabine_scene::MeasuredRoom;
 use std::sync::Arc;
 use std::time::Instant;
@@ -37,7 +38,7 @@ pub struct Diagnoser {
 
 impl std::fmt::Debug for Diagnoser {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let effects: Vec<&str> = self.effects.iter().map(|e| e.info().id).collect();
+        let effects: Vec<_> = self.effects.iter().map(|e| e.id()).collect();
         f.debug_struct("Diagnoser").field("config", &self.config).field("effects", &effects).finish()
     }
 }
@@ -59,6 +60,22 @@ impl Diagnoser {
         Self { effects, ..self }
     }
 
+    /// With laws beside its effects: each competes as a cause of its own ([`LawEffect`]).
+    ///
+    /// # Errors
+    /// [`Error::LawNotWeighed`] for a law that is none of [`LawEffect`], or whose identifier an effect or another law has. A law that does not
+    /// fit the room is an error of [`Diagnoser::diagnose`].
+    pub fn with_laws(mut self, laws: Vec<Law>) -> Result<Self, Error> {
+        for law in laws {
+            if self.effects.iter().any(|e| e.id() == law.id()) {
+                let reason = "an effect, or another law, has this identifier".to_owned();
+                return Err(Error::LawNotWeighed { id: law.id().to_owned(), reason });
+            }
+            self.effects.push(Box::new(LawEffect::new(law)?));
+        }
+        Ok(self)
+    }
+
     /// With another tracer than that of `sabine-propagate`; [`EachScene`](crate::EachScene) makes one of any
     /// [`Propagator`](sabine_paths::Propagator). [`DiagnoseConfig::rays`], `image_order` and `allow_leaks` then mean nothing.
     #[must_use]
@@ -71,10 +88,10 @@ impl Diagnoser {
     /// # Errors
     /// [`Error::UnknownEffect`] for an identifier that none has.
     pub fn with_only(mut self, ids: &[String]) -> Result<Self, Error> {
-        if let Some(id) = ids.iter().find(|id| self.effects.iter().all(|e| e.info().id != id.as_str())) {
+        if let Some(id) = ids.iter().find(|id| self.effects.iter().all(|e| e.id() != id.as_str())) {
             return Err(Error::UnknownEffect { id: id.clone() });
         }
-        self.effects.retain(|e| ids.iter().any(|id| id == e.info().id));
+        self.effects.retain(|e| ids.iter().any(|id| *id == e.id()));
         Ok(self)
     }
 

@@ -16,6 +16,7 @@ pub use term::{
 };
 
 use crate::survey::Survey;
+use std::borrow::Cow;
 
 /// A parameter of an effect.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,7 +24,7 @@ pub struct Parameter {
     /// Name, with the octave where it belongs to one.
     pub name: String,
     /// Unit; empty for a pure number.
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
     /// Most probable value before anything is measured; that at which the effect is absent, where there is one.
     pub neutral: f64,
     /// Standard deviation of the prior, a normal distribution about the neutral value.
@@ -47,14 +48,14 @@ impl Parameter {
     /// A parameter of all bands.
     pub fn new(
         name: impl Into<String>,
-        unit: &'static str,
+        unit: impl Into<Cow<'static, str>>,
         neutral: f64,
         prior_sd: f64,
         bounds: (f64, f64),
     ) -> Self {
         Self {
             name: name.into(),
-            unit,
+            unit: unit.into(),
             neutral,
             prior_sd,
             bounds,
@@ -169,7 +170,7 @@ pub trait Effect: Send + Sync {
     fn info(&self) -> EffectInfo;
 
     /// Its identifier.
-    fn id(&self) -> &'static str {
+    fn id(&self) -> Cow<'static, str> {
         self.info().id
     }
 

@@ -43,6 +43,14 @@ pub enum Error {
         /// The name asked for.
         id: String,
     },
+    /// A law that cannot be weighed as a cause.
+    #[error("law `{id}`: {reason}")]
+    LawNotWeighed {
+        /// Its identifier.
+        id: String,
+        /// Why.
+        reason: String,
+    },
     /// The data and their priors leave a combination of parameters free: a prior of infinite width.
     #[error("the parameters of {what} are not determined")]
     Singular {

@@ -47,7 +47,7 @@ fn checked(out: &Path) -> Value {
     assert!(["adequate", "explained", "ambiguous", "unexplained"].contains(&verdict));
     assert!(is_between(&json["lack_of_fit"]["p_value"], 0.0, 1.0));
     let catalogue = catalogue();
-    let known = |id: &Value| catalogue.iter().any(|e| Some(e.id()) == id.as_str());
+    let known = |id: &Value| catalogue.iter().any(|e| id.as_str() == Some(&*e.id()));
     for cause in json["causes"].as_array().unwrap() {
         assert!(known(&cause["effect"]) && is_between(&cause["probability"], 0.0, 1.0));
         for parameter in cause["parameters"].as_object().unwrap().values() {

@@ -10,6 +10,7 @@ use sabine_acoustics::Material;
 pub struct FittedCase<'a> {
     pub(crate) survey: &'a Survey,
     pub(crate) values: &'a [f64],
+    pub(crate) intervals: Vec<[f64; 2]>,
     pub(crate) relaxed: Vec<(Nuisance, Vec<f64>)>,
     pub(crate) auxiliary: Vec<FoundParameter>,
     pub(crate) level_per_s: Vec<f64>,
@@ -24,6 +25,7 @@ impl<'a> FittedCase<'a> {
         Self {
             survey,
             values,
+            intervals: Vec::new(),
             relaxed: Vec::new(),
             auxiliary: Vec::new(),
             level_per_s: Vec::new(),
@@ -41,6 +43,11 @@ impl<'a> FittedCase<'a> {
     /// Fitted values of the case's parameters, in their order; empty for a case that is not fitted.
     pub fn values(&self) -> &[f64] {
         self.values
+    }
+
+    /// The 90 % interval of a parameter (by its place), no wider than its range; the value alone where nothing is known of its uncertainty.
+    pub fn interval(&self, parameter: usize) -> [f64; 2] {
+        self.intervals.get(parameter).copied().unwrap_or([self.values[parameter]; 2])
     }
 
     /// Fitted values of a nuisance whose prior the case relaxes: one by band for absorption, three for a position (offset in metres), one

@@ -1,16 +1,17 @@
 //! What an effect says of itself.
 
 use crate::effect::next_measurement::NextMeasurement;
+use std::borrow::Cow;
 
 /// Identifier, title and texts of an effect: everything that reports show of it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct EffectInfo {
     /// Identifier in the catalogue.
-    pub id: &'static str,
+    pub id: Cow<'static, str>,
     /// Title in reports.
-    pub title: &'static str,
+    pub title: Cow<'static, str>,
     /// One sentence for people: what is the matter.
-    pub explanation: &'static str,
+    pub explanation: Cow<'static, str>,
     /// Measurements that tell it apart from single other effects, by their identifiers.
     pub against: &'static [(&'static str, NextMeasurement)],
     /// The measurement that tells it apart from all others, with a rank: of two effects the one with the lower rank decides.
@@ -19,19 +20,24 @@ pub struct EffectInfo {
 
 impl EffectInfo {
     /// An effect without advice on further measurements.
-    pub const fn new(id: &'static str, title: &'static str, explanation: &'static str) -> Self {
+    pub fn new(
+        id: impl Into<Cow<'static, str>>,
+        title: impl Into<Cow<'static, str>>,
+        explanation: impl Into<Cow<'static, str>>,
+    ) -> Self {
+        let (id, title, explanation) = (id.into(), title.into(), explanation.into());
         Self { id, title, explanation, against: &[], next_measurement: None }
     }
 
     /// The same, with measurements that tell it apart from single other effects.
     #[must_use]
-    pub const fn against(self, against: &'static [(&'static str, NextMeasurement)]) -> Self {
+    pub fn against(self, against: &'static [(&'static str, NextMeasurement)]) -> Self {
         Self { against, ..self }
     }
 
     /// The same, with the measurement that tells it apart from any other effect; of two effects the one with the lower rank decides.
     #[must_use]
-    pub const fn decided_by(self, rank: u8, measurement: NextMeasurement) -> Self {
+    pub fn decided_by(self, rank: u8, measurement: NextMeasurement) -> Self {
         Self { next_measurement: Some((rank, measurement)), ..self }
     }
 }

@@ -6,7 +6,7 @@ use crate::extend::model_change::ModelChange;
 use crate::infer::search::{Search, State};
 use crate::likelihood::arrivals;
 use crate::likelihood::parameters::assignment;
-use crate::report::found_parameters::{parameters, place_of};
+use crate::report::found_parameters::{interval_90, parameters, place_of};
 
 /// A reflection is confirmed by a peak within this of its instant, in seconds.
 const NEAR_S: f64 = 1.5e-4;
@@ -35,11 +35,14 @@ pub(crate) fn extended_model(search: &Search<'_>, state: &State) -> ExtendedMode
 pub(crate) fn changes(search: &Search<'_>, state: &State, candidate: usize) -> Vec<ModelChange> {
     let (baseline, case) = (search.baseline, search.candidates[candidate].case);
     let survey = baseline.survey();
-    let values: &[f64] = match case.observable() {
-        Observable::Channels | Observable::PreArrival => &[],
+    let (values, intervals): (&[f64], _) = match case.observable() {
+        Observable::Channels | Observable::PreArrival => (&[], Vec::new()),
         Observable::Decay | Observable::Arrivals => {
             let (maximum, first) = place_of(search, state, candidate);
-            &maximum.values[first..first + case.parameters.len()]
+            let places = case.parameters.iter().zip(first..);
+            let intervals =
+                places.map(|(p, at)| interval_90(maximum.values[at], maximum.sd(at), p.bounds)).collect();
+            (&maximum.values[first..first + case.parameters.len()], intervals)
         }
     };
     let (decays, arrivals) = (baseline.decay_layout(), baseline.arrival_layout());
@@ -54,6 +57,7 @@ pub(crate) fn changes(search: &Search<'_>, state: &State, candidate: usize) -> V
     let fitted = FittedCase {
         survey,
         values,
+        intervals,
         relaxed: relaxed.collect(),
         auxiliary: if has_auxiliary { parameters(search, state, candidate) } else { Vec::new() },
         level_per_s: (0..survey.bands.len()).map(level_per_s).collect(),

@@ -4,7 +4,8 @@ use crate::error::Error;
 use sabine_acoustics::{Error as Cause, OutOfRange};
 use sabine_paths::laws::Law;
 use serde::Deserialize;
-use std::path::Path;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 
 /// Longest file of laws, in bytes.
 const MAX_BYTES: u64 = 1 << 20;
@@ -16,7 +17,8 @@ struct LawFile {
     laws: Vec<Law>,
 }
 
-/// Reads the laws of a TOML file, in their order. Names of surfaces are checked when they are bound to a room.
+/// Reads the laws of a TOML file, or of all files `*.toml` of a folder by name, in their order. Names of surfaces are checked when they are
+/// bound to a room.
 ///
 /// ```no_run
 /// let laws = sabine_diagnose::read_laws("laws.toml")?;
@@ -25,10 +27,34 @@ struct LawFile {
 /// ```
 ///
 /// # Errors
-/// [`Error::Model`] naming file, law and column for what is no such file; [`Error::Acoustics`] if it cannot be read, is longer than 1 MiB, or
-/// has two laws of one identifier.
+/// [`Error::Model`] naming file, law and column for what is no such file; [`Error::Acoustics`] if it cannot be read, is longer than 1 MiB, if a
+/// folder holds no such file, or if two laws have one identifier.
 pub fn read_laws(path: impl AsRef<Path>) -> Result<Vec<Law>, Error> {
     let path = path.as_ref();
+    let laws = if path.is_dir() {
+        files_of(path)?.iter().map(|file| read_file(file)).collect::<Result<Vec<_>, _>>()?.concat()
+    } else {
+        read_file(path)?
+    };
+    Law::check_together(&laws).map_err(|error| Cause::from(error).in_file(path, "laws"))?;
+    Ok(laws)
+}
+
+/// The files of a folder that may hold laws, by name.
+fn files_of(folder: &Path) -> Result<Vec<PathBuf>, Cause> {
+    let io = |source| Cause::Io { path: folder.to_owned(), source };
+    let entries = std::fs::read_dir(folder).map_err(io)?;
+    let mut files: Vec<PathBuf> =
+        entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<_, _>>().map_err(io)?;
+    files.retain(|file| file.extension().is_some_and(|extension| extension == "toml"));
+    files.sort();
+    if files.is_empty() {
+        return Err(io(std::io::Error::new(ErrorKind::NotFound, "no file *.toml in this folder")));
+    }
+    Ok(files)
+}
+
+fn read_file(path: &Path) -> Result<Vec<Law>, Error> {
     let io = |source| Cause::Io { path: path.to_owned(), source };
     let bytes = std::fs::metadata(path).map_err(io)?.len();
     if bytes > MAX_BYTES {
@@ -38,6 +64,5 @@ pub fn read_laws(path: impl AsRef<Path>) -> Result<Vec<Law>, Error> {
     let text = std::fs::read_to_string(path).map_err(io)?;
     let file: LawFile = toml::from_str(&text)
         .map_err(|source| Error::Model { path: path.to_owned(), source: Box::new(source) })?;
-    Law::check_together(&file.laws).map_err(|error| Cause::from(error).in_file(path, "laws"))?;
     Ok(file.laws)
 }

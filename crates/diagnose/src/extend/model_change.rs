@@ -186,7 +186,7 @@ mod tests {
                 fitted.level_per_s = vec![1.0; survey.bands().len()];
                 fitted.confirmed = (0..survey.responses().len()).collect();
                 let changes = case.model_changes(&fitted).len();
-                assert_eq!(changes == 0, silent.contains(&effect.id()), "{}", effect.id());
+                assert_eq!(changes == 0, silent.contains(&&*effect.id()), "{}", effect.id());
             }
         }
         assert_eq!(

@@ -2,11 +2,12 @@
 
 use crate::effect::{Case, Effect, Observable};
 use crate::survey::Survey;
+use std::borrow::Cow;
 
 /// One case of one effect of the catalogue.
 pub(crate) struct Candidate<'a> {
     pub effect: usize,
-    pub id: &'static str,
+    pub id: &'a str,
     pub case: &'a Case,
 }
 
@@ -14,7 +15,7 @@ pub(crate) struct Candidate<'a> {
 #[derive(Debug)]
 pub(crate) struct CatalogueCase {
     pub effect: usize,
-    pub id: &'static str,
+    pub id: Cow<'static, str>,
     pub case: Case,
 }
 
@@ -22,10 +23,10 @@ pub(crate) struct CatalogueCase {
 pub(crate) fn cases(effects: &[Box<dyn Effect>], survey: &Survey) -> Vec<CatalogueCase> {
     let mut all: Vec<CatalogueCase> = Vec::new();
     for (effect, own) in effects.iter().enumerate() {
-        let id = own.info().id;
+        let id = own.id();
         for mut case in own.cases(survey) {
             case.slot = Some(all.len());
-            all.push(CatalogueCase { effect, id, case });
+            all.push(CatalogueCase { effect, id: id.clone(), case });
         }
     }
     all
@@ -33,7 +34,7 @@ pub(crate) fn cases(effects: &[Box<dyn Effect>], survey: &Survey) -> Vec<Catalog
 
 /// The cases as candidates.
 pub(crate) fn candidates(cases: &[CatalogueCase]) -> Vec<Candidate<'_>> {
-    cases.iter().map(|own| Candidate { effect: own.effect, id: own.id, case: &own.case }).collect()
+    cases.iter().map(|own| Candidate { effect: own.effect, id: &own.id, case: &own.case }).collect()
 }
 
 /// The chosen cases that take part in one fit, in their order.
@@ -59,7 +60,7 @@ pub(crate) struct Score {
 #[derive(Clone, Debug)]
 pub(crate) struct EffectScore {
     pub effect: usize,
-    pub id: &'static str,
+    pub id: String,
     pub best: usize,
     /// Log odds against its absence, corrected for the number of cases, in nats.
     pub nats: f64,
@@ -77,7 +78,7 @@ pub(crate) fn by_effect(candidates: &[Candidate<'_>], effects: usize, scores: &[
         let sum: f64 = own.iter().map(|s| (s.nats - best.nats).exp()).sum();
         found.push(EffectScore {
             effect,
-            id: candidates[best.candidate].id,
+            id: candidates[best.candidate].id.to_owned(),
             best: best.candidate,
             nats: best.nats + sum.ln() - (count as f64).ln(),
             d_prime: best.d_prime,

@@ -47,9 +47,9 @@ pub(crate) struct Confirmation {
     /// Whether bins scatter so far that no name can be trusted.
     pub hopeless: bool,
     /// Causes that the discrepancy without a name beats.
-    pub unseated: Vec<&'static str>,
+    pub unseated: Vec<String>,
     /// Causes that were dropped, and why.
-    pub dropped: Vec<(&'static str, Doubt)>,
+    pub dropped: Vec<(String, Doubt)>,
     pub predicting_s: f64,
     pub testing_s: f64,
 }
@@ -80,7 +80,7 @@ pub(crate) fn confirm(
     report(observer, "lack of fit", 1, 2)?;
     let mut dropped = Vec::new();
     while let Some((worst, doubt)) = doubtful(search, &state, found, &predicted)? {
-        dropped.push((search.candidates[worst].id, doubt));
+        dropped.push((search.candidates[worst].id.to_owned(), doubt));
         found.drop(worst);
         state = search.state(&found.chosen, Some(&base))?;
         predicted = predict(search, &state, &in_turn, observer)?;
@@ -97,9 +97,9 @@ pub(crate) fn confirm(
     } else {
         Verdict::Explained
     };
-    let mut unseated: Vec<&'static str> = Vec::new();
+    let mut unseated: Vec<String> = Vec::new();
     if verdict == Verdict::Unexplained && !state.chosen.is_empty() {
-        unseated = state.chosen.iter().map(|&c| search.candidates[c].id).collect();
+        unseated = state.chosen.iter().map(|&c| search.candidates[c].id.to_owned()).collect();
         state = base.clone();
         predicted = predict(search, &state, &in_turn, observer)?;
     }

@@ -21,7 +21,7 @@ pub(crate) struct Selection {
     pub chosen: Vec<usize>,
     probabilities: Vec<(usize, f64)>,
     /// The last cause and those that explain as much.
-    pub rivals: Vec<&'static str>,
+    pub rivals: Vec<String>,
     /// All effects beside the baseline.
     pub first: Vec<EffectScore>,
     /// Causes at the end of the search, and all other effects beside them, where none of these was worth a name.
@@ -106,7 +106,7 @@ pub(crate) fn select(
         named.chosen.push(best.best);
         named.interchangeable.push((best.best, interchangeable));
         if !rivals.is_empty() {
-            named.rivals = std::iter::once(best.id).chain(rivals.iter().map(|r| r.id)).collect();
+            named.rivals = std::iter::once(best).chain(&rivals).map(|r| r.id.clone()).collect();
             break;
         }
         let changes = expand_about_fit(baseline, cases, effects, &named.chosen, (used, arrival_fits))?;
@@ -211,7 +211,11 @@ mod tests {
 
     #[test]
     fn a_set_falls_with_the_cause_that_stands_for_it_and_with_no_other() {
-        let all = || Selection { chosen: vec![4, 7], rivals: vec!["a", "b"], ..Selection::default() };
+        let all = || Selection {
+            chosen: vec![4, 7],
+            rivals: vec!["a".to_owned(), "b".to_owned()],
+            ..Selection::default()
+        };
         let mut without_last = all();
         without_last.drop(7);
         assert!(without_last.chosen == [4] && without_last.rivals.is_empty());
@@ -221,7 +225,7 @@ mod tests {
     }
 
     /// Names among few effects in rooms made by hand.
-    fn named(tables: Tables) -> (Vec<(&'static str, Option<String>)>, Selection) {
+    fn named(tables: Tables) -> (Vec<(String, Option<String>)>, Selection) {
         let mut baseline = tables.baseline(DiagnoseConfig::default());
         let effects: Vec<Box<dyn Effect>> =
             vec![Box::new(PositionError), Box::new(TimeZeroOffset), Box::new(SurfaceAbsorption)];
@@ -229,7 +233,8 @@ mod tests {
         let used = vec![true; baseline.pairs()];
         let found =
             select(&mut baseline, &cases, effects.len(), (&used, &Arc::default()), &()).expect("fits");
-        let chosen = found.chosen.iter().map(|&c| (cases[c].id, cases[c].case.subject.clone())).collect();
+        let chosen =
+            found.chosen.iter().map(|&c| (cases[c].id.to_string(), cases[c].case.subject.clone())).collect();
         (chosen, found)
     }
 
@@ -239,7 +244,7 @@ mod tests {
         let (names, found) = named(tables());
         assert!(names.is_empty() && found.first.len() == 3, "{names:?}");
         let (names, found) = named(tables().late(3e-3));
-        assert_eq!(names, [("time_zero", None)]);
+        assert_eq!(names, [("time_zero".to_owned(), None)]);
         assert!(found.probability(found.chosen[0]) > 0.95);
     }
 }

@@ -180,11 +180,11 @@ impl Parts<'_> {
     fn not_planned(&self) -> Vec<String> {
         let cases = self.scales.campaign.cases;
         let predicted = |id: &str| cases.iter().any(|c| c.id == id && is_predicted(&c.case));
-        let ids: Vec<&str> = match self.names.question {
-            Some(question) => question.leading.iter().map(|h| h.effect.as_str()).collect(),
-            None => self.names.effects.iter().map(|e| e.info().id).collect(),
+        let ids: Vec<String> = match self.names.question {
+            Some(question) => question.leading.iter().map(|h| h.effect.clone()).collect(),
+            None => self.names.effects.iter().map(|e| e.id().into_owned()).collect(),
         };
-        ids.into_iter().filter(|id| !predicted(id)).map(str::to_owned).collect()
+        ids.into_iter().filter(|id| !predicted(id)).collect()
     }
 }
 
@@ -193,7 +193,7 @@ fn typical(case: &Case) -> (String, String, f64, f64) {
     let own = case.parameters.iter().find(|p| p.typical != p.neutral);
     if let Some(p) = own {
         let most = (p.neutral - p.bounds.0).max(p.bounds.1 - p.neutral);
-        return (p.name.clone(), p.unit.to_owned(), (p.typical - p.neutral).abs(), most);
+        return (p.name.clone(), p.unit.to_string(), (p.typical - p.neutral).abs(), most);
     }
     match case.relaxes.first() {
         Some((Nuisance::Absorption(_), sd)) => ("absorption".to_owned(), String::new(), *sd, 1.0),

@@ -41,7 +41,7 @@ pub struct Planner {
 
 impl std::fmt::Debug for Planner {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let effects: Vec<&str> = self.effects.iter().map(|e| e.info().id).collect();
+        let effects: Vec<_> = self.effects.iter().map(|e| e.id()).collect();
         f.debug_struct("Planner").field("config", &self.config).field("effects", &effects).finish()
     }
 }

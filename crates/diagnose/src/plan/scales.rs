@@ -87,8 +87,8 @@ impl Scales<'_> {
     }
 
     /// Effects that are predicted, by identifier, with their cases (places).
-    pub fn effects(&self) -> Vec<(&'static str, Vec<usize>)> {
-        let mut found: Vec<(&'static str, Vec<usize>)> = Vec::new();
+    pub fn effects(&self) -> Vec<(&str, Vec<usize>)> {
+        let mut found: Vec<(&str, Vec<usize>)> = Vec::new();
         for (place, CatalogueCase { id, case, .. }) in self.campaign.cases.iter().enumerate() {
             if !is_predicted(case) {
                 continue;

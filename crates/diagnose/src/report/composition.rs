@@ -119,7 +119,7 @@ fn causes(
                 .iter()
                 .filter_map(|&other| search.candidates[other].case.subject.clone())
                 .collect(),
-            explanation: effects[own.effect].info().explanation.to_owned(),
+            explanation: effects[own.effect].info().explanation.into_owned(),
             probability: found.probability(candidate),
             nats: without(search, state, candidate)?,
             more_nats_with_half_the_rays: found
@@ -242,7 +242,7 @@ fn words_that_decide(effects: &[Box<dyn Effect>], alternatives: &[String]) -> Ve
     let mut words: Vec<String> = Vec::new();
     for (i, a) in alternatives.iter().enumerate() {
         for b in &alternatives[i + 1..] {
-            let info = |id: &String| effects.iter().map(|e| e.info()).find(|info| info.id == id);
+            let info = |id: &String| effects.iter().map(|e| e.info()).find(|info| info.id == **id);
             let (Some(a), Some(b)) = (info(a), info(b)) else { continue };
             let word = discriminating_measurement(&a, &b).to_string();
             if !words.contains(&word) {

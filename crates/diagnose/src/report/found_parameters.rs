@@ -11,19 +11,19 @@ const HALF_90: f64 = 1.645;
 /// The data speak of a parameter if they leave less than this share of what was known of it beforehand.
 const TOLD_SHARE: f64 = 0.8;
 
+/// The 90 % interval of a normal distribution, no wider than its bounds.
+pub(crate) fn interval_90(value: f64, sd: f64, bounds: (f64, f64)) -> [f64; 2] {
+    [(value - HALF_90 * sd).max(bounds.0), (value + HALF_90 * sd).min(bounds.1)]
+}
+
 /// Fitted parameters of a chosen candidate, what it frees among what every fit leaves open included.
 pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -> Vec<FoundParameter> {
     let baseline = search.baseline;
     let case = search.candidates[candidate].case;
     let mut found = Vec::new();
     let mut push = |name: String, value: f64, sd: f64, bounds: (f64, f64), unit: &str| {
-        found.push(FoundParameter {
-            name,
-            value,
-            low: (value - HALF_90 * sd).max(bounds.0),
-            high: (value + HALF_90 * sd).min(bounds.1),
-            unit: unit.to_owned(),
-        });
+        let [low, high] = interval_90(value, sd, bounds);
+        found.push(FoundParameter { name, value, low, high, unit: unit.to_owned() });
     };
     let own = state.own.iter().find(|(c, _)| *c == candidate);
     if case.observable() == Observable::PreArrival {
@@ -31,7 +31,7 @@ pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -
     }
     let (maximum, first) = place_of(search, state, candidate);
     for (i, p) in case.parameters.iter().enumerate() {
-        push(p.name.clone(), maximum.values[first + i], maximum.sd(first + i), p.bounds, p.unit);
+        push(p.name.clone(), maximum.values[first + i], maximum.sd(first + i), p.bounds, &p.unit);
     }
     let bands = baseline.survey().bands;
     let open = (f64::NEG_INFINITY, f64::INFINITY);

@@ -18,9 +18,9 @@ pub(crate) struct Circumstances<'a> {
     /// Whether bins scatter far more than they should.
     pub scattered: bool,
     /// Causes that a discrepancy without a name beats.
-    pub unseated: &'a [&'a str],
+    pub unseated: &'a [String],
     /// Causes for which the data speak and that are not named, and why.
-    pub dropped: &'a [(&'a str, Doubt)],
+    pub dropped: &'a [(String, Doubt)],
     /// Effects that the data speak for beside as many causes as may be named.
     pub beyond_limit: &'a [&'a str],
     /// How far single responses drift along their decay where it is much, in dB, and in which octave.

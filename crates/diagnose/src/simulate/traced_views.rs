@@ -8,9 +8,13 @@ use crate::simulate::traced_pair::TracedPair;
 use crate::survey::{Survey, SurveyedResponse};
 use rayon::prelude::*;
 use sabine_acoustics::{Air, Material};
+use sabine_paths::laws::{BoundLaws, LawSite};
 use sabine_paths::{Conditions, PathSet};
 use sabine_propagate::ImageSource;
 use sabine_scene::{Receiver, Scene, Source};
+
+/// Energy of a bin without paths, as a share of the strongest: it counts as nothing.
+const NOTHING: f64 = 1e-12;
 
 /// The traced room at the materials about which predictions are expanded.
 pub struct TracedRoomView<'a> {
@@ -158,6 +162,30 @@ impl<'a> TracedPairView<'a> {
     pub fn bin_energies(&self, band: usize, energies: &[f32]) -> Vec<f64> {
         let (bins, pulse) = (self.state(band).bins, &self.room.pulses[band]);
         self.pair.sums(energies, bins, pulse, self.room.simulation.traced_s)
+    }
+
+    /// Natural logarithm of the change of the energy in the bins of a band if its paths had these energies, one each.
+    pub fn ln_changes(&self, band: usize, energies: &[f32]) -> Vec<f64> {
+        let sums = self.bin_energies(band, energies);
+        let floor = NOTHING * sums.iter().copied().fold(0.0, f64::max).max(1e-30);
+        sums.iter().zip(self.ln_energy(band)).map(|(s, ln)| s.max(floor).ln() - ln).collect()
+    }
+
+    /// What laws know of it, at the places and in the air that were found.
+    pub(crate) fn law_site(&self) -> LawSite {
+        let (room, response) = (self.room, self.response());
+        let (source, receiver) = (room.source(response.source), room.receiver(response.receiver));
+        let site = LawSite::new(room.scene(), source, receiver, &self.pair.air);
+        match response.recorded_at {
+            Some(order) => site.with_recording_order(order),
+            None => site,
+        }
+    }
+
+    /// Energies of its paths under laws, `[band][path]`, at the materials of the room.
+    pub(crate) fn energies_under(&self, laws: &BoundLaws) -> Result<Vec<Vec<f32>>, Error> {
+        let conditions = Conditions::new(self.room.materials(), &self.pair.air).with_laws(laws);
+        Ok(self.pair.paths().energies(&conditions)?)
     }
 
     /// The same that are to be expected, sampled ones being smoothed over time as far as chance explains their scatter, with their

@@ -6,6 +6,7 @@ mod extended_laws;
 mod hidden_distortion;
 mod hidden_edges;
 mod hidden_effects;
+mod hidden_law;
 mod hidden_local_reaction;
 mod hidden_surfaces;
 mod hidden_waves;

@@ -117,10 +117,14 @@ impl LawLanes<'_> {
     /// All laws together, and the geometric weight, leave the exponential in its range.
     fn check_sum(&self, range: &Range<usize>, block: &[Lanes]) -> Result<(), LawError> {
         let most = (MAX_GAIN_DB * NEPERS_PER_DB) as f32;
-        if block.iter().flatten().fold(true, |within, x| within & (*x <= most)) {
+        let none = [true; LANES];
+        let within = block.iter().fold(none, |within, x| std::array::from_fn(|i| within[i] & (x[i] <= most)));
+        // Lanes beyond the last band hold the weight alone, which may be any where paths stand for many.
+        if within[..self.lanes] == none[..self.lanes] {
             return Ok(());
         }
-        let greatest = block.iter().flatten().fold(f32::NEG_INFINITY, |greatest, &x| greatest.max(x));
+        let read = block.iter().flat_map(|x| &x[..self.lanes]);
+        let greatest = read.fold(f32::NEG_INFINITY, |greatest, &x| greatest.max(x));
         let path = block.iter().position(|x| x.contains(&greatest)).map(|i| range.start + i);
         let found_db = f64::from(greatest) / NEPERS_PER_DB;
         let place = Place { path, band_hz: None };

@@ -99,6 +99,21 @@ impl Binary {
 /// Binding of a sign: below that of a power, above that of a product.
 const SIGN: u8 = 3;
 
+/// How a part of a formula changes with a parameter.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Growth {
+    Constant,
+    Proportional,
+    Other,
+}
+
+impl Growth {
+    /// That of a function of it.
+    fn through(self) -> Self {
+        if self == Self::Constant { self } else { Self::Other }
+    }
+}
+
 /// A formula: operations, each after its arguments; the last is the result.
 #[derive(Clone, Debug)]
 pub(crate) struct Formula {
@@ -110,6 +125,28 @@ pub(crate) struct Formula {
 }
 
 impl Formula {
+    /// Whether the whole goes in proportion to a parameter: as far as its form shows it, without reordering.
+    pub fn is_proportional_to(&self, parameter: Index) -> bool {
+        let mut grows: Vec<Growth> = Vec::with_capacity(self.ops.len());
+        for &op in &self.ops {
+            let of = |index: Index| grows[usize::from(index)];
+            grows.push(match op {
+                Op::Parameter(index) if index == parameter => Growth::Proportional,
+                Op::Number(_) | Op::Parameter(_) | Op::Variable(_) | Op::Hits(_) => Growth::Constant,
+                Op::Unary(Unary::Negate, a) => of(a),
+                Op::Unary(_, a) => of(a).through(),
+                Op::Binary(Binary::Add | Binary::Subtract, a, b) if of(a) == of(b) => of(a),
+                Op::Binary(Binary::Multiply, a, b) if of(a) == Growth::Constant => of(b),
+                Op::Binary(Binary::Multiply | Binary::Divide, a, b) if of(b) == Growth::Constant => of(a),
+                Op::Binary(_, a, b) => of(a).through().max(of(b).through()),
+                Op::Resonance(arguments) => {
+                    arguments.map(|a| of(a).through()).into_iter().fold(Growth::Constant, Growth::max)
+                }
+            });
+        }
+        grows.last() == Some(&Growth::Proportional)
+    }
+
     /// The formula as text that reads as the same formula.
     pub fn print(&self, parameters: &[String]) -> String {
         let mut text = String::new();

@@ -206,6 +206,35 @@ impl Law {
         law.with_values(values)
     }
 
+    /// The parameter in proportion to which the whole law goes, so that it says how strong the law is: the first by name, where there is one.
+    ///
+    /// ```
+    /// use sabine_paths::laws::{Law, LawParameter, LawTarget};
+    /// let per_metre = LawParameter::new(0.1, [0.0, 0.5], "dB/m");
+    /// let law = Law::new("fog", LawTarget::Path, None, "-a * length_m * reflections", [("a", per_metre)])?;
+    /// assert_eq!(law.amplitude(), Some("a"));
+    /// # Ok::<(), sabine_paths::laws::LawError>(())
+    /// ```
+    pub fn amplitude(&self) -> Option<&str> {
+        let index = (0..self.names.len()).find(|&i| self.formula.is_proportional_to(i as u16))?;
+        Some(&self.names[index])
+    }
+
+    /// The same law times a pure number, which becomes a parameter of this name.
+    ///
+    /// # Errors
+    /// As [`Law::new`]: the name may be taken, the formula become too long.
+    pub fn times(&self, name: &str, factor: LawParameter) -> Result<Self, LawError> {
+        if self.names.iter().any(|own| own == name) {
+            return Err(self.error(None, LawFault::BadParameterName(name.to_owned())));
+        }
+        let own = self.names.iter().cloned().zip(self.parameters.iter().cloned());
+        let formula = format!("{name} * ({})", self.text);
+        let parameters = own.chain([(name.to_owned(), factor)]);
+        let law = Self::new(self.id.clone(), self.target, self.surface(), &formula, parameters)?;
+        Ok(law.with_words(self.words.clone()))
+    }
+
     /// Its identifier.
     pub fn id(&self) -> &str {
         &self.id

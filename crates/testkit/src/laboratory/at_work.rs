@@ -90,6 +90,7 @@ impl Hidden {
             | Self::RoomModes { .. }
             | Self::GainDrift { .. }
             | Self::Dropouts { .. }
+            | Self::GrazingAbsorption { .. }
             | Self::ForeignChirp { .. } => {}
         }
         truth.effects.push(self.clone());
@@ -257,6 +258,16 @@ fn check(truth: &Truth, effect: &Hidden) -> Result<(), Error> {
             OutOfRange::check("beginning of a gap (s)", gap.start_s, 0.0, 100.0, "between 0 and 100 s")?;
             Ok(OutOfRange::check("length of a gap (s)", gap.length_s, 0.0, 10.0, "between 0 and 10 s")?)
         }),
+        Hidden::GrazingAbsorption { material, db, .. } => {
+            exists("material", *material, truth.materials.len())?;
+            Ok(OutOfRange::check(
+                "absorption at grazing incidence (dB)",
+                *db,
+                0.0,
+                40.0,
+                "between 0 and 40 dB",
+            )?)
+        }
         Hidden::ForeignChirp { start_s, length_s, from_hz, to_hz, level_db } => {
             OutOfRange::check("beginning (s)", *start_s, 0.0, 100.0, "between 0 and 100 s")?;
             OutOfRange::check("length (s)", *length_s, 1e-3, 10.0, "between 0.001 and 10 s")?;

@@ -179,6 +179,16 @@ pub enum Hidden {
         /// The moments.
         gaps: Vec<Gap>,
     },
+    /// Outside the catalogue: a material takes the more of the sound that meets it, the more that grazes: `db (1 - cos)^2` at each meeting, cos
+    /// being that of the angle to the normal, in bands from a frequency on.
+    GrazingAbsorption {
+        /// Index of the material.
+        material: usize,
+        /// What it takes at grazing incidence in dB, 0 to 40.
+        db: f64,
+        /// The first nominal octave centre in Hz.
+        from_hz: f64,
+    },
     /// Outside the catalogue: a sweep that is none of the measurement's, in every response.
     ForeignChirp {
         /// Its beginning in seconds from the first sample.
@@ -267,7 +277,7 @@ impl Hidden {
         "surface_displacement",
     ];
     /// Names of the effects that no catalogue holds.
-    pub const OUTSIDE: [&'static str; 3] = ["gain_drift", "dropouts", "foreign_chirp"];
+    pub const OUTSIDE: [&'static str; 4] = ["gain_drift", "dropouts", "foreign_chirp", "grazing_absorption"];
 
     /// Identifier in the catalogue, or `outside`.
     pub fn id(&self) -> &'static str {
@@ -303,6 +313,7 @@ impl Hidden {
             Self::GainDrift { .. } => "gain_drift",
             Self::Dropouts { .. } => "dropouts",
             Self::ForeignChirp { .. } => "foreign_chirp",
+            Self::GrazingAbsorption { .. } => "grazing_absorption",
         }
     }
 }

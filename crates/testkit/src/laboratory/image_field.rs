@@ -2,9 +2,9 @@
 
 use super::box_decay::BoxDecay;
 use super::columns::Columns;
-use super::local_reaction::LocalReaction;
 use super::panel::{self, Panel};
 use super::patch::{self, Patch};
+use super::reflection_by_angle::ReflectionByAngle;
 use super::stream::{Purpose, key, mix, unit};
 use super::truth::{Medium, Truth};
 use super::unfolded::times_met;
@@ -59,7 +59,7 @@ fn add_images_of<const LANES: usize>(
     let share = PULSES_PER_SAMPLE * columns.rate_hz * volume_m3 / (4.0 * PI * medium.speed_m_s);
     let (panels, patches) = (Panel::all(truth), Patch::all(truth));
     panel::add_reflections(truth, medium, &panels, pair, columns);
-    let local = LocalReaction::of(truth);
+    let reflection = ReflectionByAngle::of(truth);
     let weights = decay.weights::<LANES>(medium);
     let mut row = [0.0; LANES];
     let mut by_angle = [1.0; LANES];
@@ -83,11 +83,11 @@ fn add_images_of<const LANES: usize>(
                 let hash = mix(row_seed ^ z.index as u64);
                 let mut worth = *weights.at(time_s);
                 let offset = [x.offset_m, y.offset_m, z.offset_m];
-                if let Some(local) = &local {
+                if let Some(reflection) = &reflection {
                     let met = [x.index, y.index, z.index].map(times_met);
                     let met = [met[0][0], met[0][1], met[1][0], met[1][1], met[2][0], met[2][1]];
                     let cosines = offset.map(|o| o / length_m);
-                    (0..bands).for_each(|b| by_angle[b] = local.factor(b, met, cosines));
+                    (0..bands).for_each(|b| by_angle[b] = reflection.factor(b, met, cosines));
                 }
                 (0..LANES).for_each(|b| worth[b] *= by_angle[b] * row[b] * z.walls[b]);
                 let strongest = worth.into_iter().fold(0.0, f64::max);

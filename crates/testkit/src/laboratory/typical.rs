@@ -112,6 +112,12 @@ fn draw(id: &str, strength: f64, lab: &Laboratory, seed: u64, r: &mut Pcg64Mcg) 
             phase_rad: std::f64::consts::TAU * unit(r),
         },
         "dropouts" => dropouts(r, truth, decay_s, strength),
+        // The floor, as carpets do, from 1 or 2 kHz up.
+        "grazing_absorption" => Hidden::GrazingAbsorption {
+            material: truth.faces[4],
+            db: strength * (5.0 + 3.0 * unit(r)),
+            from_hz: if r.random::<bool>() { 1000.0 } else { 2000.0 },
+        },
         "foreign_chirp" => foreign_chirp(r, truth, decay_s, strength),
         _ => return Err(Error::UnknownId { id: id.to_owned() }),
     })

@@ -16,12 +16,13 @@ pub(in crate::commands) mod words;
 use crate::bar::Bar;
 use crate::demo::Demo;
 use crate::failure::Failure;
+use crate::laws::naming_laws;
 use crate::output::OutputFolder;
 use crate::room::RoomArguments;
 use clap::Args;
 use findings::Findings;
 use sabine::acoustics::Error as ValueError;
-use sabine::diagnose::{DiagnoseConfig, Diagnoser, Error as DiagnoseError, catalogue};
+use sabine::diagnose::{DiagnoseConfig, Diagnoser, Error as DiagnoseError, catalogue, read_laws};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -37,6 +38,9 @@ pub struct Arguments {
     /// Causes to try, by their names in the catalogue [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     effects: Vec<String>,
+    /// Formulas to weigh as causes beside the catalogue, `[[laws]]` in TOML: a file, or a folder of such files
+    #[arg(long, value_name = "FILE|DIR")]
+    laws: Option<PathBuf>,
     /// Rays for each source-receiver pair [default: 10000]
     #[arg(long)]
     rays: Option<usize>,
@@ -68,16 +72,19 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(rays) = arguments.rays {
         config.rays = rays;
     }
-    let tried = match &arguments.effects {
+    let laws = arguments.laws.as_ref().map(read_laws).transpose()?.unwrap_or_default();
+    let effects = match &arguments.effects {
         ids if ids.is_empty() => catalogue().len(),
         ids => ids.iter().collect::<BTreeSet<_>>().len(),
     };
+    let tried = effects + laws.len();
     // What a name must reach: the odds that are asked for, and the number that was tried.
     let threshold_nats = config.naming_nats + (tried as f64).ln();
     let mut diagnoser = Diagnoser::new(config)?;
     if !arguments.effects.is_empty() {
         diagnoser = diagnoser.with_only(&arguments.effects)?;
     }
+    diagnoser = diagnoser.with_laws(laws)?;
     // A folder that cannot be written to should not cost the user a computation first.
     let mut out = OutputFolder::create(&arguments.out)?;
     let (room, name) = arguments.room.read(&mut demo)?;
@@ -88,7 +95,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             (DiagnoseError::Acoustics(ValueError::Cancelled { .. }), Some(place)) => {
                 format!("{place}; nothing was written").into()
             }
-            _ => error.into(),
+            _ => naming_laws(error.into(), arguments.laws.as_deref()),
         }
     })?;
     bar.finish();

@@ -2,6 +2,7 @@
 
 use super::findings::Findings;
 use sabine::diagnose::{Cause, FoundParameter, Verdict, catalogue};
+use std::borrow::Cow;
 
 /// Below this probability chance is not believed, as by default in the diagnosis.
 const UNLIKELY: f64 = 0.01;
@@ -9,7 +10,7 @@ const UNLIKELY: f64 = 0.01;
 /// The title of an effect; one that is not in the catalogue is called by its identifier.
 pub fn effect(id: &str) -> String {
     let title = catalogue().iter().map(|e| e.info()).find(|info| info.id == id).map(|info| info.title);
-    title.map_or_else(|| id.replace('_', " "), str::to_owned)
+    title.map_or_else(|| id.replace('_', " "), Cow::into_owned)
 }
 
 /// An effect and what it concerns.

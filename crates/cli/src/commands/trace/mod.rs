@@ -9,6 +9,7 @@ mod waves;
 use crate::bar::Bar;
 use crate::demo::Demo;
 use crate::failure::Failure;
+use crate::laws::naming_laws;
 use crate::output::OutputFolder;
 use crate::room::{PlaceArguments, RoomArguments};
 use clap::{Args, ValueEnum};
@@ -16,7 +17,7 @@ use sabine::acoustics::{
     Directivity, NoReading, Orientation, PerBand, Reading, SampleFormat, Signal, encode_wav, write_atomically,
 };
 use sabine::diagnose::{ExtendedModel, ModelChange, read_laws};
-use sabine::paths::laws::{BoundLaws, LawError, LawSite};
+use sabine::paths::laws::{BoundLaws, LawSite};
 use sabine::paths::{Conditions, PathParameters, PathSet, Propagator};
 use sabine::propagate::{
     AmbisonicRenderer, MeshReport, PathTracer, PressureRenderer, RenderConfig, TracerConfig,
@@ -132,18 +133,7 @@ fn use_threads(asked: usize) -> Result<(), Failure> {
 /// Whatever stands in the way, in words for the user.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let file = arguments.laws.as_ref().or(arguments.model.as_ref());
-    trace_room(arguments).map_err(|failure| naming_laws(failure, file))
-}
-
-/// A failure of laws, with the file that they came from.
-fn naming_laws(failure: Failure, file: Option<&PathBuf>) -> Failure {
-    let first: &(dyn std::error::Error + 'static) = &*failure;
-    let of_law =
-        std::iter::successors(Some(first), |error| error.source()).any(|error| error.is::<LawError>());
-    match file.map(|path| path.display().to_string()) {
-        Some(file) if of_law && !failure.to_string().contains(&file) => format!("{file}: {failure}").into(),
-        _ => failure,
-    }
+    trace_room(arguments).map_err(|failure| naming_laws(failure, file.map(PathBuf::as_path)))
 }
 
 fn trace_room(arguments: &Arguments) -> Result<(), Failure> {

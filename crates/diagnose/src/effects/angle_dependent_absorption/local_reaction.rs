@@ -13,8 +13,6 @@ const HALVES: [i32; 5] = [-1, 0, 1, 2, 3];
 const OCTAVES: usize = 4;
 /// Place of none in the grid.
 const NO_SHARE: usize = 1;
-/// Energy of a bin without paths, as a share of the strongest: it counts as nothing.
-const NOTHING: f64 = 1e-12;
 
 /// Logarithm of the change of the energy of each bin of one band and pair, `[grid][bin]`.
 pub(super) struct LocalReactionTable(Vec<Vec<f64>>);
@@ -62,9 +60,7 @@ fn of_bins(pair: &TracedPairView<'_>) -> Result<Vec<LocalReactionTable>, Error> 
                 }
                 let changed: Vec<f32> =
                     energies[band].iter().zip(&halves).map(|(e, half)| e * half.powi(power)).collect();
-                let sums = pair.bin_energies(band, &changed);
-                let floor = NOTHING * sums.iter().copied().fold(0.0, f64::max).max(1e-30);
-                sums.iter().zip(pair.ln_energy(band)).map(|(s, l)| s.max(floor).ln() - l).collect()
+                pair.ln_changes(band, &changed)
             };
             found.push(LocalReactionTable(HALVES.iter().enumerate().map(one).collect()));
         }

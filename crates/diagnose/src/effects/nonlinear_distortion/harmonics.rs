@@ -87,7 +87,7 @@ pub(super) fn fit(responses: &PreArrival, used: &[bool]) -> Result<Option<Auxili
             value,
             low: (value - HALF_90 * sd).max(p.bounds.0),
             high: (value + HALF_90 * sd).min(p.bounds.1),
-            unit: p.unit.to_owned(),
+            unit: p.unit.to_string(),
         }
     });
     Ok(Some(AuxiliaryEvidence { nats: best.log_evidence - base.log_evidence, parameters: found.collect() }))

@@ -428,3 +428,29 @@ fn no_laws_and_laws_that_do_nothing_are_the_same_to_the_byte() {
     let fault = paths.delays_s(&conditions.with_laws(&zero)).unwrap();
     assert!(fault.is_none());
 }
+
+/// Six bands leave two of eight lanes over, in which the weight of a path that stands for many is all there is.
+#[test]
+fn paths_that_stand_for_many_are_not_too_loud() {
+    let known: Vec<Known> = (0..2000)
+        .map(|i| Known {
+            length_m: 100.0 + 0.1 * f64::from(i),
+            departure: [1.0, 0.0, 0.0],
+            arrival: [0.0, 0.0, 1.0],
+            meetings: vec![(FLOOR, false, 0.5); 12],
+            back: 0,
+        })
+        .collect();
+    let (mut paths, (site, _)) = (path_set(&known), site());
+    paths.thin(&vec![1e-25; known.len()], 1).unwrap();
+    paths = if paths.is_empty() { path_set(&known) } else { paths };
+    let walls = vec![Material::uniform(bands(), 0.99, 0.2).unwrap(); 6];
+    let air = Air::default();
+    let taken = law(LawTarget::Reflection, Some("floor"), "-a * (1 - cos_incidence)", &[("a", 1.0, "dB")]);
+    let bound = BoundLaws::new(&[taken], &site).unwrap();
+    let conditions = Conditions::new(&walls, &air);
+    let plain = paths.energies(&conditions).unwrap();
+    let under = paths.energies(&conditions.with_laws(&bound)).unwrap();
+    let ratio = f64::from(under[0][0]) / f64::from(plain[0][0]);
+    assert!((ratio - 10f64.powf(-0.6)).abs() < 0.01, "{ratio}");
+}

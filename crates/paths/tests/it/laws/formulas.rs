@@ -355,3 +355,48 @@ proptest! {
         }
     }
 }
+
+/// A parameter is the amplitude if doubling it doubles the law, whatever else stands in it.
+#[test]
+fn the_amplitude_is_what_the_whole_law_is_proportional_to() {
+    let of = |formula: &str| {
+        let parameters = ["a", "k"].into_iter().filter(|name| formula.contains(name));
+        let parameters = parameters.map(|name| (name, LawParameter::new(2.0, [0.0, 9.0], "dB")));
+        let law = Law::new("l", LawTarget::Path, None, formula, parameters).unwrap();
+        let amplitude = law.amplitude().map(str::to_owned);
+        if let Some(name) = &amplitude {
+            let values: Vec<f64> =
+                law.parameters().map(|(own, p)| if own == name { 4.0 } else { p.value }).collect();
+            let at = |law: &Law| law.value(|_| Some(0.7)).unwrap();
+            let (once, twice) = (at(&law), at(&law.with_values(&values).unwrap()));
+            assert!((twice - 2.0 * once).abs() < 1e-12 && once != 0.0, "{formula}: {once} {twice}");
+        }
+        amplitude
+    };
+    for formula in ["-a * reflections", "a / 2 + a * reflections", "scatterings * (a - 3 * a)"] {
+        assert_eq!(of(formula).as_deref(), Some("a"), "{formula}");
+    }
+    // Of two the first by name; proportional to the second alone.
+    assert_eq!(of("k * (1 + (a / k) * 0) * a / k").as_deref(), None);
+    assert_eq!(of("k * exp(-a / k) + 0 * a").as_deref(), None);
+    assert_eq!(of("k * cos(a / a)").as_deref(), Some("k"));
+    for formula in ["a + 1 * k", "abs(a)", "max(a, k)", "a ^ 1", "a * a / a", "k * k / a"] {
+        assert_eq!(of(formula), None, "{formula}");
+    }
+}
+
+#[test]
+fn a_law_times_a_number_has_that_number_as_a_parameter() {
+    let parameters =
+        [("a", LawParameter::new(2.0, [0.0, 3.0], "dB")), ("b", LawParameter::new(1.0, [0.0, 2.0], "dB"))];
+    let law = Law::new("l", LawTarget::Path, None, "a * reflections + b", parameters)
+        .unwrap()
+        .with_words("Louder.");
+    assert_eq!(law.amplitude(), None);
+    let twice = law.times("strength", LawParameter::new(2.0, [-3.0, 3.0], "1")).unwrap();
+    assert_eq!((twice.amplitude(), twice.words(), twice.id()), (Some("strength"), "Louder.", "l"));
+    let at = |law: &Law| law.value(|_| Some(5.0)).unwrap();
+    assert_eq!((at(&law), at(&twice)), (11.0, 22.0));
+    let taken = law.times("a", LawParameter::new(2.0, [-3.0, 3.0], "1")).unwrap_err();
+    assert!(taken.to_string().contains("parameters.a"), "{taken}");
+}

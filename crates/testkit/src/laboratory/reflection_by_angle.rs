@@ -1,7 +1,8 @@
-//! Walls that react locally: what they reflect follows from their impedance and the angle.
+//! Walls that reflect by the angle at which sound meets them.
 //!
-//! P. M. Morse and K. U. Ingard, *Theoretical Acoustics*, 1968, 6.3: a wall of the real specific impedance z reflects the pressure
-//! (z cos - 1) / (z cos + 1) of a plane wave. Its random-incidence absorption is the mean over all directions, weighed by the cosine.
+//! Locally reacting ones: P. M. Morse and K. U. Ingard, *Theoretical Acoustics*, 1968, 6.3: a wall of the real specific impedance z reflects
+//! the pressure (z cos - 1) / (z cos + 1) of a plane wave. Its random-incidence absorption is the mean over all directions, weighed by the
+//! cosine.
 
 use super::hidden::Hidden;
 use super::truth::Truth;
@@ -14,34 +15,51 @@ const HARDEST: f64 = 1e5;
 const LEAST_REFLECTED: f64 = 1e-3;
 
 /// Logarithm of what each wall reflects over what it reflects of sound from everywhere, `[band][face][angle]`, angles evenly by cosine.
-pub(crate) struct LocalReaction {
+pub(crate) struct ReflectionByAngle {
     tables: Vec<[Vec<f64>; 6]>,
 }
 
-impl LocalReaction {
-    /// None unless the effect is at work.
+impl ReflectionByAngle {
+    /// None unless an effect of this kind is at work.
     pub(crate) fn of(truth: &Truth) -> Option<Self> {
-        let share = truth.effects.iter().find_map(|e| match e {
-            Hidden::AngleDependentAbsorption { share } => Some(*share),
-            _ => None,
-        })?;
+        let by_angle = |e: &&Hidden| {
+            matches!(e, Hidden::AngleDependentAbsorption { .. } | Hidden::GrazingAbsorption { .. })
+        };
+        let effects: Vec<&Hidden> = truth.effects.iter().filter(by_angle).collect();
         let face = |band: usize, face: usize| {
-            let absorption = truth.materials[truth.faces[face]].absorption[band];
-            let impedance = impedance(absorption);
-            let off = |angle: usize| {
-                let cosine = (angle as f64 + 0.5) / ANGLES as f64;
-                share * (reflected(impedance, cosine).ln() - (1.0 - absorption).ln())
-            };
-            (0..ANGLES).map(off).collect()
+            let mut by_angle = vec![0.0; ANGLES];
+            effects.iter().for_each(|effect| add(truth, effect, (band, face), &mut by_angle));
+            by_angle
         };
         let tables = (0..truth.bands_hz.len()).map(|b| std::array::from_fn(|f| face(b, f))).collect();
-        Some(Self { tables })
+        (!effects.is_empty()).then_some(Self { tables })
     }
 
     /// Factor of an image's energy in a band, given how often it met each face, and the cosine along each axis.
     pub(crate) fn factor(&self, band: usize, met: [f64; 6], cosines: [f64; 3]) -> f64 {
         let angle = cosines.map(|c| ((c.abs() * ANGLES as f64) as usize).min(ANGLES - 1));
         (0..6).map(|f| met[f] * self.tables[band][f][angle[f / 2]]).sum::<f64>().exp()
+    }
+}
+
+/// Adds what an effect does to the logarithm of what a face reflects in a band, at all angles.
+fn add(truth: &Truth, effect: &Hidden, (band, face): (usize, usize), by_angle: &mut [f64]) {
+    let own = truth.faces[face];
+    let cosines = (0..ANGLES).map(|angle| (angle as f64 + 0.5) / ANGLES as f64);
+    match effect {
+        Hidden::AngleDependentAbsorption { share } => {
+            let absorption = truth.materials[own].absorption[band];
+            let impedance = impedance(absorption);
+            let off = |cosine: f64| share * (reflected(impedance, cosine).ln() - (1.0 - absorption).ln());
+            by_angle.iter_mut().zip(cosines).for_each(|(sum, cosine)| *sum += off(cosine));
+        }
+        Hidden::GrazingAbsorption { material, db, from_hz }
+            if *material == own && truth.bands_hz[band] >= *from_hz =>
+        {
+            let off = |cosine: f64| -db * (1.0 - cosine).powi(2) * std::f64::consts::LN_10 / 10.0;
+            by_angle.iter_mut().zip(cosines).for_each(|(sum, cosine)| *sum += off(cosine));
+        }
+        _ => {}
     }
 }
 

@@ -1,0 +1,104 @@
+//! A law that no catalogue lists, hidden in a laboratory room, is told from laws that are not at work.
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
+use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, Error, Verdict};
+use sabine_paths::laws::{Law, LawParameter, LawTarget};
+use sabine_scene::MeasuredRoom;
+use sabine_testkit::{Hidden, LabConfig, Laboratory};
+
+/// What the floor takes of sound that grazes it.
+const HIDDEN_DB: f64 = 6.0;
+
+fn room(hidden: &[Hidden]) -> (tempfile::TempDir, MeasuredRoom) {
+    let lab = Laboratory::new(LabConfig { seed: 24_110, receivers: 8, ..LabConfig::default() }).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let room = lab.write(hidden, &folder.path().join("room"), None).unwrap();
+    (folder, room)
+}
+
+fn law(id: &str, target: LawTarget, surface: Option<&str>, formula: &str, unit: &str) -> Law {
+    let a = ("a", LawParameter::new(3.0, [0.0, 15.0], unit));
+    let edge = formula.contains("f0").then(|| ("f0", LawParameter::new(1.0, [0.5, 2.0], "kHz")));
+    Law::new(id, target, surface, formula, edge.into_iter().chain([a])).unwrap()
+}
+
+/// The law that is at work, on its own material and on the others, and two that have nothing to do with it.
+fn laws(room: &MeasuredRoom) -> Vec<Law> {
+    let grazing = "-a * (1 - cos_incidence)^2 * above(frequency_hz, f0)";
+    let names = room.scene().materials().iter().map(|m| m.name.clone());
+    let mut all: Vec<Law> = names
+        .map(|name| law(&format!("grazing_{name}"), LawTarget::Reflection, Some(&name), grazing, "dB"))
+        .collect();
+    all.push(law(
+        "long_paths",
+        LawTarget::Path,
+        None,
+        "-a / 100 * length_m * above(frequency_hz, f0)",
+        "dB/m",
+    ));
+    all.push(law("drift", LawTarget::Recorder, None, "a * file_time_s", "dB/s"));
+    all
+}
+
+fn diagnose(room: &MeasuredRoom, laws: Vec<Law>) -> Result<Diagnosis, Error> {
+    let config = DiagnoseConfig { rays: 1000, ..DiagnoseConfig::default() };
+    // What else takes sound from some reflections, or from long paths.
+    let rivals = [
+        "surface_absorption",
+        "scattering",
+        "angle_dependent_absorption",
+        "air_absorption",
+        "transducer_response",
+    ];
+    let rivals = rivals.map(str::to_owned);
+    Diagnoser::new(config)?.with_only(&rivals)?.with_laws(laws)?.diagnose(room, &[], &())
+}
+
+#[test]
+fn a_hidden_law_is_named_with_its_size_and_rendered() {
+    let hidden = Hidden::GrazingAbsorption { material: 0, db: HIDDEN_DB, from_hz: 1000.0 };
+    let (_folder, room) = room(&[hidden]);
+    let id = format!("grazing_{}", room.scene().materials()[0].name);
+    let found = diagnose(&room, laws(&room)).unwrap();
+    let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
+    assert_eq!(named, [&id], "{:?} {:?}", found.candidates, found.lack_of_fit);
+    assert_eq!(found.verdict, Verdict::Explained);
+    let amplitude = &found.causes[0].parameters[0];
+    assert!(amplitude.name == "a" && amplitude.unit == "dB" && amplitude.low > 0.0, "{amplitude:?}");
+    assert!((amplitude.value - HIDDEN_DB).abs() < 2.0, "{amplitude:?}");
+    assert!(found.causes[0].held_out_gain.clone().unwrap().low > 0.0);
+    // What is named is rendered, with its interval.
+    let own = &found.model.laws[0];
+    let (_, parameter) = own.parameters().next().unwrap();
+    assert_eq!(
+        [parameter.value, parameter.low, parameter.high],
+        [amplitude.value, amplitude.low, amplitude.high]
+    );
+    assert!(own.id() == id && found.model.room(&room).is_ok());
+}
+
+#[test]
+fn where_no_law_is_at_work_none_is_named() {
+    let (_folder, room) = room(&[]);
+    let found = diagnose(&room, laws(&room)).unwrap();
+    assert_eq!(found.verdict, Verdict::Adequate, "{:?}", found.causes);
+    assert!(found.causes.is_empty() && found.model.laws.is_empty());
+}
+
+#[test]
+fn laws_that_cannot_be_weighed_say_why() {
+    let (_folder, room) = room(&[]);
+    let said = |law: Law| diagnose(&room, vec![law]).unwrap_err().to_string();
+    let late =
+        Law::new("late", LawTarget::Delay, None, "d", [("d", LawParameter::new(1.0, [0.0, 2.0], "ms"))])
+            .unwrap();
+    assert_eq!(said(late), "law `late`: a law of target `delay` is rendered, not weighed as a cause");
+    let known = law("scattering", LawTarget::Path, None, "a", "dB");
+    assert_eq!(said(known), "law `scattering`: an effect, or another law, has this identifier");
+    let nothing =
+        Law::new("no", LawTarget::Path, None, "a", [("a", LawParameter::new(0.0, [0.0, 0.0], "dB"))])
+            .unwrap();
+    assert_eq!(said(nothing), "law `no`: the interval of `a` is zero alone: nothing is left to fit");
+    let elsewhere = law("velvet", LawTarget::Reflection, Some("velvet"), "-a", "dB");
+    assert!(said(elsewhere).contains("velvet"));
+}
