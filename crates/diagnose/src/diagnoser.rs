@@ -2,7 +2,7 @@
 
 use crate::config::DiagnoseConfig;
 use crate::effect::Effect;
-use crate::effects::{LawEffect, catalogue};
+use crate::effects::{LawEffect, UnknownLaw, catalogue};
 use crate::error::Error;
 use crate::infer::baseline::Baseline;
 use crate::infer::candidates;
@@ -74,6 +74,13 @@ impl Diagnoser {
             self.effects.push(Box::new(LawEffect::new(law)?));
         }
         Ok(self)
+    }
+
+    /// With [`UnknownLaw`] beside its effects: what the misfit goes with, where no listed cause explains it.
+    #[must_use]
+    pub fn discovering(mut self) -> Self {
+        self.effects.push(Box::new(UnknownLaw));
+        self
     }
 
     /// With another tracer than that of `sabine-propagate`; [`EachScene`](crate::EachScene) makes one of any

@@ -25,6 +25,7 @@ mod surface_displacement;
 mod time_zero;
 mod transducer_response;
 mod truncation;
+mod unknown_law;
 
 pub use air_absorption::AirAbsorption;
 pub use angle_dependent_absorption::AngleDependentAbsorption;
@@ -51,6 +52,7 @@ pub use surface_displacement::SurfaceDisplacement;
 pub use time_zero::TimeZeroOffset;
 pub use transducer_response::TransducerResponse;
 pub use truncation::Truncation;
+pub use unknown_law::UnknownLaw;
 
 use crate::effect::Effect;
 

@@ -41,6 +41,9 @@ pub struct Arguments {
     /// Formulas to weigh as causes beside the catalogue, `[[laws]]` in TOML: a file, or a folder of such files
     #[arg(long, value_name = "FILE|DIR")]
     laws: Option<PathBuf>,
+    /// Look for a law beside the catalogue: what the misfit goes with (angles, lengths, directions, time), and by how much
+    #[arg(long)]
+    discover: bool,
     /// Rays for each source-receiver pair [default: 10000]
     #[arg(long)]
     rays: Option<usize>,
@@ -77,7 +80,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         ids if ids.is_empty() => catalogue().len(),
         ids => ids.iter().collect::<BTreeSet<_>>().len(),
     };
-    let tried = effects + laws.len();
+    let tried = effects + laws.len() + usize::from(arguments.discover);
     // What a name must reach: the odds that are asked for, and the number that was tried.
     let threshold_nats = config.naming_nats + (tried as f64).ln();
     let mut diagnoser = Diagnoser::new(config)?;
@@ -85,6 +88,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         diagnoser = diagnoser.with_only(&arguments.effects)?;
     }
     diagnoser = diagnoser.with_laws(laws)?;
+    if arguments.discover {
+        diagnoser = diagnoser.discovering();
+    }
     // A folder that cannot be written to should not cost the user a computation first.
     let mut out = OutputFolder::create(&arguments.out)?;
     let (room, name) = arguments.room.read(&mut demo)?;

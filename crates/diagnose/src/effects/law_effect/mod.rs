@@ -1,17 +1,17 @@
 //! A law as a cause: a formula that somebody wrote, weighed beside the catalogue.
 
+pub(super) mod tabulated_law;
+
 use crate::effect::{Case, DecayTerm, Effect, EffectInfo, FittedCase, Parameter, Stage};
 use crate::error::Error;
 use crate::extend::model_change::ModelChange;
-use crate::simulate::tables::{Tables, Unprepared, between};
-use crate::simulate::traced_views::{TracedPairView, TracedRoomView};
+use crate::simulate::tables::{Tables, Unprepared};
+use crate::simulate::traced_views::TracedRoomView;
 use crate::simulate::views::BandView;
 use crate::survey::Survey;
-use sabine_acoustics::Error as Cause;
-use sabine_paths::laws::{BoundLaws, Law, LawError, LawParameter, LawTarget};
+use sabine_paths::laws::{Law, LawParameter, LawTarget};
+use tabulated_law::{LawTable, TabulatedLaw};
 
-/// Amplitudes at which energies are tabulated, on each side of zero.
-const STEPS: usize = 6;
 /// Name of the amplitude of a law that has none of its own.
 const STRENGTH: &str = "strength";
 /// A strength of so much on either side is tried: the law as it was written, half as much again, or turned about.
@@ -39,13 +39,10 @@ const HALF_90: f64 = 1.645;
 /// ```
 #[derive(Clone, Debug)]
 pub struct LawEffect {
-    law: Law,
-    /// Which parameter of the law is its amplitude.
-    amplitude: usize,
+    law: TabulatedLaw,
+    /// Name and unit of its amplitude.
     name: String,
     unit: String,
-    /// Amplitudes at which energies are tabulated, as far apart on each side of zero.
-    grid: Vec<f64>,
 }
 
 impl LawEffect {
@@ -81,121 +78,57 @@ impl LawEffect {
         if low == high {
             return Err(refused(format!("the interval of `{name}` is zero alone: nothing is left to fit")));
         }
-        let side = |end: f64| (1..=STEPS).map(move |i| end * i as f64 / STEPS as f64).filter(|x| *x != 0.0);
-        let mut grid: Vec<f64> = side(low).chain([0.0]).chain(side(high)).collect();
-        grid.sort_by(f64::total_cmp);
         let (name, unit) =
             (name.to_owned(), if parameter.unit == "1" { "" } else { &parameter.unit }.to_owned());
-        Ok(Self { law, amplitude, name, unit, grid })
-    }
-
-    /// The law at an amplitude, in an interval of it.
-    fn at(&self, amplitude: f64, interval: [f64; 2]) -> Result<Law, LawError> {
-        let (mut values, mut intervals): (Vec<f64>, Vec<[f64; 2]>) =
-            self.law.parameters().map(|(_, p)| (p.value, [p.low, p.high])).unzip();
-        values[self.amplitude] = amplitude;
-        intervals[self.amplitude] = interval;
-        self.law.with_fitted(&values, &intervals)
-    }
-
-    /// Energies of a pair's paths at an amplitude.
-    fn energies(&self, pair: &TracedPairView<'_>, amplitude: f64) -> Result<Vec<Vec<f32>>, Error> {
-        let law = self.at(amplitude, [amplitude; 2]).map_err(Cause::from)?;
-        let bound = BoundLaws::new(&[law], &pair.law_site()).map_err(Cause::from)?;
-        pair.energies_under(&bound)
-    }
-
-    /// Tables of all bands. The decibels of a law go with its amplitude: each step multiplies the energy of a path by the same factor.
-    fn tables(&self, pair: &TracedPairView<'_>) -> Result<Vec<LawTable>, Error> {
-        let without = pair.energies(pair.room().materials())?;
-        let zero = self.grid.iter().position(|x| *x == 0.0).unwrap_or(0);
-        let (below, above) = (self.grid[..zero].iter().rev(), self.grid[zero + 1..].iter());
-        let one_side = |amplitudes: Vec<f64>| -> Result<Vec<Vec<Vec<f64>>>, Error> {
-            let (Some(&first), Some(&last)) = (amplitudes.first(), amplitudes.last()) else {
-                return Ok(vec![Vec::new(); without.len()]);
-            };
-            // Where the law would be too loud is an error, not a number.
-            self.energies(pair, last)?;
-            let stepped = self.energies(pair, first)?;
-            let in_band = |band: usize| {
-                let mut energies = without[band].clone();
-                let factors: Vec<f32> = energies
-                    .iter()
-                    .zip(&stepped[band])
-                    .map(|(e, s)| if *e > 0.0 { s / e } else { 0.0 })
-                    .collect();
-                let mut step = || {
-                    energies.iter_mut().zip(&factors).for_each(|(e, factor)| *e *= factor);
-                    pair.ln_changes(band, &energies)
-                };
-                amplitudes.iter().map(|_| step()).collect()
-            };
-            Ok((0..without.len()).map(in_band).collect())
-        };
-        let (below, above) = (one_side(below.copied().collect())?, one_side(above.copied().collect())?);
-        let joined = |(mut below, above): (Vec<Vec<f64>>, Vec<Vec<f64>>)| {
-            below.reverse();
-            below.push(vec![0.0; above.first().or(below.first()).map_or(0, Vec::len)]);
-            below.extend(above);
-            LawTable { grid: self.grid.clone(), ln_changes: below }
-        };
-        Ok(below.into_iter().zip(above).map(joined).collect())
+        Ok(Self { law: TabulatedLaw::new(law, amplitude, (low, high)), name, unit })
     }
 }
 
 impl Effect for LawEffect {
     fn info(&self) -> EffectInfo {
-        let printed = self.law.printed();
-        let words = self.law.words();
+        let law = &self.law.law;
+        let (printed, words) = (law.printed(), law.words());
         let explanation = if words.is_empty() {
-            format!("The law `{printed}` is at work on each {}.", self.law.target())
+            format!("The law `{printed}` is at work on each {}.", law.target())
         } else {
             words.to_owned()
         };
-        EffectInfo::new(self.law.id().to_owned(), format!("Law {}: {printed}", self.law.id()), explanation)
+        EffectInfo::new(law.id().to_owned(), format!("Law {}: {printed}", law.id()), explanation)
     }
 
     fn cases(&self, _: &Survey) -> Vec<Case> {
-        let (low, high) = (self.grid[0], self.grid[self.grid.len() - 1]);
+        let (low, high) = self.law.range();
         let farther = if -low > high { low } else { high };
         let amplitude =
             Parameter::new(self.name.clone(), self.unit.clone(), 0.0, farther.abs() / HALF_90, (low, high));
         let starts = [0.1 * farther, 0.6 * farther].map(|start| vec![start]).to_vec();
-        let own = self.clone();
+        let own = self.law.clone();
         let changes = move |fitted: &FittedCase<'_>| {
             let value = fitted.values()[0];
             // What was fitted lies in its interval.
             own.at(value, fitted.interval(0))
                 .map_or_else(|_| Vec::new(), |law| vec![ModelChange::Law(Box::new(law))])
         };
-        let stage = if self.law.target() == LawTarget::Recorder { Stage::Recorder } else { Stage::Room };
+        let stage = if self.law.law.target() == LawTarget::Recorder { Stage::Recorder } else { Stage::Room };
         let case = Case::decay(vec![amplitude.typically(0.5 * farther)], self.clone());
         vec![case.at(stage).starting(starts).changing(changes)]
     }
 }
 
-/// Logarithm of the change of the energy of each bin of one band and pair, `[grid][bin]`.
-#[derive(Clone)]
-struct LawTable {
-    grid: Vec<f64>,
-    ln_changes: Vec<Vec<f64>>,
-}
-
 impl DecayTerm for LawEffect {
     fn prepare(&self, room: &TracedRoomView<'_>) -> Result<Tables, Unprepared> {
-        Ok(Tables::of_bins(room.by_pair(|pair| self.tables(pair))?))
+        self.law.prepare(room)
     }
 
     #[cfg(test)]
     fn by_hand(&self, bins: usize) -> Option<Box<dyn std::any::Any + Send + Sync>> {
-        let at = |x: &f64| (0..bins).map(|bin| 0.3 * x * (1.1 * bin as f64 + 1.0).sin()).collect();
-        Some(Box::new(LawTable { grid: self.grid.clone(), ln_changes: self.grid.iter().map(at).collect() }))
+        Some(Box::new(LawTable::by_hand(&self.law, bins)))
     }
 
     fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
         let Some(table) = view.table::<LawTable>() else { return };
         for (bin, ln) in ln_energy.iter_mut().enumerate() {
-            *ln += between(&table.grid, &table.ln_changes, bin, values[0]);
+            *ln += table.change(bin, values[0]);
         }
     }
 }
