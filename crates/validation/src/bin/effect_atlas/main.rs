@@ -56,6 +56,9 @@ struct Arguments {
     /// Third octaves in place of octaves
     #[arg(long)]
     third_octaves: bool,
+    /// Look for a law that no catalogue lists, too; to be kept in a record of its own
+    #[arg(long)]
+    discover: bool,
     /// Follow every set of causes up by the measurement that it asks for, and by another
     #[arg(long)]
     decide: bool,
@@ -141,6 +144,7 @@ fn tasks(arguments: &Arguments) -> Vec<Task> {
                     sessions: arguments.sessions,
                     positive_reflections: arguments.positive_reflections,
                     bands_per_octave: if arguments.third_octaves { 3 } else { 1 },
+                    discover: arguments.discover,
                     decide: arguments.decide,
                     rays: arguments.rays,
                     range_db: arguments.range_db,

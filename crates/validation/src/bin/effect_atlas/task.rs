@@ -29,6 +29,8 @@ pub struct Task {
     pub position_sd_m: f64,
     /// Effects without meaning that stand beside the catalogue.
     pub shams: usize,
+    /// Whether a law that no catalogue lists is looked for.
+    pub discover: bool,
     /// Whether a set is followed up by the measurement that it asks for, and by another.
     pub decide: bool,
 }
@@ -78,7 +80,9 @@ impl Task {
         };
         let mut effects = catalogue();
         effects.extend((0..self.shams.min(IDS.len())).map(|n| Box::new(Sham::new(n)) as _));
-        let found = Diagnoser::new(config)?.with_effects(effects).diagnose(&room, &[], &())?;
+        let diagnoser = Diagnoser::new(config)?.with_effects(effects);
+        let diagnoser = if self.discover { diagnoser.discovering() } else { diagnoser };
+        let found = diagnoser.diagnose(&room, &[], &())?;
         std::fs::remove_dir_all(folder)?;
         Ok(found)
     }
