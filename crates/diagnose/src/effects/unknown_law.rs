@@ -1,6 +1,6 @@
 //! `unknown_law`: a cause that no catalogue lists, by what it goes with.
 
-use super::law_effect::tabulated_law::{LawTable, TabulatedLaw};
+use super::law_effect::tabulated_law::TabulatedLaw;
 use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, DecayTerm, Effect, EffectInfo, FittedCase, Parameter, Stage};
 use crate::extend::model_change::ModelChange;
@@ -113,7 +113,7 @@ impl Covariate {
     }
 
     fn case(&self) -> Result<Case, LawError> {
-        let least = if self.both_signs { -MOST_DB } else { 0.0 };
+        let least = self.least_db();
         let law = self.law("-a", vec![("a", LawParameter::new(0.0, [least, MOST_DB], "dB"))])?;
         let index = law.parameters().position(|(name, _)| name == "a").unwrap_or(0);
         let term = OverBands { law: TabulatedLaw::new(law, index, (least, MOST_DB)) };
@@ -143,6 +143,11 @@ impl Covariate {
         Ok(Case::decay(parameters, term).about(subject).at(stage).starting(starts).changing(changes))
     }
 
+    /// Least amplitude that is sought.
+    fn least_db(&self) -> f64 {
+        if self.both_signs { -MOST_DB } else { 0.0 }
+    }
+
     fn of_what(&self) -> &'static str {
         if self.target == LawTarget::Recorder { "what is recorded" } else { "the level of paths" }
     }
@@ -152,10 +157,18 @@ impl Covariate {
         let own = Self { surface: self.surface.clone(), ..*self };
         move |at_1_khz, per_octave| {
             let amplitude = "a + b * ln(frequency_hz / f) / 0.6931471805599453";
-            let factor =
-                if own.both_signs { format!("-({amplitude})") } else { format!("-max({amplitude}, 0)") };
-            let hz = LawParameter::new(AT_HZ, [AT_HZ; 2], "Hz");
-            own.law(&factor, vec![("a", at_1_khz), ("b", per_octave), ("f", hz)])
+            // As far as amplitudes are sought, so that what renders is what was fitted.
+            let factor = format!("-min(max({amplitude}, low), high)");
+            let known = |value: f64, unit: &str| LawParameter::new(value, [value; 2], unit);
+            let (low, high) = (known(own.least_db(), "dB"), known(MOST_DB, "dB"));
+            let parameters = vec![
+                ("a", at_1_khz),
+                ("b", per_octave),
+                ("f", known(AT_HZ, "Hz")),
+                ("low", low),
+                ("high", high),
+            ];
+            own.law(&factor, parameters)
         }
     }
 }
@@ -179,14 +192,33 @@ impl DecayTerm for OverBands {
 
     #[cfg(test)]
     fn by_hand(&self, bins: usize) -> Option<Box<dyn std::any::Any + Send + Sync>> {
-        Some(Box::new(LawTable::by_hand(&self.law, bins)))
+        Some(self.law.by_hand(bins))
     }
 
     fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
-        let Some(table) = view.table::<LawTable>() else { return };
-        let amplitude_db = self.amplitude_db(values, view);
-        for (bin, ln) in ln_energy.iter_mut().enumerate() {
-            *ln += table.change(bin, amplitude_db);
+        self.law.apply(self.amplitude_db(values, view), view, ln_energy);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hand_made;
+    use sabine_scene::{Levels, TimeZero};
+
+    #[test]
+    fn every_covariate_is_a_case_whose_law_takes_what_was_fitted() {
+        let survey = hand_made::survey(Levels::Common, TimeZero::Emission);
+        let cases = UnknownLaw.cases(&survey);
+        assert_eq!(cases.len(), 2 * survey.materials().len() + OF_PATHS.len() + OF_RECORDINGS.len());
+        // Carpet at grazing incidence: 4 dB at 1 kHz and 3 dB more each octave, up to 10 dB, nothing below zero.
+        let changes = cases[0].model_changes(&FittedCase::of_values(&survey, &[4.0, 3.0]));
+        let [ModelChange::Law(law)] = changes.as_slice() else { panic!("{changes:?}") };
+        for (hz, taken_db) in [(1000.0, 4.0), (2000.0, 7.0), (16_000.0, 10.0), (250.0, 0.0)] {
+            let at = |name: &str| Some(if name == "frequency_hz" { hz } else { 0.0 });
+            let found = law.value(at).expect("a value");
+            assert!((found + taken_db).abs() < 1e-9, "{hz}: {found}");
         }
+        assert_eq!((law.id(), law.surface()), ("grazing_carpet", Some("carpet")));
     }
 }

@@ -7,7 +7,7 @@ use crate::likelihood::laplace::LaplaceFit;
 use crate::report::diagnosis::FoundParameter;
 
 /// Half the width of a 90 % interval in standard deviations.
-const HALF_90: f64 = 1.645;
+pub(crate) const HALF_90: f64 = 1.645;
 /// The data speak of a parameter if they leave less than this share of what was known of it beforehand.
 const TOLD_SHARE: f64 = 0.8;
 

@@ -5,19 +5,18 @@ pub(super) mod tabulated_law;
 use crate::effect::{Case, DecayTerm, Effect, EffectInfo, FittedCase, Parameter, Stage};
 use crate::error::Error;
 use crate::extend::model_change::ModelChange;
+use crate::report::found_parameters::HALF_90;
 use crate::simulate::tables::{Tables, Unprepared};
 use crate::simulate::traced_views::TracedRoomView;
 use crate::simulate::views::BandView;
 use crate::survey::Survey;
 use sabine_paths::laws::{Law, LawParameter, LawTarget};
-use tabulated_law::{LawTable, TabulatedLaw};
+use tabulated_law::TabulatedLaw;
 
 /// Name of the amplitude of a law that has none of its own.
 const STRENGTH: &str = "strength";
 /// A strength of so much on either side is tried: the law as it was written, half as much again, or turned about.
 const STRENGTHS: [f64; 2] = [-1.5, 1.5];
-/// Half the width of a 90 % interval in standard deviations.
-const HALF_90: f64 = 1.645;
 
 /// A law whose amplitude is fitted: the parameter in proportion to which the whole law goes ([`Law::amplitude`]), or else a `strength` that
 /// multiplies the formula and is 1 where the law holds as it was written. Other parameters keep the values that were written.
@@ -122,13 +121,10 @@ impl DecayTerm for LawEffect {
 
     #[cfg(test)]
     fn by_hand(&self, bins: usize) -> Option<Box<dyn std::any::Any + Send + Sync>> {
-        Some(Box::new(LawTable::by_hand(&self.law, bins)))
+        Some(self.law.by_hand(bins))
     }
 
     fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
-        let Some(table) = view.table::<LawTable>() else { return };
-        for (bin, ln) in ln_energy.iter_mut().enumerate() {
-            *ln += table.change(bin, values[0]);
-        }
+        self.law.apply(values[0], view, ln_energy);
     }
 }

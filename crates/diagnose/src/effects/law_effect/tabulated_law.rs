@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::simulate::tables::{Tables, Unprepared, between};
 use crate::simulate::traced_views::{TracedPairView, TracedRoomView};
+use crate::simulate::views::BandView;
 use sabine_acoustics::Error as Cause;
 use sabine_paths::laws::{BoundLaws, Law, LawError};
 
@@ -36,6 +37,21 @@ impl TabulatedLaw {
     /// Tables for all bins.
     pub fn prepare(&self, room: &TracedRoomView<'_>) -> Result<Tables, Unprepared> {
         Ok(Tables::of_bins(room.by_pair(|pair| self.tables(pair))?))
+    }
+
+    /// Changes the bins of a view by the law at an amplitude.
+    pub fn apply(&self, amplitude: f64, view: &BandView<'_>, ln_energy: &mut [f64]) {
+        let Some(table) = view.table::<LawTable>() else { return };
+        for (bin, ln) in ln_energy.iter_mut().enumerate() {
+            *ln += between(&table.grid, &table.ln_changes, bin, amplitude);
+        }
+    }
+
+    /// A table without traced paths, for unit tests of likelihoods.
+    #[cfg(test)]
+    pub fn by_hand(&self, bins: usize) -> Box<dyn std::any::Any + Send + Sync> {
+        let at = |x: &f64| (0..bins).map(|bin| 0.3 * x * (1.1 * bin as f64 + 1.0).sin()).collect();
+        Box::new(LawTable { grid: self.grid.clone(), ln_changes: self.grid.iter().map(at).collect() })
     }
 
     /// The law at an amplitude, in an interval of it.
@@ -94,20 +110,7 @@ impl TabulatedLaw {
 
 /// Logarithm of the change of the energy of each bin of one band and pair, `[grid][bin]`.
 #[derive(Clone)]
-pub(crate) struct LawTable {
+struct LawTable {
     grid: Vec<f64>,
     ln_changes: Vec<Vec<f64>>,
-}
-
-impl LawTable {
-    /// The change of a bin at an amplitude.
-    pub fn change(&self, bin: usize, amplitude: f64) -> f64 {
-        between(&self.grid, &self.ln_changes, bin, amplitude)
-    }
-
-    #[cfg(test)]
-    pub fn by_hand(law: &TabulatedLaw, bins: usize) -> Self {
-        let at = |x: &f64| (0..bins).map(|bin| 0.3 * x * (1.1 * bin as f64 + 1.0).sin()).collect();
-        Self { grid: law.grid.clone(), ln_changes: law.grid.iter().map(at).collect() }
-    }
 }
