@@ -3,7 +3,7 @@
 use crate::channel;
 use crate::commands::{
     augment, deconvolve, diagnose, eq, estimate, evaluate, export, fit, import, listen, live, match_room,
-    materials, measure, mix, new_room, plan, replace, sweep, trace, train, validate, walk,
+    materials, measure, mix, model, new_room, plan, replace, sweep, trace, train, validate, walk,
 };
 use crate::console;
 use crate::failure::Failure;
@@ -50,6 +50,8 @@ enum Job {
     Fit(fit::Arguments),
     /// Find what a simulation of a room gets wrong against measured responses
     Diagnose(diagnose::Arguments),
+    /// Show extended models of `diagnose`, fit them anew, join them, take causes out, draw from them
+    Model(model::Arguments),
     /// Plan the next measurement of a room: which one decides between causes, and by how much
     Plan(plan::Arguments),
     /// Replace a material of a room and predict what changes
@@ -164,6 +166,7 @@ impl Job {
             Self::Walk(arguments) => walk::run(arguments),
             Self::Fit(arguments) => fit::run(arguments),
             Self::Diagnose(arguments) => diagnose::run(arguments),
+            Self::Model(arguments) => model::run(arguments),
             Self::Plan(arguments) => plan::run(arguments),
             Self::Replace(arguments) => replace::run(arguments),
             Self::Validate(arguments) => validate::run(arguments),

@@ -15,6 +15,7 @@ pub mod match_room;
 pub mod materials;
 pub mod measure;
 pub mod mix;
+pub mod model;
 pub mod new_room;
 pub mod plan;
 pub mod replace;

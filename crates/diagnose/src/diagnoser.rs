@@ -4,12 +4,14 @@ use crate::config::DiagnoseConfig;
 use crate::effect::Effect;
 use crate::effects::{LawEffect, UnknownLaw, catalogue};
 use crate::error::Error;
+use crate::extend::extended_model::ExtendedModel;
+use crate::extend::extension::extended_model;
 use crate::infer::baseline::Baseline;
-use crate::infer::candidates;
+use crate::infer::candidates::{self, CatalogueCase};
 use crate::infer::confirmation::confirm;
 use crate::infer::ray_dependence::more_with_half;
 use crate::infer::search::Search;
-use crate::infer::selection::select;
+use crate::infer::selection::{give, select};
 use crate::report::composition::compose;
 use crate::report::diagnosis::Diagnosis;
 use crate::simulate::scene_tracer::{Rays, SceneTracer};
@@ -34,6 +36,16 @@ pub struct Diagnoser {
     pub(crate) config: DiagnoseConfig,
     pub(crate) effects: Vec<Box<dyn Effect>>,
     tracer: Arc<dyn SceneTracer>,
+    /// Causes that are at work from the beginning.
+    given: Vec<GivenCause>,
+}
+
+/// A cause of a model from which a diagnosis starts.
+struct GivenCause {
+    id: String,
+    subject: Option<String>,
+    /// As it is called in the model.
+    name: String,
 }
 
 impl std::fmt::Debug for Diagnoser {
@@ -51,7 +63,7 @@ impl Diagnoser {
     pub fn new(config: DiagnoseConfig) -> Result<Self, Error> {
         config.check()?;
         let tracer = Arc::new(Rays { config: config.tracer() });
-        Ok(Self { config, effects: catalogue(), tracer })
+        Ok(Self { config, effects: catalogue(), tracer, given: Vec::new() })
     }
 
     /// With these effects instead.
@@ -83,6 +95,33 @@ impl Diagnoser {
         self
     }
 
+    /// Starting from an extended model: its causes are at work from the beginning, their parameters and the absorption fitted anew to the data
+    /// at hand, and the search goes on beside them. One for which these data do not speak is dropped, and a note says so. What is known of the
+    /// parameters beforehand is what the catalogue knows, not what the model found: data that it was fitted to may be given again.
+    ///
+    /// # Errors
+    /// [`Error::LawNotWeighed`] for a law of the model that is none of [`LawEffect`]. A cause without a case in the room is
+    /// [`Error::UnknownCause`] of [`Diagnoser::diagnose`].
+    pub fn starting_from(mut self, model: &ExtendedModel) -> Result<Self, Error> {
+        for cause in &model.causes {
+            let name = cause.name();
+            let knows = |effects: &[Box<dyn Effect>], id: &str| effects.iter().any(|e| e.id() == id);
+            // A law is that law wherever it came from.
+            if let Some(law) = cause.law() {
+                if !knows(&self.effects, law.id()) {
+                    self.effects.push(Box::new(LawEffect::new(law.clone())?));
+                }
+                self.given.push(GivenCause { id: law.id().to_owned(), subject: None, name });
+                continue;
+            }
+            if !knows(&self.effects, &cause.id) {
+                self.effects.extend(catalogue().into_iter().filter(|effect| effect.id() == cause.id));
+            }
+            self.given.push(GivenCause { id: cause.id.clone(), subject: cause.subject.clone(), name });
+        }
+        Ok(self)
+    }
+
     /// With another tracer than that of `sabine-propagate`; [`EachScene`](crate::EachScene) makes one of any
     /// [`Propagator`](sabine_paths::Propagator). [`DiagnoseConfig::rays`], `image_order` and `allow_leaks` then mean nothing.
     #[must_use]
@@ -102,6 +141,11 @@ impl Diagnoser {
         Ok(self)
     }
 
+    /// What a name must reach, in nats: the odds that are asked for, and the number of effects that are tried.
+    pub fn threshold_nats(&self) -> f64 {
+        self.config.naming_nats + (self.effects.len().max(1) as f64).ln()
+    }
+
     /// Diagnoses a measured room. Receivers in `hold_out` are never fitted and only predicted; without any, each group of
     /// receivers is left out in turn for that.
     ///
@@ -115,7 +159,54 @@ impl Diagnoser {
         observer: &dyn Observer,
     ) -> Result<Diagnosis, Error> {
         let held = held_receivers(room, hold_out)?;
-        let mut baseline = Baseline::new(room, &held, &self.config, &self.tracer, observer)?;
+        let Prepared { mut baseline, cases, given, used } = self.prepare(room, &held, observer)?;
+        let started = Instant::now();
+        let arrival_fits = Arc::default();
+        let fits = (&used[..], &arrival_fits);
+        let first_dispersion = baseline.dispersion.clone();
+        let effects = self.effects.len();
+        let named = give(&mut baseline, &cases, effects, fits, &given)?;
+        let mut found = select(&mut baseline, &cases, effects, fits, named, observer)?;
+        let other_rays = (&*self.tracer, observer);
+        found.more_with_half = more_with_half(&mut baseline, &cases, &found.chosen, &used, other_rays)?;
+        baseline.seconds.insert("search", started.elapsed().as_secs_f64());
+
+        let search = Search::new(&baseline, &cases, effects, used).knowing(&arrival_fits);
+        let confirmed = confirm(&search, &mut found, &held, observer)?;
+        let stands = |candidate: &usize| confirmed.state.chosen.contains(candidate);
+        let gone = given.iter().zip(&self.given).filter(|(candidate, _)| !stands(candidate));
+        let notes: Vec<String> = gone
+            .map(|(_, cause)| {
+                format!("The model's {} is not at work here: these data do not need it.", cause.name)
+            })
+            .collect();
+        let mut diagnosis = compose(&self.effects, &search, &found, confirmed, &first_dispersion, observer)?;
+        diagnosis.notes.extend(notes);
+        Ok(diagnosis)
+    }
+
+    /// The model from which the diagnosis starts, its parameters and the absorption fitted anew to a room's responses: nothing is looked for,
+    /// nothing is dropped. For the same room on another day, or with other positions.
+    ///
+    /// # Errors
+    /// As [`Diagnoser::diagnose`].
+    pub fn refit(&self, room: &MeasuredRoom, observer: &dyn Observer) -> Result<ExtendedModel, Error> {
+        let Prepared { mut baseline, cases, given, used } = self.prepare(room, &[], observer)?;
+        let (effects, arrival_fits) = (self.effects.len(), Arc::default());
+        give(&mut baseline, &cases, effects, (&used, &arrival_fits), &given)?;
+        let search = Search::new(&baseline, &cases, effects, used).knowing(&arrival_fits);
+        let base = search.state(&[], None)?;
+        Ok(extended_model(&search, &search.state(&given, Some(&base))?))
+    }
+
+    /// Traces and fits the baseline, and prepares the cases.
+    fn prepare(
+        &self,
+        room: &MeasuredRoom,
+        held: &[usize],
+        observer: &dyn Observer,
+    ) -> Result<Prepared, Error> {
+        let mut baseline = Baseline::new(room, held, &self.config, &self.tracer, observer)?;
         let used = baseline.observations.fitted.clone();
         let mut cases = candidates::cases(&self.effects, baseline.survey());
         // What cannot be prepared takes no part.
@@ -123,20 +214,24 @@ impl Diagnoser {
         let mut refused = baseline.prepare(&cases)?.into_iter();
         cases.retain(|_| !refused.next().unwrap_or(false));
         *baseline.seconds.entry("baseline").or_default() += started.elapsed().as_secs_f64();
-
-        let started = Instant::now();
+        let place = |cause: &GivenCause| {
+            let is_it = |own: &CatalogueCase| own.id == cause.id && own.case.subject == cause.subject;
+            let unknown = || Error::UnknownCause { cause: cause.name.clone() };
+            cases.iter().position(is_it).ok_or_else(unknown)
+        };
+        let given = self.given.iter().map(place).collect::<Result<_, Error>>()?;
         baseline.calibrate_scatter(&[], &used)?;
-        let arrival_fits = Arc::default();
-        let first_dispersion = baseline.dispersion.clone();
-        let mut found = select(&mut baseline, &cases, self.effects.len(), (&used, &arrival_fits), observer)?;
-        let other_rays = (&*self.tracer, observer);
-        found.more_with_half = more_with_half(&mut baseline, &cases, &found.chosen, &used, other_rays)?;
-        baseline.seconds.insert("search", started.elapsed().as_secs_f64());
-
-        let search = Search::new(&baseline, &cases, self.effects.len(), used).knowing(&arrival_fits);
-        let confirmed = confirm(&search, &mut found, &held, observer)?;
-        compose(&self.effects, &search, &found, confirmed, &first_dispersion, observer)
+        Ok(Prepared { baseline, cases, given, used })
     }
+}
+
+/// What a search starts from.
+struct Prepared {
+    baseline: Baseline,
+    cases: Vec<CatalogueCase>,
+    /// The given causes among the cases.
+    given: Vec<usize>,
+    used: Vec<bool>,
 }
 
 /// Receivers (indices) to be held out.

@@ -43,6 +43,14 @@ pub enum Error {
         /// The name asked for.
         id: String,
     },
+    /// A cause of an extended model that has no case in the room.
+    #[error(
+        "the model's cause {cause} cannot be at work in this room: no effect, or none about that subject, has a case here; leave it out to go on"
+    )]
+    UnknownCause {
+        /// The cause, with its subject.
+        cause: String,
+    },
     /// A law that cannot be weighed as a cause.
     #[error("law `{id}`: {reason}")]
     LawNotWeighed {
@@ -65,6 +73,12 @@ pub enum Error {
         /// Why.
         #[source]
         source: Box<toml::de::Error>,
+    },
+    /// Two extended models cannot be joined.
+    #[error("the models cannot be joined: they disagree in, or both have, {field}")]
+    ModelsDisagree {
+        /// The field, or the cause that both have.
+        field: String,
     },
     /// Displaced surfaces cannot stand where an extended model has them.
     #[error("extended model: surfaces: {0}")]

@@ -97,12 +97,14 @@ pub use effect::{
 };
 pub use effects::*;
 pub use error::Error;
+pub use extend::applied_changes::{AppliedChanges, CoupledDecay, Dimensions, GainOverTime, ThinPanel};
 pub use extend::displaced_surface::DisplacedSurface;
-pub use extend::extended_model::{CoupledDecay, Dimensions, ExtendedModel, GainOverTime, ThinPanel};
+pub use extend::extended_model::{ExtendedModel, ModelCause};
 pub use extend::extended_room::ExtendedRoom;
 pub use extend::law_file::read_laws;
 pub use extend::model_change::ModelChange;
 pub use extend::moved_mesh::DisplacementError;
+pub use extend::uncertainty::Uncertainty;
 pub use likelihood::multilateration::{UnassignedPeak, UnassignedPeaks};
 pub use observe::pre_arrival::PreArrival;
 pub use plan::config::PlanConfig;

@@ -1,6 +1,7 @@
 //! `sabine trace --laws` as a user runs it.
 
 use crate::sabine;
+use sabine::diagnose::{ExtendedModel, read_laws};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -55,9 +56,11 @@ fn the_page_shows_the_example_and_the_example_changes_the_response() {
         let ratio = energy(&under, sound) / energy(&stated, sound);
         assert!((0.5..0.99).contains(&ratio), "{sound}: {ratio}");
     }
-    // The same blocks in an extended model render the same.
-    let centres = "centres_hz = [125, 250, 500, 1000, 2000, 4000, 8000]\ncauses = []\n";
-    let model = file(folder.path(), "extended_model.toml", &format!("{centres}{example}"));
+    // The same laws in an extended model render the same.
+    let mut empty = ExtendedModel::default();
+    empty.centres_hz = vec![125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0];
+    let model = folder.path().join("extended_model.toml");
+    read_laws(EXAMPLE).unwrap().into_iter().fold(empty, ExtendedModel::with_law).write(&model).unwrap();
     let by_model = traced(&modelled, &["--model", model.to_str().unwrap()]);
     for key in ["t20_s", "c50_db", "drr_db"] {
         assert_eq!(by_model[key], after[key], "{key}");

@@ -108,7 +108,7 @@ fn waves_take_the_low_end_and_leave_the_rest() {
     assert_eq!(joined.samples().len(), rays.samples().len());
     // A diagnosis that named standing waves says so in its model.
     let model = folder.path().join("extended_model.toml");
-    std::fs::write(&model, "centres_hz = [125.0]\ncauses = [\"room_modes\"]\nwave_below_hz = 100.0\n")
+    std::fs::write(&model, "version = 2\ncentres_hz = [125.0]\n[[causes]]\nid = \"room_modes\"\nchanges = [{ wave_below_hz = 100.0 }]\n")
         .unwrap();
     let (extended, told) = heard("model", &["--model", model.to_str().unwrap()]);
     assert_eq!((&extended["waves"]["below_hz"], told), (&waves["below_hz"], joined.clone()));

@@ -4,7 +4,7 @@ use super::add_energy;
 use crate::effect::EffectInfo;
 use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, DecayTerm, Effect, FittedCase, Parameter, Stage};
-use crate::extend::extended_model::{BUILD_UP_S, CoupledDecay};
+use crate::extend::applied_changes::{BUILD_UP_S, CoupledDecay};
 use crate::extend::model_change::ModelChange;
 use crate::simulate::views::BandView;
 use crate::survey::Survey;

@@ -3,7 +3,7 @@
 use crate::effect::EffectInfo;
 use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{AddedReflection, Case, Effect, FittedCase, Parameter, ReflectionTerm};
-use crate::extend::extended_model::ThinPanel;
+use crate::extend::applied_changes::ThinPanel;
 use crate::extend::model_change::ModelChange;
 use crate::likelihood::multilateration::{UnassignedPeaks, mirrored, panel_axes};
 use crate::survey::Survey;

@@ -4,7 +4,7 @@ use crate::effect::EffectInfo;
 use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::reflection_gate::ReflectionGate;
 use crate::effect::{AuxiliaryEvidence, Case, DecayTerm, Effect, FittedCase, Parameter, ReflectionEvidence};
-use crate::extend::extended_model::ThinPanel;
+use crate::extend::applied_changes::ThinPanel;
 use crate::extend::model_change::ModelChange;
 use crate::report::diagnosis::FoundParameter;
 use crate::simulate::views::BandView;

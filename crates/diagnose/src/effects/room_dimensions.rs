@@ -3,7 +3,7 @@
 use crate::effect::EffectInfo;
 use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{ArrivalTerm, Case, Effect, Parameter};
-use crate::extend::extended_model::Dimensions;
+use crate::extend::applied_changes::Dimensions;
 use crate::extend::model_change::ModelChange;
 use crate::simulate::views::ArrivalView;
 use crate::survey::Survey;

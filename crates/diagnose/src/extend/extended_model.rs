@@ -1,204 +1,256 @@
-//! The room with its named causes at work, as a file from which sound can be rendered.
+//! A room as a diagnosis found it: what is stated, and an ordered list of changes.
 
-use crate::extend::displaced_surface::DisplacedSurface;
+use crate::error::Error;
+use crate::extend::applied_changes::AppliedChanges;
+use crate::extend::extended_room::ExtendedRoom;
+use crate::extend::model_change::ModelChange;
+use crate::extend::model_checks::Fault;
+use crate::extend::uncertainty::Uncertainty;
+use crate::report::diagnosis::FoundParameter;
+use sabine_acoustics::{Error as Cause, OutOfRange, write_atomically};
 use sabine_paths::laws::Law;
-use sabine_scene::Scene;
-use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use sabine_scene::MeasuredRoom;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::Write;
+use std::path::Path;
 
-/// What a diagnosis changes in a room: an overlay over the room file. Absent parts leave the room as it is.
+/// What a diagnosis changes in a room: an overlay over the room file. As TOML it is the `extended_model.toml` that `sabine diagnose` writes.
 ///
-/// As TOML it is the `extended_model.toml` of the example `diagnose`.
+/// Causes stand in the order in which they were named, each with its parameters, their 90 % intervals, and the changes that it makes. Where
+/// two make the same change (a temperature, the gains of the loudspeaker) the later one counts; changes of different things (two positions,
+/// two panels) add up.
+///
+/// ```
+/// use sabine_diagnose::{ExtendedModel, ModelCause, ModelChange};
+/// let mut model = ExtendedModel::default();
+/// model.centres_hz = vec![125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0];
+/// model.causes.push(ModelCause::new("time_zero", vec![ModelChange::Latency(0.003)]));
+/// assert!(model.to_toml()?.ends_with("[[causes]]\nid = \"time_zero\"\n\n[[causes.changes]]\nlatency_s = 0.003\n"));
+/// # Ok::<(), sabine_diagnose::Error>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct ExtendedModel {
+    version: Version,
     /// Nominal octave centres of everything given by octave, in Hz.
     pub centres_hz: Vec<f64>,
-    /// Identifiers of the causes that are at work.
-    pub causes: Vec<String>,
     /// Absorption by material and octave.
     #[serde(default)]
     pub absorption: BTreeMap<String, Vec<f64>>,
-    /// Scattering by material and octave.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub scattering: BTreeMap<String, Vec<f64>>,
-    /// Relative humidity in percent, for attenuation.
+    /// The causes that are at work, in order.
+    #[serde(default)]
+    pub causes: Vec<ModelCause>,
+    /// How sure the numbers of the model are, all together; none for one that was not fitted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub relative_humidity_percent: Option<f64>,
-    /// Temperature in degrees Celsius, for the speed of sound.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub temperature_c: Option<f64>,
-    /// Gain of loudspeaker and microphone by octave, in dB.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub gain_db: Vec<f64>,
-    /// First-order pattern of the sources: directed share by octave (0: omnidirectional, 0.5: cardioid), radiated power as without.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub directed_share: Vec<f64>,
-    /// Axis of each source.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub axis: BTreeMap<String, [f64; 3]>,
-    /// First-order pattern of receivers: directed share by octave, sensitivity in a diffuse field as without; absent ones are
-    /// omnidirectional.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub receiver_directed_share: BTreeMap<String, Vec<f64>>,
-    /// Axis of receivers that have a pattern; the room file's where there is none.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub receiver_axis: BTreeMap<String, [f64; 3]>,
-    /// Noise by octave: energy per second relative to that of the direct sound at 1 m.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub noise_per_s: Vec<f64>,
-    /// The decay of a coupled volume.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub coupled: Option<CoupledDecay>,
-    /// Below this frequency in Hz responses are those of the wave equation; [`ExtendedRoom::finish`](crate::ExtendedRoom::finish) takes
-    /// them as they come: whoever renders joins them ([`Crossover`](sabine_propagate::wave::Crossover)).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub wave_below_hz: Option<f64>,
-    /// End of the response and length of its fade, in seconds from the first sample.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub truncation: Option<[f64; 2]>,
-    /// Gain of all responses over the time of the file.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub gain_over_time: Option<GainOverTime>,
-    /// Deviation of the sampling clock in parts per million.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub clock_ppm: Option<f64>,
-    /// Scale of the room along each axis about the middle of its box, and shift in metres.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub dimensions: Option<Dimensions>,
-    /// Surfaces of the mesh that stand elsewhere; each at most once. They are moved before the room is scaled.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub surfaces: Vec<DisplacedSurface>,
-    /// Where sources and receivers stand that are not where the room file says, by name, in metres.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub position_m: BTreeMap<String, [f64; 3]>,
-    /// Latency of all responses in seconds.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub latency_s: Option<f64>,
-    /// Responses (SOURCE-RECEIVER) whose sign is turned.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub inverted: Vec<String>,
-    /// Gain of single responses in dB.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub response_gain_db: BTreeMap<String, f64>,
-    /// Gain of single responses by octave, in dB.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub response_band_gain_db: BTreeMap<String, Vec<f64>>,
-    /// Responses that were exchanged.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub exchanged: Vec<[String; 2]>,
-    /// Sound bends around the edges of the mesh, as theory has it.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub diffraction: bool,
-    /// Specular reflections add as pressures, to any order: image sources in a cuboid.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub coherent_reflections: bool,
-    /// Flat surfaces that the mesh lacks.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub sheets: Vec<ThinPanel>,
-    /// Formulas that change what paths carry, with the 90 % intervals of their parameters.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub laws: Vec<Law>,
+    pub uncertainty: Option<Uncertainty>,
 }
 
-/// A flat rectangle that reflects on both sides: a panel, or (just before its wall, absorbing all) a hole.
+/// A cause in a model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
-pub struct ThinPanel {
-    /// Its corners in order, in metres.
-    pub corners_m: [[f64; 3]; 4],
-    /// Absorption, the same in all octaves, 0 to 1; it does not scatter.
-    pub absorption: f64,
+pub struct ModelCause {
+    /// Identifier: that of an effect of the catalogue, of a law, or your own.
+    pub id: String,
+    /// What it concerns (a receiver, a material ...), where the effect has several cases.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub subject: Option<String>,
+    /// What was found of it. Changes count when sound is rendered, not these.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parameters: Vec<FoundParameter>,
+    /// What it changes; empty for a cause that is named and not rendered, or whose change is absorption alone.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub changes: Vec<ModelChange>,
 }
 
-impl ThinPanel {
-    /// A rectangle about a centre, half as long along two unit vectors as given.
-    pub fn rectangle(centre_m: [f64; 3], axes: [[f64; 3]; 2], half_m: [f64; 2], absorption: f64) -> Self {
-        let corner = |[a, b]: [f64; 2]| {
-            std::array::from_fn(|k| centre_m[k] + a * half_m[0] * axes[0][k] + b * half_m[1] * axes[1][k])
-        };
-        Self { corners_m: [[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]].map(corner), absorption }
-    }
-}
-
-/// Gain of a recorder that changes while it records: straight lines in dB between the given instants, constant before the first and after
-/// the last.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[non_exhaustive]
-pub struct GainOverTime {
-    /// Instants in seconds from the first sample, rising.
-    pub time_s: Vec<f64>,
-    /// Gain at each of them, in dB.
-    pub gain_db: Vec<f64>,
-}
-
-impl GainOverTime {
-    /// Gains in dB at instants in seconds from the first sample, which rise.
-    pub fn new(time_s: Vec<f64>, gain_db: Vec<f64>) -> Self {
-        Self { time_s, gain_db }
+impl ModelCause {
+    /// A cause that makes some changes, whose parameters nobody fitted.
+    pub fn new(id: impl Into<String>, changes: Vec<ModelChange>) -> Self {
+        Self { id: id.into(), subject: None, parameters: Vec::new(), changes }
     }
 
-    /// The gain at an instant, in dB.
-    pub(crate) fn at(&self, time_s: f64) -> f64 {
-        let next = self.time_s.partition_point(|t| *t <= time_s);
-        if next == 0 || next == self.time_s.len() {
-            return self.gain_db.get(next.saturating_sub(1)).copied().unwrap_or(0.0);
+    /// The law that is this cause, if it is one.
+    pub fn law(&self) -> Option<&Law> {
+        self.changes.iter().find_map(|change| match change {
+            ModelChange::Law(law) => Some(&**law),
+            _ => None,
+        })
+    }
+
+    /// Whether another is the same cause of the same thing.
+    pub fn is_same(&self, other: &Self) -> bool {
+        (&self.id, &self.subject) == (&other.id, &other.subject)
+    }
+
+    /// Its identifier, with its subject where it has one: `position_error (r2)`.
+    pub fn name(&self) -> String {
+        match &self.subject {
+            Some(subject) => format!("{} ({subject})", self.id),
+            None => self.id.clone(),
         }
-        let (from, to) = (self.time_s[next - 1], self.time_s[next]);
-        let share = (time_s - from) / (to - from);
-        self.gain_db[next - 1] * (1.0 - share) + self.gain_db[next] * share
     }
 }
 
-/// A coupled volume fills within this time, in seconds.
-pub(crate) const BUILD_UP_S: f64 = 0.02;
-
-/// The second decay of a coupled volume.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[non_exhaustive]
-pub struct CoupledDecay {
-    /// Energy per second at the beginning, by octave, relative to that of the direct sound at 1 m.
-    pub energy_per_s: Vec<f64>,
-    /// Decay time (60 dB) by octave, in seconds.
-    pub decay_time_s: Vec<f64>,
-    /// Change of level with the receiver's position, in dB/m along each axis, about `centre_m`.
-    pub gradient_db_per_m: [f64; 3],
-    /// Where the level is as stated.
-    pub centre_m: [f64; 3],
-}
-
-/// How the room differs from its mesh.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[non_exhaustive]
-pub struct Dimensions {
-    /// Factor along each axis.
-    pub scale: [f64; 3],
-    /// Shift along each axis in metres.
-    pub shift_m: [f64; 3],
-}
-
-impl Dimensions {
-    /// Factors along the axes about the middle of the mesh's box, then a shift in metres.
-    pub fn new(scale: [f64; 3], shift_m: [f64; 3]) -> Self {
-        Self { scale, shift_m }
+impl ExtendedModel {
+    /// Reads a model from a TOML file. Names are checked by [`ExtendedModel::room`], which knows them.
+    ///
+    /// # Errors
+    /// [`Error::Model`] for what is not such a file, another version of the format and a change of an unknown kind;
+    /// [`Error::Acoustics`] if it cannot be read or, naming file and field, for a list that is not as long as `centres_hz` and a value out of
+    /// range.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
+        let path = path.as_ref();
+        let text =
+            std::fs::read_to_string(path).map_err(|source| Cause::Io { path: path.to_owned(), source })?;
+        let model: Self = toml::from_str(&text)
+            .map_err(|source| Error::Model { path: path.to_owned(), source: Box::new(source) })?;
+        model.check().map_err(|(field, source)| Cause::InFile {
+            path: path.to_owned(),
+            field,
+            source: Box::new(source),
+        })?;
+        Ok(model)
     }
 
-    /// A scene of this size: scaled about the middle of the box of the room as stated.
-    pub(crate) fn applied(&self, stated: &Scene, scene: &Scene) -> Result<Scene, sabine_acoustics::Error> {
-        let corner = |fold: fn(f64, f64) -> f64, from: f64, k: usize| {
-            stated.vertices().iter().map(|v| v[k]).fold(from, fold)
+    /// The model as TOML.
+    ///
+    /// # Errors
+    /// [`Error::Acoustics`] with the cause [`Cause::Implementation`] if a value has no form in TOML, which none has that passes
+    /// the checks of [`ExtendedModel::read`].
+    pub fn to_toml(&self) -> Result<String, Error> {
+        Ok(toml::to_string(self).map_err(|e| Cause::implementation("extended model as TOML", e))?)
+    }
+
+    /// Writes the model to a TOML file, whole or not at all.
+    ///
+    /// # Errors
+    /// As [`ExtendedModel::to_toml`]; [`Error::Acoustics`] if it cannot be written.
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), Error> {
+        let text = self.to_toml()?;
+        Ok(write_atomically(path.as_ref(), |file| file.write_all(text.as_bytes()))?)
+    }
+
+    /// Everything that can be said without the room.
+    pub(super) fn check(&self) -> Result<(), Fault> {
+        for (i, cause) in self.causes.iter().enumerate() {
+            if self.causes[..i].iter().any(|other| other.is_same(cause)) {
+                let field = "number of causes of this name and subject";
+                let twice = OutOfRange { field, value: 2.0, range: "at most 1" };
+                return Err((format!("causes, {}", cause.name()), twice.into()));
+            }
+        }
+        self.applied().check()?;
+        self.uncertainty.as_ref().map_or(Ok(()), |uncertainty| uncertainty.check(self))
+    }
+
+    /// What all changes make of the room together.
+    pub fn applied(&self) -> AppliedChanges {
+        let mut all = AppliedChanges {
+            centres_hz: self.centres_hz.clone(),
+            absorption: self.absorption.clone(),
+            ..AppliedChanges::default()
         };
-        let middle: [f64; 3] = std::array::from_fn(|k| {
-            0.5 * (corner(f64::min, f64::INFINITY, k) + corner(f64::max, f64::NEG_INFINITY, k))
-        });
-        let vertices = scene.vertices().iter().map(|v| {
-            std::array::from_fn(|k| middle[k] + (v[k] - middle[k]) * self.scale[k] + self.shift_m[k])
-        });
-        Scene::new(vertices.collect(), scene.triangles().to_vec(), scene.materials().to_vec())
+        self.causes.iter().flat_map(|cause| &cause.changes).for_each(|change| all.apply(change.clone()));
+        all
+    }
+
+    /// The room as the model has it. Octaves that the model lacks take the nearest one's values.
+    ///
+    /// # Errors
+    /// [`Error::Displacement`] for surfaces that cannot stand where the model has them;
+    /// [`Error::InModel`] naming the field, for a name that the room does not have, a list that is not as long as `centres_hz`, a
+    /// value out of range, or a source whose axis neither the model nor the room file states.
+    pub fn room(&self, room: &MeasuredRoom) -> Result<ExtendedRoom, Error> {
+        self.applied().room(room)
+    }
+
+    /// The model with a law after its causes, in the place of one of the same identifier.
+    #[must_use]
+    pub fn with_law(self, law: Law) -> Self {
+        let known =
+            self.causes.iter().position(|cause| cause.law().is_some_and(|known| known.id() == law.id()));
+        let mut model = known.into_iter().fold(self, Self::without);
+        model.causes.push(ModelCause::new(law.id().to_owned(), vec![ModelChange::Law(Box::new(law))]));
+        model
+    }
+
+    /// The model without a cause, by its place. Absorption stays as it was found beside it.
+    ///
+    /// # Panics
+    /// If there is no such place.
+    #[must_use]
+    pub fn without(mut self, place: usize) -> Self {
+        self.causes.remove(place);
+        self.uncertainty = self.uncertainty.and_then(|uncertainty| uncertainty.without_cause(place));
+        self
+    }
+
+    /// This model, and then the causes of another. Absorption is this one's; materials that it does not have are the other's. Nothing is known
+    /// of how the numbers of one model depend on those of the other.
+    ///
+    /// # Errors
+    /// [`Error::ModelsDisagree`] if their octaves differ, or if both have the same cause.
+    pub fn merged(mut self, other: Self) -> Result<Self, Error> {
+        if self.centres_hz != other.centres_hz {
+            return Err(Error::ModelsDisagree { field: "centres_hz".to_owned() });
+        }
+        if let Some(twice) =
+            other.causes.iter().find(|cause| self.causes.iter().any(|own| own.is_same(cause)))
+        {
+            return Err(Error::ModelsDisagree { field: format!("causes, {}", twice.name()) });
+        }
+        let own: BTreeSet<String> = self.absorption.keys().cloned().collect();
+        let added = other.uncertainty.and_then(|u| u.moved(self.causes.len(), &own));
+        self.uncertainty = Uncertainty::joined(self.uncertainty, added);
+        for (material, absorption) in other.absorption {
+            self.absorption.entry(material).or_insert(absorption);
+        }
+        self.causes.extend(other.causes);
+        Ok(self)
+    }
+
+    /// So many models that could be as well, drawn from how sure the numbers of this one are: a normal distribution about them, cut off where
+    /// a number leaves its range. They have no parameters and no uncertainty of their own. A model without uncertainty is drawn as it stands.
+    /// Same seed, same draws.
+    ///
+    /// # Errors
+    /// [`Error::InModel`] naming `uncertainty` for a number that the model does not have, or if hardly any draw is a model.
+    pub fn draws(&self, count: usize, seed: u64) -> Result<Vec<Self>, Error> {
+        let in_model = |(field, source)| Error::InModel { field, source: Box::new(source) };
+        let plain = Self {
+            uncertainty: None,
+            causes: self.causes.iter().map(|c| ModelCause { parameters: Vec::new(), ..c.clone() }).collect(),
+            ..self.clone()
+        };
+        let Some(uncertainty) = &self.uncertainty else { return Ok(vec![plain; count]) };
+        uncertainty.draws(&plain, count, seed).map_err(in_model)
+    }
+}
+
+/// The version of the format: this program writes and reads one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Version;
+
+impl Version {
+    const NUMBER: u32 = 2;
+}
+
+impl Serialize for Version {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_u32(Self::NUMBER)
+    }
+}
+
+impl<'de> Deserialize<'de> for Version {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        match u32::deserialize(from)? {
+            Self::NUMBER => Ok(Self),
+            other => Err(serde::de::Error::custom(format!(
+                "version {other} of extended models is not read, {} is: run the diagnosis again",
+                Self::NUMBER
+            ))),
+        }
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::config::CUBOID_PATHS;
 use crate::error::Error;
+use crate::extend::applied_changes::{AppliedChanges, ThinPanel};
 use crate::extend::displaced_surface::DisplacedSurface;
-use crate::extend::extended_model::{ExtendedModel, ThinPanel};
 use crate::extend::laws_of_pairs::bound_laws;
 use crate::extend::model_checks::Fault;
 use crate::extend::moved_mesh::{check_places, displaced};
@@ -12,13 +12,10 @@ use crate::survey::planes::dot;
 use crate::survey::surfaces::{minus, unit};
 use sabine_acoustics::{
     Air, Bands, Directivity, Error as Cause, ImpulseResponse, Material, Orientation, PerBand,
-    write_atomically,
 };
 use sabine_paths::Conditions;
 use sabine_paths::laws::BoundLaws;
 use sabine_scene::{MeasuredRoom, NamedMaterial, Receiver, Scene, Source, Triangle};
-use std::io::Write;
-use std::path::Path;
 
 /// A sheet whose corners are no farther from a surface than this lies on it, in metres.
 const ON_SURFACE_M: f64 = 0.02;
@@ -119,51 +116,9 @@ impl ExtendedRoom {
     }
 }
 
-impl ExtendedModel {
-    /// Reads a model from a TOML file. Names are checked by [`ExtendedModel::room`], which knows them.
-    ///
-    /// # Errors
-    /// [`Error::Model`] for what is not such a file, [`Error::Acoustics`] if it cannot be read or, naming file and field, for a
-    /// list that is not as long as `centres_hz` and a value out of range.
-    pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
-        let path = path.as_ref();
-        let text =
-            std::fs::read_to_string(path).map_err(|source| Cause::Io { path: path.to_owned(), source })?;
-        let model: Self = toml::from_str(&text)
-            .map_err(|source| Error::Model { path: path.to_owned(), source: Box::new(source) })?;
-        model.check().map_err(|(field, source)| Cause::InFile {
-            path: path.to_owned(),
-            field,
-            source: Box::new(source),
-        })?;
-        Ok(model)
-    }
-
-    /// The model as TOML.
-    ///
-    /// # Errors
-    /// [`Error::Acoustics`] with the cause [`Cause::Implementation`] if a value has no form in TOML, which none has that passes
-    /// the checks of [`ExtendedModel::read`].
-    pub fn to_toml(&self) -> Result<String, Error> {
-        Ok(toml::to_string(self).map_err(|e| Cause::implementation("extended model as TOML", e))?)
-    }
-
-    /// Writes the model to a TOML file, whole or not at all.
-    ///
-    /// # Errors
-    /// As [`ExtendedModel::to_toml`]; [`Error::Acoustics`] if it cannot be written.
-    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), Error> {
-        let text = self.to_toml()?;
-        Ok(write_atomically(path.as_ref(), |file| file.write_all(text.as_bytes()))?)
-    }
-
-    /// The room as the model has it. Octaves that the model lacks take the nearest one's values.
-    ///
-    /// # Errors
-    /// [`Error::Displacement`] for surfaces that cannot stand where the model has them;
-    /// [`Error::InModel`] naming the field, for a name that the room does not have, a list that is not as long as `centres_hz`, a
-    /// value out of range, or a source whose axis neither the model nor the room file states.
-    pub fn room(&self, room: &MeasuredRoom) -> Result<ExtendedRoom, Error> {
+impl AppliedChanges {
+    /// [`ExtendedModel::room`](crate::ExtendedModel::room).
+    pub(super) fn room(&self, room: &MeasuredRoom) -> Result<ExtendedRoom, Error> {
         let in_model = |(field, source): Fault| Error::InModel { field, source: Box::new(source) };
         let own = self.check().map_err(in_model)?;
         self.check_names(room).map_err(in_model)?;
@@ -219,14 +174,13 @@ impl ExtendedModel {
         let of_source = |s: &Source| {
             let share = Some(&self.directed_share).filter(|share| !share.is_empty());
             share.map(|share| {
-                first_order(share, s.axis, own, bands).map_err(|e| e.of("directed_share", "axis", &s.id))
+                first_order(share, s.axis, own, bands).map_err(|e| e.of("source_pattern", &s.id))
             })
         };
         let of_receiver = |r: &Receiver| {
             let share = self.receiver_directed_share.get(&r.id);
             share.map(|share| {
-                let names = ("receiver_directed_share", "receiver_axis");
-                first_order(share, r.axis, own, bands).map_err(|e| e.of(names.0, names.1, &r.id))
+                first_order(share, r.axis, own, bands).map_err(|e| e.of("receiver_pattern", &r.id))
             })
         };
         let directivities = sources.iter().map(|s| of_source(s).transpose()).collect::<Result<_, Fault>>()?;
@@ -303,12 +257,13 @@ enum PatternFault {
 }
 
 impl PatternFault {
-    /// The fault of a source or receiver in the fields of its shares and its axis.
-    fn of(self, share: &str, axis: &str, id: &str) -> Fault {
+    /// The fault of a source or receiver in a change of that name.
+    fn of(self, change: &str, id: &str) -> Fault {
+        let axis = || format!("{change}.axis.{id}");
         match self {
-            Self::NoAxis => (format!("{axis}.{id}"), Cause::UnknownId { id: id.to_owned() }),
-            Self::Axis(cause) => (format!("{axis}.{id}"), cause),
-            Self::Share(cause) => (share.to_owned(), cause),
+            Self::NoAxis => (axis(), Cause::UnknownId { id: id.to_owned() }),
+            Self::Axis(cause) => (axis(), cause),
+            Self::Share(cause) => (format!("{change}.directed_share"), cause),
         }
     }
 }

@@ -1,38 +1,90 @@
 //! Turns named causes into a model that renders.
 
 use crate::effect::{FittedCase, Observable};
-use crate::extend::extended_model::ExtendedModel;
+use crate::extend::extended_model::{ExtendedModel, ModelCause};
 use crate::extend::model_change::ModelChange;
+use crate::extend::number_slopes::{Input, InputKind, NumberSlopes, Origin};
+use crate::extend::uncertainty::absorption_at;
 use crate::infer::search::{Search, State};
 use crate::likelihood::arrivals;
 use crate::likelihood::parameters::assignment;
-use crate::report::found_parameters::{interval_90, parameters, place_of};
+use crate::report::found_parameters::{HALF_90, interval_90, parameters, place_of};
 
 /// A reflection is confirmed by a peak within this of its instant, in seconds.
 const NEAR_S: f64 = 1.5e-4;
 
-/// The overlay of the named causes over the room file.
+/// The model of the named causes, in the order in which they were named.
 pub(crate) fn extended_model(search: &Search<'_>, state: &State) -> ExtendedModel {
     let survey = search.baseline.survey();
     let layout = search.baseline.decay_layout();
-    let absorption =
-        |(m, name): (usize, &String)| (name.clone(), state.energy.values[layout.material(m)].to_vec());
-    let mut model = ExtendedModel {
-        centres_hz: survey.bands.iter_hz().collect(),
-        absorption: survey.materials.iter().enumerate().map(absorption).collect(),
-        ..ExtendedModel::default()
-    };
-    for &candidate in &state.chosen {
-        model.causes.push(search.candidates[candidate].id.to_owned());
-        for change in changes(search, state, candidate) {
-            model.apply(change);
+    let mut model = ExtendedModel::default();
+    model.centres_hz = survey.bands.iter_hz().collect();
+    let mut numbers = NumberSlopes::default();
+    for (m, material) in survey.materials.iter().enumerate() {
+        model.absorption.insert(material.clone(), state.energy.values[layout.material(m)].to_vec());
+        for (band, parameter) in layout.material(m).enumerate() {
+            numbers.add(absorption_at(material, band), Origin::Decays(parameter), 1.0);
         }
     }
+    for (place, &candidate) in state.chosen.iter().enumerate() {
+        let case = search.candidates[candidate].case;
+        let fitted = fitted_case(search, state, candidate);
+        numbers.add_case(place, case, &fitted, &inputs(search, state, candidate, (place, &fitted)));
+        model.causes.push(ModelCause {
+            subject: case.subject.clone(),
+            parameters: parameters(search, state, candidate),
+            ..ModelCause::new(search.candidates[candidate].id, case.model_changes(&fitted))
+        });
+    }
+    model.uncertainty = numbers.uncertainty(&state.energy.covariance, &state.arrivals.covariance);
     model
 }
 
 /// What a chosen candidate changes in the model.
 pub(crate) fn changes(search: &Search<'_>, state: &State, candidate: usize) -> Vec<ModelChange> {
+    search.candidates[candidate].case.model_changes(&fitted_case(search, state, candidate))
+}
+
+/// What the fit of a chosen candidate leaves open, part by part, and how far.
+fn inputs(
+    search: &Search<'_>,
+    state: &State,
+    candidate: usize,
+    (place, fitted): (usize, &FittedCase<'_>),
+) -> Vec<Input> {
+    let (baseline, case) = (search.baseline, search.candidates[candidate].case);
+    let of_decays = |parameter: usize| (Origin::Decays(parameter), state.energy.sd(parameter));
+    let of_arrivals = |parameter: usize| (Origin::Arrivals(parameter), state.arrivals.sd(parameter));
+    let mut inputs = Vec::new();
+    let mut push = |kind: InputKind, (origin, sd): (Origin, f64)| inputs.push(Input { kind, origin, sd });
+    if !fitted.values.is_empty() {
+        let (_, first) = place_of(search, state, candidate);
+        for i in 0..fitted.values.len() {
+            let by_arrivals = case.observable() == Observable::Arrivals;
+            push(
+                InputKind::Value(i),
+                if by_arrivals { of_arrivals(first + i) } else { of_decays(first + i) },
+            );
+        }
+    }
+    for (which, (nuisance, _)) in fitted.relaxed.iter().enumerate() {
+        let of_decays = baseline.decay_layout().nuisance(*nuisance).map(|own| own.map(of_decays).collect());
+        let of_arrivals =
+            || baseline.arrival_layout().nuisance(*nuisance).map(|own| own.map(of_arrivals).collect());
+        let own: Vec<(Origin, f64)> = of_decays.or_else(of_arrivals).unwrap_or_default();
+        own.into_iter().enumerate().for_each(|(i, one)| push(InputKind::Relaxed(which, i), one));
+    }
+    for (i, parameter) in fitted.auxiliary.iter().enumerate() {
+        let sd = (parameter.high - parameter.low) / (2.0 * HALF_90);
+        if sd.is_finite() {
+            push(InputKind::Auxiliary(i), (Origin::Alone(place, i, sd * sd), sd));
+        }
+    }
+    inputs
+}
+
+/// A chosen candidate as the fit left it.
+fn fitted_case<'s>(search: &'s Search<'_>, state: &'s State, candidate: usize) -> FittedCase<'s> {
     let (baseline, case) = (search.baseline, search.candidates[candidate].case);
     let survey = baseline.survey();
     let (values, intervals): (&[f64], _) = match case.observable() {
@@ -54,7 +106,7 @@ pub(crate) fn changes(search: &Search<'_>, state: &State, candidate: usize) -> V
     let width_s = |band: usize| baseline.simulation.states[0][band].bins.width_s;
     let level_per_s = |band: usize| baseline.simulation.reference[band] / width_s(band);
     let has_auxiliary = state.own.iter().any(|(c, _)| *c == candidate);
-    let fitted = FittedCase {
+    FittedCase {
         survey,
         values,
         intervals,
@@ -64,8 +116,7 @@ pub(crate) fn changes(search: &Search<'_>, state: &State, candidate: usize) -> V
         materials: &baseline.simulation.materials,
         confirmed: case.reflection_term().map_or_else(Vec::new, |_| confirmed(search, state)),
         levels_db: levels_db(search, state),
-    };
-    case.model_changes(&fitted)
+    }
 }
 
 /// Levels that the fit found beside the prediction, `[response][band]`, in dB.
@@ -133,21 +184,22 @@ mod tests {
         let state = search.state(&chosen, None).expect("a fit");
         let model = extended_model(&search, &state);
         let (energy, arrivals) = (&state.energy, &state.arrivals);
-        assert!((model.latency_s.expect("a latency") - 3e-3).abs() < 2e-4, "{:?}", model.latency_s);
+        let all = model.applied();
+        assert!((all.latency_s.expect("a latency") - 3e-3).abs() < 2e-4, "{:?}", all.latency_s);
         let (decays, times) = (baseline.decay_layout(), baseline.arrival_layout());
-        assert_eq!(model.response_gain_db["s0-r1"], energy.values[decays.gain(1)]);
+        assert_eq!(all.response_gain_db["s0-r1"], energy.values[decays.gain(1)]);
         for (k, at) in times.receiver(2).enumerate() {
             let stated = baseline.survey().receivers[2].position_m[k];
-            assert_eq!(model.position_m["r2"][k], stated + arrivals.values[at]);
+            assert_eq!(all.position_m["r2"][k], stated + arrivals.values[at]);
         }
         // Two terms of the decays: the first has no parameters, so that the noise follows the nuisances.
         let width_s = baseline.simulation.states[0][1].bins.width_s;
         let level = baseline.simulation.reference[1] / width_s;
         let noise = level * 10f64.powf(energy.values[decays.len() + 1] / 10.0);
-        assert!((model.noise_per_s[1] / noise - 1.0).abs() < 1e-12);
-        assert_eq!(model.inverted, ["s0-r0"]);
+        assert!((all.noise_per_s[1] / noise - 1.0).abs() < 1e-12);
+        assert_eq!(all.inverted, ["s0-r0"]);
         assert_eq!(model.absorption["plaster"], energy.values[decays.material(1)]);
         assert_eq!(model.causes.len(), 5);
-        assert!(model.gain_db.is_empty() && model.temperature_c.is_none() && model.sheets.is_empty());
+        assert!(all.gain_db.is_empty() && all.temperature_c.is_none() && all.sheets.is_empty());
     }
 }

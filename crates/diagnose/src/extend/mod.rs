@@ -1,5 +1,6 @@
 //! The model with the named causes in it, and its rendering.
 
+pub(crate) mod applied_changes;
 pub(crate) mod displaced_surface;
 pub(crate) mod extended_model;
 pub(crate) mod extended_room;
@@ -9,4 +10,6 @@ pub(crate) mod laws_of_pairs;
 pub(crate) mod model_change;
 mod model_checks;
 pub(crate) mod moved_mesh;
+mod number_slopes;
 pub(crate) mod recording_chain;
+pub(crate) mod uncertainty;

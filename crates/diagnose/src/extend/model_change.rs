@@ -1,20 +1,25 @@
 //! A change of the model: what a named cause does to the room and to the recording.
 
+use crate::extend::applied_changes::{AppliedChanges, CoupledDecay, Dimensions, GainOverTime, ThinPanel};
 use crate::extend::displaced_surface::{DisplacedSurface, put};
-use crate::extend::extended_model::{CoupledDecay, Dimensions, ExtendedModel, GainOverTime, ThinPanel};
 use sabine_paths::laws::Law;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// One change of the model. [`ExtendedModel`] holds all of them and renders; those that move paths are traced again while the search goes
-/// on.
-#[derive(Clone, Debug, PartialEq)]
+/// One change of a model, and its form in a file: [`ExtendedModel`](crate::ExtendedModel) holds all of them in order and renders; those that
+/// move paths are traced again while the search goes on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum ModelChange {
     /// Gain of loudspeaker and microphone by band, in dB.
+    #[serde(rename = "gain_db")]
     BandGains(Vec<f64>),
     /// Relative humidity in percent.
+    #[serde(rename = "relative_humidity_percent")]
     RelativeHumidity(f64),
     /// Temperature in degrees Celsius.
+    #[serde(rename = "temperature_c")]
     Temperature(f64),
     /// First-order pattern of the sources: directed share by band, 0 to 1, and the axis of each source by name.
     SourcePattern {
@@ -33,28 +38,37 @@ pub enum ModelChange {
     /// Scattering by material and band.
     Scattering(BTreeMap<String, Vec<f64>>),
     /// Noise by band: energy per second relative to that of the direct sound at 1 m.
+    #[serde(rename = "noise_per_s")]
     Noise(Vec<f64>),
     /// The decay of a coupled volume.
+    #[serde(rename = "coupled")]
     CoupledVolume(CoupledDecay),
     /// Below this frequency in Hz responses are those of the wave equation.
+    #[serde(rename = "wave_below_hz")]
     WaveBelow(f64),
     /// End of the response and length of its fade, in seconds from the first sample.
+    #[serde(rename = "truncation_s")]
     Truncation([f64; 2]),
     /// Deviation of the sampling clock in parts per million.
+    #[serde(rename = "clock_ppm")]
     Clock(f64),
     /// Size of the room.
     Dimensions(Dimensions),
     /// A surface of the mesh stands elsewhere. Several make a room together, whatever their order; of one surface the last counts.
+    #[serde(rename = "surface")]
     SurfaceDisplacement(DisplacedSurface),
     /// A flat surface that the mesh lacks.
+    #[serde(rename = "sheet")]
     Panel(ThinPanel),
     /// Sound is diffracted at the edges of the mesh.
     Diffraction,
     /// Specular reflections add as pressures.
     CoherentReflections,
     /// Latency of all responses in seconds.
+    #[serde(rename = "latency_s")]
     Latency(f64),
     /// Position of a source or receiver, by name, in metres.
+    #[serde(rename = "position")]
     Position {
         /// Its name.
         id: String,
@@ -95,9 +109,9 @@ impl ModelChange {
     }
 }
 
-impl ExtendedModel {
-    /// Takes a change into the model.
-    pub fn apply(&mut self, change: ModelChange) {
+impl AppliedChanges {
+    /// Takes one change more.
+    pub(crate) fn apply(&mut self, change: ModelChange) {
         match change {
             ModelChange::BandGains(gain_db) => self.gain_db = gain_db,
             ModelChange::RelativeHumidity(percent) => self.relative_humidity_percent = Some(percent),
@@ -153,7 +167,7 @@ mod tests {
     #[test]
     fn changes_of_one_kind_that_concern_different_things_add_up() {
         let survey = hand_made::survey(Levels::Common, TimeZero::Emission);
-        let mut model = ExtendedModel::default();
+        let mut model = AppliedChanges::default();
         for (response, gain_db) in [(0, 3.0), (2, -4.0)] {
             for case in ChannelFault.cases(&survey) {
                 let relaxed = Nuisance::ResponseGain(response);

@@ -1,6 +1,6 @@
 //! What can be wrong with an extended model, and which field says so.
 
-use crate::extend::extended_model::{Dimensions, ExtendedModel};
+use crate::extend::applied_changes::{AppliedChanges, Dimensions};
 use crate::extend::laws_of_pairs::check_laws;
 use crate::survey::planes::dot;
 use sabine_acoustics::{Bands, Error as Cause, OutOfRange};
@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// A field and what is wrong with it.
 pub(super) type Fault = (String, Cause);
 
-impl ExtendedModel {
+impl AppliedChanges {
     /// Everything that can be said without the room; the bands.
     pub(super) fn check(&self) -> Result<Bands, Fault> {
         check_laws(&self.laws)?;
@@ -25,19 +25,19 @@ impl ExtendedModel {
         for (table, columns) in [
             ("absorption", &self.absorption),
             ("scattering", &self.scattering),
-            ("receiver_directed_share", &self.receiver_directed_share),
+            ("receiver_pattern.directed_share", &self.receiver_directed_share),
         ] {
             for (name, values) in columns {
                 check.per_band(&format!("{table}.{name}"), values, (0.0, 1.0), "between 0 and 1")?;
             }
         }
         for (name, values) in &self.response_band_gain_db {
-            let field = format!("response_band_gain_db.{name}");
+            let field = format!("response_band_gains.{name}");
             check.per_band(&field, values, (-200.0, 200.0), "within 200 dB")?;
         }
         for (field, values, limits, range) in [
             ("gain_db", &self.gain_db, (-200.0, 200.0), "within 200 dB"),
-            ("directed_share", &self.directed_share, (0.0, 1.0), "between 0 and 1"),
+            ("source_pattern.directed_share", &self.directed_share, (0.0, 1.0), "between 0 and 1"),
             ("noise_per_s", &self.noise_per_s, (0.0, 1e6), "between 0 and a million per second"),
         ] {
             if !values.is_empty() {
@@ -62,26 +62,26 @@ impl ExtendedModel {
             self.dimensions.as_ref().map_or(Vec::new(), |d| pick(d).to_vec())
         };
         let one = |value: Option<f64>| value.into_iter().collect::<Vec<f64>>();
-        let places = self.position_m.iter().map(|(id, p)| (format!("position_m.{id}"), p));
-        let axes = self.axis.iter().map(|(id, p)| (format!("axis.{id}"), p));
-        let heard = self.receiver_axis.iter().map(|(id, p)| (format!("receiver_axis.{id}"), p));
+        let places = self.position_m.iter().map(|(id, p)| (format!("position.{id}"), p));
+        let axes = self.axis.iter().map(|(id, p)| (format!("source_pattern.axis.{id}"), p));
+        let heard = self.receiver_axis.iter().map(|(id, p)| (format!("receiver_pattern.axis.{id}"), p));
         for (field, values) in places.chain(axes).chain(heard) {
             check.each(&field, values, (-1e5, 1e5), "a finite coordinate")?;
         }
         for (name, &gain) in &self.response_gain_db {
-            check.each(&format!("response_gain_db.{name}"), &[gain], (-200.0, 200.0), "within 200 dB")?;
+            check.each(&format!("response_gain.{name}"), &[gain], (-200.0, 200.0), "within 200 dB")?;
         }
         for surface in &self.surfaces {
-            check.each("surfaces.point_m", &surface.point_m, (-1e5, 1e5), "a finite coordinate")?;
+            check.each("surface.point_m", &surface.point_m, (-1e5, 1e5), "a finite coordinate")?;
             let length = dot(surface.normal, surface.normal).sqrt();
-            check.each("surfaces.normal", &[length], (0.99, 1.01), "a vector of length 1")?;
-            check.each("surfaces.offset_m", &[surface.offset_m], (-2.0, 2.0), "within 2 m")?;
-            check.each("surfaces.tilt_deg", &surface.tilt_deg, (-20.0, 20.0), "within 20 degrees")?;
+            check.each("surface.normal", &[length], (0.99, 1.01), "a vector of length 1")?;
+            check.each("surface.offset_m", &[surface.offset_m], (-2.0, 2.0), "within 2 m")?;
+            check.each("surface.tilt_deg", &surface.tilt_deg, (-20.0, 20.0), "within 20 degrees")?;
         }
         for sheet in &self.sheets {
             let corners = sheet.corners_m.as_flattened();
-            check.each("sheets.corners_m", corners, (-1e5, 1e5), "a finite coordinate")?;
-            check.each("sheets.absorption", &[sheet.absorption], (0.0, 1.0), "between 0 and 1")?;
+            check.each("sheet.corners_m", corners, (-1e5, 1e5), "a finite coordinate")?;
+            check.each("sheet.absorption", &[sheet.absorption], (0.0, 1.0), "between 0 and 1")?;
         }
         self.check_gain_over_time(check)?;
         for (field, values, limits, range) in [
@@ -96,7 +96,7 @@ impl ExtendedModel {
             ("wave_below_hz", one(self.wave_below_hz), (20.0, 3500.0), "between 20 and 3,500 Hz"),
             ("latency_s", one(self.latency_s), (-10.0, 10.0), "within 10 s"),
             (
-                "truncation",
+                "truncation_s",
                 self.truncation.map_or(Vec::new(), |t| t.to_vec()),
                 (0.0, 1e3),
                 "between 0 and 1000 s",
@@ -136,12 +136,12 @@ impl ExtendedModel {
         for (field, names, known) in [
             ("absorption", keys(&self.absorption), &materials),
             ("scattering", keys(&self.scattering), &materials),
-            ("axis", keys(&self.axis), &sources),
-            ("receiver_directed_share", keys(&self.receiver_directed_share), &receivers),
-            ("receiver_axis", keys(&self.receiver_axis), &receivers),
-            ("position_m", keys(&self.position_m), &places),
-            ("response_gain_db", keys(&self.response_gain_db), &pairs),
-            ("response_band_gain_db", keys(&self.response_band_gain_db), &pairs),
+            ("source_pattern.axis", keys(&self.axis), &sources),
+            ("receiver_pattern.directed_share", keys(&self.receiver_directed_share), &receivers),
+            ("receiver_pattern.axis", keys(&self.receiver_axis), &receivers),
+            ("position", keys(&self.position_m), &places),
+            ("response_gain", keys(&self.response_gain_db), &pairs),
+            ("response_band_gains", keys(&self.response_band_gain_db), &pairs),
             ("inverted", self.inverted.clone(), &pairs),
             ("exchanged", exchanged, &pairs),
         ] {

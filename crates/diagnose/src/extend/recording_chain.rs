@@ -1,8 +1,8 @@
 //! What happens to a response after propagation: sound that joins, loudspeaker and microphone, noise, recorder.
 
 use crate::error::Error;
-use crate::extend::extended_model::BUILD_UP_S;
-use crate::extend::extended_model::ExtendedModel;
+use crate::extend::applied_changes::AppliedChanges;
+use crate::extend::applied_changes::BUILD_UP_S;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
@@ -20,7 +20,7 @@ const TAPS: i64 = 48;
 /// The part of an extended model that acts on rendered responses.
 #[derive(Clone, Debug)]
 pub(crate) struct RecordingChain {
-    model: ExtendedModel,
+    model: AppliedChanges,
     bands: Bands,
 }
 
@@ -38,7 +38,7 @@ struct Filters {
 
 impl RecordingChain {
     /// A model that has passed its checks, and its bands.
-    pub fn new(model: ExtendedModel, bands: Bands) -> Self {
+    pub fn new(model: AppliedChanges, bands: Bands) -> Self {
         Self { model, bands }
     }
 

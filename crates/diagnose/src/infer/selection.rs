@@ -51,16 +51,42 @@ impl Selection {
     }
 }
 
-/// Greedy naming, the scatter estimated again after each name, and a backward check.
+/// Puts causes that are given to work, one after the other, as if each had been named; their probabilities are those against their absence.
+pub(crate) fn give(
+    baseline: &mut Baseline,
+    cases: &[CatalogueCase],
+    effects: usize,
+    (used, arrival_fits): (&[bool], &Arc<ArrivalFits>),
+    given: &[usize],
+) -> Result<Selection, Error> {
+    let mut named = Selection::default();
+    for &candidate in given {
+        baseline.prepare_rest(cases)?;
+        let odds = {
+            let search = Search::new(baseline, cases, effects, used.to_vec()).knowing(arrival_fits);
+            let without = search.state(&named.chosen, None)?;
+            let with = search.with(&without, candidate)?;
+            let nats = with.log_evidence() - without.log_evidence() - search.price(candidate);
+            nats - (search.threshold() - baseline.config.naming_nats)
+        };
+        named.probabilities.push((candidate, 1.0 / (1.0 + (-odds).exp())));
+        named.chosen.push(candidate);
+        put_to_work(baseline, cases, effects, &named.chosen, (used, arrival_fits))?;
+    }
+    Ok(named)
+}
+
+/// Greedy naming beside what is named already, the scatter estimated again after each name, and a backward check.
 pub(crate) fn select(
     baseline: &mut Baseline,
     cases: &[CatalogueCase],
     effects: usize,
     (used, arrival_fits): (&[bool], &Arc<ArrivalFits>),
+    mut named: Selection,
     observer: &dyn Observer,
 ) -> Result<Selection, Error> {
-    let mut named = Selection::default();
-    while named.chosen.len() < baseline.config.most_causes {
+    let most = named.chosen.len() + baseline.config.most_causes;
+    while named.chosen.len() < most {
         baseline.prepare_rest(cases)?;
         let (ranked, rivals, interchangeable, threshold) = {
             let search = Search::new(baseline, cases, effects, used.to_vec()).knowing(arrival_fits);
@@ -109,17 +135,7 @@ pub(crate) fn select(
             named.rivals = std::iter::once(best).chain(&rivals).map(|r| r.id.clone()).collect();
             break;
         }
-        let changes = expand_about_fit(baseline, cases, effects, &named.chosen, (used, arrival_fits))?;
-        for change in &changes {
-            baseline.retrace(change, cases, &named.chosen)?;
-        }
-        let chosen: Vec<&Case> = named
-            .chosen
-            .iter()
-            .map(|&c| &cases[c].case)
-            .filter(|c| c.observable().concerns(Observable::Decay))
-            .collect();
-        baseline.calibrate_scatter(&chosen, used)?;
+        put_to_work(baseline, cases, effects, &named.chosen, (used, arrival_fits))?;
     }
     baseline.prepare_rest(cases)?;
     let search = Search::new(baseline, cases, effects, used.to_vec()).knowing(arrival_fits);
@@ -130,6 +146,25 @@ pub(crate) fn select(
     }
     named.chosen = state.chosen;
     Ok(named)
+}
+
+/// Takes the cause named last into paths, expansion and scatter.
+fn put_to_work(
+    baseline: &mut Baseline,
+    cases: &[CatalogueCase],
+    effects: usize,
+    chosen: &[usize],
+    fits: (&[bool], &Arc<ArrivalFits>),
+) -> Result<(), Error> {
+    for change in &expand_about_fit(baseline, cases, effects, chosen, fits)? {
+        baseline.retrace(change, cases, chosen)?;
+    }
+    let of_decays: Vec<&Case> = chosen
+        .iter()
+        .map(|&c| &cases[c].case)
+        .filter(|c| c.observable().concerns(Observable::Decay))
+        .collect();
+    baseline.calibrate_scatter(&of_decays, fits.0)
 }
 
 /// With a cause at work the materials are others: what is compared, and with which spread, follows them. Expands about their fit, where a
@@ -232,7 +267,8 @@ mod tests {
         let cases = cases(&effects, baseline.survey());
         let used = vec![true; baseline.pairs()];
         let found =
-            select(&mut baseline, &cases, effects.len(), (&used, &Arc::default()), &()).expect("fits");
+            select(&mut baseline, &cases, effects.len(), (&used, &Arc::default()), Selection::default(), &())
+                .expect("fits");
         let chosen =
             found.chosen.iter().map(|&c| (cases[c].id.to_string(), cases[c].case.subject.clone())).collect();
         (chosen, found)

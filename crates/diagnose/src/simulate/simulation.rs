@@ -4,8 +4,8 @@ mod retracing;
 
 use crate::config::DiagnoseConfig;
 use crate::error::Error;
+use crate::extend::applied_changes::Dimensions;
 use crate::extend::displaced_surface::DisplacedSurface;
-use crate::extend::extended_model::Dimensions;
 use crate::extend::moved_mesh::find_ranges;
 use crate::observe::observations::Observations;
 use crate::observe::observed_response::PEAKS_S;

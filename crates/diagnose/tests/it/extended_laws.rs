@@ -2,30 +2,39 @@
 
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
-use sabine_diagnose::{Error, ExtendedModel, ModelChange, read_laws};
+use sabine_diagnose::{Error, ExtendedModel, read_laws};
 use sabine_paths::Propagator;
 use sabine_propagate::{PathTracer, TracerConfig};
 use sabine_scene::MeasuredRoom;
 use std::path::PathBuf;
 
-const MODEL: &str = r#"centres_hz = [125, 250, 500, 1000, 2000, 4000, 8000]
-causes = ["background_noise"]
-relative_humidity_percent = 40.0
+const MODEL: &str = r#"version = 2
+centres_hz = [125, 250, 500, 1000, 2000, 4000, 8000]
 
 [absorption]
 carpet = [0.1, 0.1, 0.1, 0.1, 0.2, 0.2, 0.2]
 
-[[laws]]
+[[causes]]
+id = "air_absorption"
+changes = [{ relative_humidity_percent = 40.0 }]
+
+[[causes]]
+id = "carpet_takes_grazing_sound"
+[[causes.changes]]
+[causes.changes.law]
 id = "carpet_takes_grazing_sound"
 target = "reflection"
 surface = "carpet"
 formula = "-a * (1 - cos_incidence)^2 * above(frequency_hz, f0)"
 words = "Each meeting with the carpet takes up to 4.1 dB more the more it grazes, from 2 kHz up."
-[laws.parameters]
+[causes.changes.law.parameters]
 a  = { value = 4.1, low = 2.9, high = 5.4, unit = "dB" }
 f0 = { value = 2000, low = 1000, high = 2800, unit = "Hz" }
 
-[[laws]]
+[[causes]]
+id = "near_receivers_are_loud"
+[[causes.changes]]
+[causes.changes.law]
 id = "near_receivers_are_loud"
 target = "path"
 formula = "a * exp(-distance_m / d)"
@@ -51,7 +60,8 @@ fn read(text: &str) -> Result<ExtendedModel, Error> {
 #[test]
 fn laws_come_back_to_the_byte_with_their_intervals() {
     let model = read(MODEL).unwrap();
-    let intervals: Vec<[f64; 2]> = model.laws[0].parameters().map(|(_, p)| [p.low, p.high]).collect();
+    let intervals: Vec<[f64; 2]> =
+        model.causes[1].law().unwrap().parameters().map(|(_, p)| [p.low, p.high]).collect();
     assert_eq!(intervals, [[2.9, 5.4], [1000.0, 2800.0]]);
     let written = model.to_toml().unwrap();
     let again = read(&written).unwrap();
@@ -66,7 +76,7 @@ fn laws_come_back_to_the_byte_with_their_intervals() {
 fn a_law_of_the_model_weighs_the_paths_of_each_pair() {
     let (room, model) = (fixture(), read(MODEL).unwrap());
     let mut without = model.clone();
-    without.laws.clear();
+    without.causes.truncate(1);
     let (under, plain) = (model.room(&room).unwrap(), without.room(&room).unwrap());
     let (source, receiver) = (&under.sources[0], &under.receivers[0]);
     let config = TracerConfig { rays: 500, duration_s: 0.3, image_order: 2, ..Default::default() };
@@ -109,10 +119,10 @@ fn a_law_of_the_model_weighs_the_paths_of_each_pair() {
 
 #[test]
 fn a_change_replaces_the_law_of_its_name() {
-    let mut model = read(MODEL).unwrap();
-    let stronger = model.laws[1].with_values(&[3.5, 1.2]).unwrap();
-    model.apply(ModelChange::Law(Box::new(stronger.clone())));
-    assert_eq!((model.laws.len(), &model.laws[1]), (2, &stronger));
+    let model = read(MODEL).unwrap();
+    let stronger = model.causes[2].law().unwrap().with_values(&[3.5, 1.2]).unwrap();
+    let model = model.with_law(stronger.clone());
+    assert_eq!((model.causes.len(), model.causes[2].law()), (3, Some(&stronger)));
 }
 
 #[test]
@@ -120,8 +130,7 @@ fn what_is_wrong_with_a_law_names_it() {
     for (from, to, words) in [
         ("cos_incidence)", "cos_incidense)", "law `carpet_takes_grazing_sound`, column 11 of its formula"),
         ("value = 4.1", "value = 6.1", "parameters.a: 6.1 lies outside its interval from 2.9 to 5.4"),
-        ("id = \"near_receivers_are_loud\"", "id = \"carpet_takes_grazing_sound\"", "two laws have it"),
-        ("relative_humidity_percent", "relative_humidity", "unknown field `relative_humidity`"),
+        ("relative_humidity_percent", "relative_humidity", "unknown variant `relative_humidity`"),
         (
             "distance_m / d",
             "distance_m",
@@ -142,9 +151,16 @@ fn what_is_wrong_with_a_law_names_it() {
 
 #[test]
 fn a_file_of_laws_holds_nothing_else() {
-    let laws = &MODEL[MODEL.find("[[laws]]").unwrap()..];
+    let is_of_law = |line: &&str| !line.starts_with("[[causes") && !line.starts_with("changes");
+    let all: Vec<&str> =
+        MODEL[MODEL.find("[[causes.changes]]").unwrap()..].lines().filter(is_of_law).collect();
+    let laws =
+        all.join("\n").replace("[causes.changes.law]", "[[laws]]").replace("causes.changes.law", "laws")
+            + "\n";
+    let laws = &laws.replace("id = \"near_receivers_are_loud\"\n[[laws]]", "[[laws]]");
     let (_folder, path) = in_file(laws);
-    assert_eq!(read_laws(path).unwrap(), read(MODEL).unwrap().laws);
+    let model = read(MODEL).unwrap();
+    assert!(read_laws(path).unwrap().iter().eq(model.causes.iter().filter_map(|cause| cause.law())));
     let (_folder, path) = in_file(MODEL);
     assert!(read_laws(path).unwrap_err().to_string().contains("unknown field `"));
     let (_folder, path) = in_file(&format!("{laws}{laws}"));

@@ -37,7 +37,7 @@ fn what_bends_around_a_screen_is_found() {
     // Found: 1 to 2 dB; what is reflected before or after the edge makes it more than theory says.
     let level = &cause.parameters[0];
     assert!(level.value.abs() < 3.0 && level.high - level.low < 6.0, "{level:?}");
-    assert!(found.model.diffraction);
+    assert!(found.model.applied().diffraction);
 }
 
 #[test]

@@ -146,7 +146,8 @@ fn a_face_that_stands_elsewhere_is_found(seed: u64, face: usize, offset_m: f64) 
     let offset = &cause.parameters[0];
     assert!(offset.name == "offset" && (offset.value - offset_m).abs() < 0.01, "{offset:?} {offset_m}");
     // The face that was moved, and no tilt to speak of.
-    let [surface] = &found.model.surfaces[..] else { panic!("{:?}", found.model.surfaces) };
+    let applied = found.model.applied();
+    let [surface] = &applied.surfaces[..] else { panic!("{:?}", applied.surfaces) };
     let axis = face / 2;
     let mut normal = [0.0; 3];
     normal[axis] = if face.is_multiple_of(2) { -1.0 } else { 1.0 };
@@ -228,7 +229,8 @@ fn the_axis_of_a_directional_source_is_found_where_the_room_file_states_none() {
     let truth = lab.truth(std::slice::from_ref(&hidden)).unwrap().sources[0].axis;
     let found = diagnose_among(&lab, &[hidden], &ON_LEVELS);
     only_cause(&found, "source_directivity");
-    let axis = found.model.axis.values().next().unwrap();
+    let applied = found.model.applied();
+    let axis = applied.axis.values().next().unwrap();
     let cosine: f64 = axis.iter().zip(truth).map(|(a, b)| a * b).sum();
     assert!(cosine > 15f64.to_radians().cos(), "{axis:?} {truth:?}");
 }

@@ -74,7 +74,7 @@ fn a_hidden_law_is_named_with_its_size_and_rendered() {
     assert!((amplitude.value - HIDDEN_DB).abs() < 2.0, "{amplitude:?}");
     assert!(found.causes[0].held_out_gain.clone().unwrap().low > 0.0);
     // What is named is rendered, with its interval.
-    let own = &found.model.laws[0];
+    let own = found.model.causes[0].law().unwrap();
     let (_, parameter) = own.parameters().next().unwrap();
     assert_eq!(
         [parameter.value, parameter.low, parameter.high],
@@ -99,7 +99,7 @@ fn what_a_hidden_law_goes_with_is_discovered() {
     let [at_1_khz, per_octave] = [0, 1].map(|i| found.causes[0].parameters[i].value);
     assert!((at_1_khz + 1.5 * per_octave - PLAIN_DB).abs() < 4.0, "{at_1_khz} {per_octave}");
     // The model renders it.
-    let law = &found.model.laws[0];
+    let law = found.model.causes[0].law().unwrap();
     let at = |hz: f64| law.value(|name| Some(if name == "frequency_hz" { hz } else { 0.0 })).unwrap();
     assert!((at(2000.0) + (at_1_khz + per_octave).max(0.0)).abs() < 1e-9 && found.model.room(&room).is_ok());
 }
@@ -109,7 +109,7 @@ fn where_no_law_is_at_work_none_is_named() {
     let (_folder, room) = room(&[]);
     let found = diagnoser(laws(&room)).unwrap().discovering().diagnose(&room, &[], &()).unwrap();
     assert_eq!(found.verdict, Verdict::Adequate, "{:?}", found.causes);
-    assert!(found.causes.is_empty() && found.model.laws.is_empty());
+    assert!(found.causes.is_empty() && found.model.causes.is_empty());
 }
 
 #[test]

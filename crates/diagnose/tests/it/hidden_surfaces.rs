@@ -52,7 +52,7 @@ fn a_panel_that_the_mesh_lacks_is_found_and_located() {
         assert!(low <= truth && truth <= high, "{name}: {truth} is not within {low} to {high}");
         assert!(high - low < 0.2, "{name}: {low} to {high}");
     }
-    assert_eq!(found.model.sheets.len(), 1);
+    assert_eq!(found.model.applied().sheets.len(), 1);
     // The pulse's height is that of the high octaves.
     let (low, high) = interval(&cause, "reflectance");
     let truth_db = 10.0 * reflectance[reflectance.len() - 1].log10();
@@ -78,8 +78,8 @@ fn a_hole_in_a_wall_is_found_and_located() {
     let truth = size_m[0] * size_m[1];
     assert!(low <= truth && truth <= high, "area: {truth} is not within {low} to {high}");
     // It renders as a sheet that absorbs everything.
-    assert_eq!(found.model.sheets.len(), 1);
-    assert!((found.model.sheets[0].absorption - 1.0).abs() < 1e-12);
+    assert_eq!(found.model.applied().sheets.len(), 1);
+    assert!((found.model.applied().sheets[0].absorption - 1.0).abs() < 1e-12);
 }
 
 #[test]

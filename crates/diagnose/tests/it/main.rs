@@ -3,6 +3,7 @@
 mod any_tracer;
 mod channel_gains;
 mod extended_laws;
+mod extended_model;
 mod hidden_distortion;
 mod hidden_edges;
 mod hidden_effects;

@@ -10,17 +10,22 @@ use sabine_scene::MeasuredRoom;
 use std::path::PathBuf;
 
 const RATE_HZ: u32 = 32_000;
-const CENTRES: &str = "centres_hz = [125, 250, 500, 1000, 2000, 4000, 8000]\ncauses = []\n";
 const BANDS: Bands = Bands::T60;
 
 fn fixture() -> MeasuredRoom {
     MeasuredRoom::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/room")).unwrap()
 }
 
-fn in_file(text: &str) -> (tempfile::TempDir, PathBuf) {
+/// A model with some changes, a line each; lines on absorption are none.
+fn in_file(lines: &str) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("extended_model.toml");
-    std::fs::write(&path, format!("{CENTRES}{text}")).unwrap();
+    let (absorption, changes): (Vec<&str>, Vec<&str>) =
+        lines.lines().partition(|line| line.starts_with("absorption"));
+    let changes: Vec<String> = changes.iter().map(|change| format!("{{ {change} }}")).collect();
+    let head = "version = 2\ncentres_hz = [125, 250, 500, 1000, 2000, 4000, 8000]";
+    let cause = format!("[[causes]]\nid = \"by_hand\"\nchanges = [{}]", changes.join(", "));
+    std::fs::write(&path, format!("{head}\n{}\n{cause}\n", absorption.join("\n"))).unwrap();
     (folder, path)
 }
 
@@ -76,7 +81,7 @@ fn room_of_fixture() -> (MeasuredRoom, ImpulseResponse) {
 /// A level sheet 0.8 m below the talker and 0.6 m below the microphone: its image is 1.4 m lower.
 #[test]
 fn a_sheet_reflects_where_its_image_says() {
-    let text = "[[sheets]]\nabsorption = 0.2\ncorners_m = [[3.4, 1.2, 0.7], [5.0, 1.2, 0.7], [5.0, 3.0, 0.7], [3.4, 3.0, 0.7]]\n";
+    let text = "sheet = { absorption = 0.2, corners_m = [[3.4, 1.2, 0.7], [5.0, 1.2, 0.7], [5.0, 3.0, 0.7], [3.4, 3.0, 0.7]] }";
     let stated = fixture();
     let room = extended(text).measured_room(&stated).unwrap();
     assert_eq!(room.scene().materials().len(), stated.scene().materials().len() + 1);
@@ -143,7 +148,7 @@ fn a_coupled_volume_has_its_level_slope_and_gradient() {
     let receivers = room.receivers();
     let [near, far] = [receivers[0].position_m, receivers[1].position_m];
     let text = format!(
-        "[coupled]\nenergy_per_s = {:?}\ndecay_time_s = {t:?}\ngradient_db_per_m = [1.0, 0.0, 0.0]\ncentre_m = {near:?}",
+        "coupled = {{ energy_per_s = {:?}, decay_time_s = {t:?}, gradient_db_per_m = [1.0, 0.0, 0.0], centre_m = {near:?} }}",
         [level; 7],
     );
     let extended = extended(&text);
@@ -188,7 +193,7 @@ fn gains_are_those_of_the_octaves_of_a_pulse() {
         assert!((db(*found) - wanted).abs() < 0.05, "{found:.3}: {:.2} dB for {wanted}", db(*found));
     }
     // A cardioid of gain 1 on its axis radiates a third of the power; the model keeps the power.
-    let cardioid = "directed_share = [0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5]\naxis.talker = [1, 0, 0]\naxis.screen = [1, 0, 0]";
+    let cardioid = "source_pattern = { directed_share = [0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5], axis = { talker = [1, 0, 0], screen = [1, 0, 0] } }";
     for found in energies(&finished(cardioid, pulse(8000, 16_000))) {
         assert!((found / 3.0 - 1.0).abs() < 0.01, "{found}");
     }
@@ -216,21 +221,22 @@ fn the_recorder_delays_stretches_cuts_and_turns() {
         assert!((f64::from(sample) - tone(n, 32.5)).abs() < 1e-4, "sample {n}");
     }
     let noise = "noise_per_s = [0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1]\n";
-    let cut = finished(&format!("{noise}truncation = [0.1, 0.02]"), vec![0.0; 6400]);
+    let cut = finished(&format!("{noise}truncation_s = [0.1, 0.02]"), vec![0.0; 6400]);
     let whole = finished(noise, vec![0.0; 6400]);
     assert!(cut[3200..].iter().all(|&s| s == 0.0) && cut[..2560] == whole[..2560]);
     assert!((cut[2880] - 0.5 * whole[2880]).abs() <= 1e-6 * whole[2880].abs());
-    let turned = "inverted = [\"talker-microphone\"]\nresponse_gain_db.talker-microphone = 6";
+    let turned =
+        "inverted = \"talker-microphone\"\nresponse_gain = { response = \"talker-microphone\", gain_db = 6 }";
     assert!((finished(turned, pulse(9, 99))[9] + 10f32.powf(0.3)).abs() < 1e-5);
-    let other = "inverted = [\"talker-corner\"]\nresponse_gain_db.talker-corner = 6";
+    let other = "inverted = \"talker-corner\"\nresponse_gain = { response = \"talker-corner\", gain_db = 6 }";
     assert_eq!(finished(other, pulse(9, 99)), pulse(9, 99));
 }
 
 #[test]
 fn the_room_is_as_the_model_says() {
     let text = "relative_humidity_percent = 12\ntemperature_c = 30\n\
-        absorption.carpet = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]\nscattering.carpet = [0.9, 0.9, 0.9, 0.9, 0.9, 0.9, 0.9]\n\
-        position_m.corner = [1.0, 4.0, 1.5]\n[dimensions]\nscale = [1.1, 1.0, 0.9]\nshift_m = [0.0, 0.2, 0.0]\n";
+        absorption.carpet = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]\nscattering = { carpet = [0.9, 0.9, 0.9, 0.9, 0.9, 0.9, 0.9] }\n\
+        position = { id = \"corner\", position_m = [1.0, 4.0, 1.5] }\ndimensions = { scale = [1.1, 1.0, 0.9], shift_m = [0.0, 0.2, 0.0] }";
     let room = fixture();
     let extended = extended(text);
     assert!((extended.scene.volume_m3() / room.scene().volume_m3() - 0.99).abs() < 1e-9);
@@ -260,7 +266,7 @@ fn the_room_is_as_the_model_says() {
 
 #[test]
 fn a_model_is_read_as_it_was_written() {
-    let text = "noise_per_s = [1, 2, 3, 4, 5, 6, 7]\nexchanged = [[\"talker-corner\", \"talker-microphone\"]]\n\
+    let text = "noise_per_s = [1, 2, 3, 4, 5, 6, 7]\nexchanged = [\"talker-corner\", \"talker-microphone\"]\n\
         absorption.carpet = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]\n";
     let (folder, path) = in_file(text);
     let model = ExtendedModel::read(path).unwrap();
@@ -277,7 +283,7 @@ fn what_is_wrong_in_a_file_is_named() {
         ("absorption.carpet = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 1.7]", &["absorption.carpet", "1.7"]),
         ("gain_db = [nan, 0, 0, 0, 0, 0, 0]", &["gain_db", "NaN"]),
         ("temperature_c = 300", &["temperature_c", "300"]),
-        ("truncation = [-1, 0]", &["truncation", "-1"]),
+        ("truncation_s = [-1, 0]", &["truncation_s", "-1"]),
         ("dimensions = { scale = [1, 1, 9], shift_m = [0, 0, 0] }", &["dimensions.scale", "9"]),
         ("wishes = 3", &["wishes"]),
         ("clock_ppm = \"fast\"", &["clock_ppm"]),
@@ -290,9 +296,13 @@ fn what_is_wrong_in_a_file_is_named() {
     assert!(matches!(ExtendedModel::read("no/such.toml"), Err(Error::Acoustics(_))));
     for (text, field, name) in [
         ("absorption.velvet = [0, 0, 0, 0, 0, 0, 0]", "absorption", "velvet"),
-        ("position_m.nobody = [0, 0, 0]", "position_m", "nobody"),
-        ("inverted = [\"corner-talker\"]", "inverted", "corner-talker"),
-        ("directed_share = [0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5]", "axis.talker", "talker"),
+        ("position = { id = \"nobody\", position_m = [0, 0, 0] }", "position", "nobody"),
+        ("inverted = \"corner-talker\"", "inverted", "corner-talker"),
+        (
+            "source_pattern = { directed_share = [0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5], axis = {} }",
+            "source_pattern.axis.talker",
+            "talker",
+        ),
     ] {
         let (_folder, path) = in_file(text);
         let error = ExtendedModel::read(path).unwrap().room(&fixture()).unwrap_err();
@@ -319,18 +329,18 @@ fn a_gain_over_time_acts_on_the_time_of_the_file() {
     for at in [3200, 9600, 16_000, 28_800] {
         pulses[at] = 1.0;
     }
-    let model = "[gain_over_time]\ntime_s = [0.2, 0.4, 0.6]\ngain_db = [-6, 0, 12]\n";
+    let model = "gain_over_time = { time_s = [0.2, 0.4, 0.6], gain_db = [-6, 0, 12] }";
     let found = finished(model, pulses);
     // Before the first instant, halfway, halfway, after the last.
     for (at, gain_db) in [(3200, -6.0), (9600, -3.0), (16_000, 6.0), (28_800, 12.0)] {
         assert!((20.0 * f64::from(found[at]).log10() - gain_db).abs() < 1e-3, "{at}: {}", found[at]);
     }
     for (field, wrong) in [
-        ("gain_over_time.gain_db", "time_s = [0.2, 0.4]\ngain_db = [1]"),
-        ("gain_over_time.time_s", "time_s = [0.4, 0.2]\ngain_db = [1, 2]"),
-        ("gain_over_time.gain_db", "time_s = []\ngain_db = []"),
+        ("gain_over_time.gain_db", "time_s = [0.2, 0.4], gain_db = [1]"),
+        ("gain_over_time.time_s", "time_s = [0.4, 0.2], gain_db = [1, 2]"),
+        ("gain_over_time.gain_db", "time_s = [], gain_db = []"),
     ] {
-        let (_folder, path) = in_file(&format!("[gain_over_time]\n{wrong}\n"));
+        let (_folder, path) = in_file(&format!("gain_over_time = {{ {wrong} }}"));
         let error = ExtendedModel::read(path).unwrap_err().to_string();
         assert!(error.contains(field), "{error}");
     }
@@ -338,7 +348,7 @@ fn a_gain_over_time_acts_on_the_time_of_the_file() {
 
 #[test]
 fn a_microphone_with_a_pattern_hears_its_direction_and_as_much_of_a_diffuse_field() {
-    let text = "receiver_directed_share.microphone = [0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5]\nreceiver_axis.microphone = [0, 0, 1]\n";
+    let text = "receiver_pattern = { directed_share = { microphone = [0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5] }, axis = { microphone = [0, 0, 1] } }";
     let room = extended(text);
     let materials: Vec<_> = room.scene.materials().iter().map(|m| m.material.clone()).collect();
     let conditions = room.conditions(&materials, 0, 0);
@@ -356,30 +366,36 @@ fn a_microphone_with_a_pattern_hears_its_direction_and_as_much_of_a_diffuse_fiel
 #[test]
 fn a_channel_has_its_own_octaves() {
     let wanted = [-3.0, -1.0, 0.0, 1.0, 2.0, 1.0, -2.0];
-    let text = format!("response_band_gain_db.talker-microphone = {wanted:?}");
+    let text = format!("response_band_gains = {{ response = \"talker-microphone\", gain_db = {wanted:?} }}");
     let found = energies(&finished(&text, pulse(8000, 16_000)));
     for (found, wanted) in found.iter().zip(wanted) {
         assert!((db(*found) - wanted).abs() < 0.05, "{} for {wanted}", db(*found));
     }
-    let other = "response_band_gain_db.talker-corner = [9, 9, 9, 9, 9, 9, 9]";
+    let other = "response_band_gains = { response = \"talker-corner\", gain_db = [9, 9, 9, 9, 9, 9, 9] }";
     assert_eq!(finished(other, pulse(9, 99)), pulse(9, 99));
-    let (_folder, path) = in_file("response_band_gain_db.nobody = [0, 0, 0, 0, 0, 0, 0]");
+    let (_folder, path) =
+        in_file("response_band_gains = { response = \"nobody\", gain_db = [0, 0, 0, 0, 0, 0, 0] }");
     let error = ExtendedModel::read(path).unwrap().room(&fixture()).unwrap_err().to_string();
-    assert!(error.contains("response_band_gain_db") && error.contains("nobody"), "{error}");
+    assert!(error.contains("response_band_gains") && error.contains("nobody"), "{error}");
 }
 
 const END_WALL: &str =
-    "[[surfaces]]\npoint_m = [POINT]\nnormal = [NORMAL]\noffset_m = OFFSET\ntilt_deg = [0.0, TILT]\n";
+    "surface = { point_m = [POINT], normal = [NORMAL], offset_m = OFFSET, tilt_deg = [0.0, TILT] }\n";
 
 /// The fixture's wall at its greatest x, displaced.
 fn end_wall(offset_m: f64, tilt_deg: f64) -> (String, f64) {
+    end_wall_about(0.0, offset_m, tilt_deg)
+}
+
+/// The same, said by a point so far from its middle.
+fn end_wall_about(aside_m: f64, offset_m: f64, tilt_deg: f64) -> (String, f64) {
     let room = fixture();
     let far = room.scene().vertices().iter().map(|v| v[0]).fold(f64::NEG_INFINITY, f64::max);
     let corners: Vec<&[f64; 3]> =
         room.scene().vertices().iter().filter(|v| (v[0] - far).abs() < 1e-9).collect();
     let middle = |k: usize| corners.iter().map(|c| c[k]).sum::<f64>() / corners.len() as f64;
     let text = END_WALL
-        .replace("POINT", &format!("{far}, {}, {}", middle(1), middle(2)))
+        .replace("POINT", &format!("{far}, {}, {}", middle(1) + aside_m, middle(2)))
         .replace("NORMAL", "1.0, 0.0, 0.0")
         .replace("OFFSET", &format!("{offset_m:?}"))
         .replace("TILT", &format!("{tilt_deg:?}"));
@@ -407,7 +423,7 @@ fn a_displaced_surface_comes_out_of_its_file_where_it_stands() {
     let x = far - 0.005;
     let sheet = |x: f64| {
         format!(
-            "[[sheets]]\nabsorption = 1.0\ncorners_m = [[{x}, 1.0, 1.0], [{x}, 2.0, 1.0], [{x}, 2.0, 2.0], [{x}, 1.0, 2.0]]\n"
+            "sheet = {{ absorption = 1.0, corners_m = [[{x}, 1.0, 1.0], [{x}, 2.0, 1.0], [{x}, 2.0, 2.0], [{x}, 1.0, 2.0]] }}\n"
         )
     };
     let (text, _) = end_wall(0.3, 0.0);
@@ -427,12 +443,13 @@ fn a_surface_that_cannot_stand_there_is_refused_by_name() {
     let elsewhere = text.replace("normal = [1.0, 0.0, 0.0]", "normal = [0.0, 0.6, 0.8]");
     let error = refused(&elsewhere);
     assert!(matches!(error, Error::Displacement(DisplacementError::NoSurface { .. })), "{error}");
-    let error = refused(&format!("{text}{text}"));
+    let (again, _) = end_wall_about(0.1, 0.1, 0.0);
+    let error = refused(&format!("{text}{again}"));
     assert!(matches!(error, Error::Displacement(DisplacementError::Twice { .. })), "{error}");
     for (from, to, field) in [
-        ("offset_m = 0.1", "offset_m = 3.0", "surfaces.offset_m"),
-        ("normal = [1.0, 0.0, 0.0]", "normal = [2.0, 0.0, 0.0]", "surfaces.normal"),
-        ("tilt_deg = [0.0, 0.0]", "tilt_deg = [0.0, 45.0]", "surfaces.tilt_deg"),
+        ("offset_m = 0.1", "offset_m = 3.0", "surface.offset_m"),
+        ("normal = [1.0, 0.0, 0.0]", "normal = [2.0, 0.0, 0.0]", "surface.normal"),
+        ("tilt_deg = [0.0, 0.0]", "tilt_deg = [0.0, 45.0]", "surface.tilt_deg"),
     ] {
         let error = refused(&text.replace(from, to)).to_string();
         assert!(error.contains(field), "{error}");

@@ -29,6 +29,7 @@ const ADDED: &str = "fill=\"#d55e00\" fill-opacity=\"0.3\"";
 
 /// Whether what was found has a place in the room.
 pub fn has_a_place(model: &ExtendedModel) -> bool {
+    let model = model.applied();
     let axes = model.axis.is_empty() && model.receiver_axis.is_empty();
     let places = model.position_m.is_empty() && model.surfaces.is_empty() && model.sheets.is_empty();
     !(axes && places && model.dimensions.is_none())
@@ -271,7 +272,7 @@ mod tests {
     use super::*;
     use crate::demo::Demo;
     use crate::room::read_room;
-    use sabine::diagnose::{Dimensions, ThinPanel};
+    use sabine::diagnose::{Dimensions, ModelCause, ModelChange, ThinPanel};
 
     #[test]
     fn what_was_found_is_drawn_where_it_is() {
@@ -284,13 +285,19 @@ mod tests {
         let source = &room.sources()[0];
         let mut there = source.position_m;
         there[0] += 0.2 * (0.5 * (low[0] + high[0]) - there[0]).signum();
-        model.position_m.insert(source.id.clone(), there);
+        model.causes.push(ModelCause::new(
+            "a",
+            vec![ModelChange::Position { id: source.id.clone(), position_m: there }],
+        ));
         let unaltered = svg(&room, &model.room(&room).unwrap());
         assert!(has_a_place(&model) && unaltered.contains("from where it is stated"));
         assert!(!unaltered.contains("<polygon") && !unaltered.contains("the mesh as found"));
 
-        model.sheets.push(ThinPanel::rectangle(there, [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], [0.2, 0.1], 0.1));
-        model.dimensions = Some(Dimensions::new([1.05, 1.0, 1.0], [0.0; 3]));
+        let panel = ThinPanel::rectangle(there, [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], [0.2, 0.1], 0.1);
+        let size = Dimensions::new([1.05, 1.0, 1.0], [0.0; 3]);
+        model
+            .causes
+            .push(ModelCause::new("b", vec![ModelChange::Panel(panel), ModelChange::Dimensions(size)]));
         let drawn = svg(&room, &model.room(&room).unwrap());
         // Two triangles in each of three views.
         assert_eq!(drawn.matches("<polygon").count(), 6);

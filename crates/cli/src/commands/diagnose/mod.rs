@@ -22,8 +22,7 @@ use crate::room::RoomArguments;
 use clap::Args;
 use findings::Findings;
 use sabine::acoustics::Error as ValueError;
-use sabine::diagnose::{DiagnoseConfig, Diagnoser, Error as DiagnoseError, catalogue, read_laws};
-use std::collections::BTreeSet;
+use sabine::diagnose::{DiagnoseConfig, Diagnoser, Error as DiagnoseError, ExtendedModel, read_laws};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -44,6 +43,9 @@ pub struct Arguments {
     /// Look for a law beside the catalogue: what the misfit goes with (angles, lengths, directions, time), and by how much
     #[arg(long)]
     discover: bool,
+    /// extended_model.toml of an earlier diagnosis to start from: its causes are at work, fitted anew, and the search goes on
+    #[arg(long, value_name = "F.toml")]
+    model: Option<PathBuf>,
     /// Rays for each source-receiver pair [default: 10000]
     #[arg(long)]
     rays: Option<usize>,
@@ -76,13 +78,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         config.rays = rays;
     }
     let laws = arguments.laws.as_ref().map(read_laws).transpose()?.unwrap_or_default();
-    let effects = match &arguments.effects {
-        ids if ids.is_empty() => catalogue().len(),
-        ids => ids.iter().collect::<BTreeSet<_>>().len(),
-    };
-    let tried = effects + laws.len() + usize::from(arguments.discover);
-    // What a name must reach: the odds that are asked for, and the number that was tried.
-    let threshold_nats = config.naming_nats + (tried as f64).ln();
     let mut diagnoser = Diagnoser::new(config)?;
     if !arguments.effects.is_empty() {
         diagnoser = diagnoser.with_only(&arguments.effects)?;
@@ -91,6 +86,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.discover {
         diagnoser = diagnoser.discovering();
     }
+    if let Some(model) = &arguments.model {
+        diagnoser = diagnoser.starting_from(&ExtendedModel::read(model)?)?;
+    }
+    let threshold_nats = diagnoser.threshold_nats();
     // A folder that cannot be written to should not cost the user a computation first.
     let mut out = OutputFolder::create(&arguments.out)?;
     let (room, name) = arguments.room.read(&mut demo)?;

@@ -75,7 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut wave_below_hz = arguments.wave_below;
     if let Some(model) = &arguments.model {
         let read = ExtendedModel::read(model)?;
-        if !read.laws.is_empty() {
+        if read.causes.iter().any(|cause| cause.law().is_some()) {
             println!("note: the laws of {} are left out: materials are fitted without them", model.display());
         }
         let extended = read.room(&room)?;

@@ -3,6 +3,7 @@
 //!
 //! Without arguments it runs on the built-in demo. See docs/how-to/trace-a-room.md.
 
+mod draws;
 mod plan;
 mod waves;
 
@@ -13,10 +14,11 @@ use crate::laws::naming_laws;
 use crate::output::OutputFolder;
 use crate::room::{PlaceArguments, RoomArguments};
 use clap::{Args, ValueEnum};
+use draws::{Drawing, Draws};
 use sabine::acoustics::{
     Directivity, NoReading, Orientation, PerBand, Reading, SampleFormat, Signal, encode_wav, write_atomically,
 };
-use sabine::diagnose::{ExtendedModel, ModelChange, read_laws};
+use sabine::diagnose::{ExtendedModel, read_laws};
 use sabine::paths::laws::{BoundLaws, LawSite};
 use sabine::paths::{Conditions, PathParameters, PathSet, Propagator};
 use sabine::propagate::{
@@ -44,6 +46,10 @@ pub struct Arguments {
     /// plan and parameters are those of the room, without loudspeaker response, noise and recorder
     #[arg(long, value_name = "F.toml")]
     model: Option<PathBuf>,
+    /// Render so many draws from how sure the numbers of --model are, too: what that leaves open in T30 and, in the folder, decay_band.csv
+    /// and decay_band.svg
+    #[arg(long, value_name = "N", requires = "model", value_parser = clap::value_parser!(u32).range(5..=1000))]
+    draws: Option<u32>,
     /// Formulas that change what paths carry, `[[laws]]` in TOML: response, ambisonics, plan and parameters are those under them; beside
     /// those of --model. See docs/how-to/own-law.md
     #[arg(long, value_name = "F.toml")]
@@ -145,12 +151,10 @@ fn trace_room(arguments: &Arguments) -> Result<(), Failure> {
     let (stated, room_name) = arguments.room.read(&mut Demo::default())?;
     let model = arguments.model.as_ref();
     let own_laws = arguments.laws.as_ref().map(read_laws).transpose()?.unwrap_or_default();
-    let under_own_laws = |path: &PathBuf| {
-        let mut model = ExtendedModel::read(path)?;
-        own_laws.iter().for_each(|law| model.apply(ModelChange::Law(Box::new(law.clone()))));
-        model.room(&stated)
-    };
-    let extended = model.map(under_own_laws).transpose()?;
+    let with_laws =
+        |path| ExtendedModel::read(path).map(|m| own_laws.iter().cloned().fold(m, ExtendedModel::with_law));
+    let modelled = model.map(with_laws).transpose()?;
+    let extended = modelled.as_ref().map(|model| model.room(&stated)).transpose()?;
     let room = extended.as_ref().map_or_else(|| Ok(stated.clone()), |model| model.measured_room(&stated))?;
     let (source, receiver) = arguments.place.of(&room)?;
     let renderer =
@@ -215,6 +219,18 @@ fn trace_room(arguments: &Arguments) -> Result<(), Failure> {
     let directional = ambisonic.render(&paths, &conditions, facing)?;
     let render_s = render_s + start.elapsed().as_secs_f64();
 
+    let drawn = match (arguments.draws, &modelled, from.zip(to)) {
+        (Some(count), Some(model), Some(pair)) => {
+            let duration_s = paths.max_length_m() / air.speed_of_sound_m_s();
+            let tracer = TracerConfig { duration_s, ..tracer };
+            let drawing =
+                Drawing { model, room: &stated, pair, tracer, renderer: &mono, seed: arguments.seed };
+            Some(drawing.render(count as usize, &bar)?)
+        }
+        _ => None,
+    };
+    bar.finish();
+
     let absorption_sd: Vec<PerBand<f64>> =
         room.priors().iter().map(|prior| prior.absorption_sd.clone()).collect();
     let by_materials = PathParameters::read_material_errors(&paths, &conditions, &absorption_sd)?;
@@ -230,6 +246,9 @@ fn trace_room(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(waves) = &waves {
         println!("{}", waves.line());
     }
+    if let Some(draws) = &drawn {
+        println!("{}", draws.line());
+    }
     let mut result = as_json(&parameters, &by_materials);
     let [low, high] = room.scene().bounds_m();
     result["size_m"] = json!([0, 1, 2].map(|k| high[k] - low[k]));
@@ -237,6 +256,7 @@ fn trace_room(arguments: &Arguments) -> Result<(), Failure> {
     result["surface_m2"] = json!(room.scene().surface_m2());
     result["guessed_materials"] = guessed(&room);
     result["waves"] = json!(waves.as_ref().map(Waves::as_json));
+    result["draws"] = json!(drawn.as_ref().map(Draws::as_json));
     result["room"] = json!(room_name);
     result["model"] = json!(model.map(|path| path.display().to_string()));
     result["laws"] = json!(arguments.laws.as_ref().map(|path| path.display().to_string()));
@@ -251,6 +271,10 @@ fn trace_room(arguments: &Arguments) -> Result<(), Failure> {
         out.write("impulse_response.wav", &encode_wav(&response, SampleFormat::Float32)?)?;
         out.write("ambisonics.wav", &directional.encode_wav(SampleFormat::Float32)?)?;
         out.write("plan.svg", plan::svg(&room, source, receiver, &paths, &conditions)?.as_bytes())?;
+        if let Some(draws) = &drawn {
+            out.write("decay_band.csv", draws.csv().as_bytes())?;
+            out.write("decay_band.svg", draws.svg()?.as_bytes())?;
+        }
         out.write("parameters.json", text.as_bytes())?;
         out.finish()?;
         println!("listen to and look at {}", folder.display());

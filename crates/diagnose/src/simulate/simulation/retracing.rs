@@ -3,8 +3,8 @@
 use super::Simulation;
 use crate::effect::Nuisance;
 use crate::error::Error;
+use crate::extend::applied_changes::Dimensions;
 use crate::extend::displaced_surface::DisplacedSurface;
-use crate::extend::extended_model::Dimensions;
 use crate::extend::model_change::ModelChange;
 use crate::extend::moved_mesh::{DisplacementError, check_places, displaced_among};
 use crate::simulate::edges::Edges;

@@ -223,7 +223,7 @@ fn outcome(found: &Diagnosis, hidden: &[Hidden], positive_reflections: bool) -> 
 fn is_of_face(found: &Diagnosis, lab: &Laboratory, face: usize) -> bool {
     let (axis, truth) = (face / 2, lab.truth(&[]));
     let at = |size_m: [f64; 3]| if face.is_multiple_of(2) { 0.0 } else { size_m[axis] };
-    match (&found.model.surfaces[..], truth) {
+    match (&found.model.applied().surfaces[..], truth) {
         ([one], Ok(truth)) => {
             one.normal[axis].abs() > 0.999 && (one.point_m[axis] - at(truth.size_m)).abs() < 1e-3
         }
