@@ -23,6 +23,19 @@ pub enum Error {
         /// Longest target that is accepted, in seconds.
         high_s: f64,
     },
+    /// Conditions that are not one for each pair.
+    #[error("{found} conditions for {pairs} pairs; there must be one for each, or none")]
+    ConditionCount {
+        /// Pairs of source and receiver.
+        pairs: usize,
+        /// Conditions.
+        found: usize,
+    },
+    /// A law under which materials are to be fitted adds sound that no surface reflects.
+    #[error(
+        "materials cannot be fitted under a law that adds sound: nothing says how its energy depends on absorption"
+    )]
+    AddedSound,
     /// A standard error that is negative or not a number.
     #[error("target at {band_hz} Hz: standard error of {value_s} s; it must be finite and not negative")]
     TargetError {

@@ -1,7 +1,14 @@
-//! What is fitted: the materials, what is known of them, and the air.
+//! What is fitted: the materials, what is known of them, the air, and what else bears on the paths.
 
+use crate::Error;
 use crate::config::AbsorptionPrior;
+use crate::history::{History, Trace, Unabsorbed, rigid};
+use rayon::prelude::*;
 use sabine_acoustics::{Air, Material};
+use sabine_paths::Conditions;
+
+/// Added sound is looked for in steps of this length, in seconds.
+const STEP_S: f64 = 0.01;
 
 /// What every fit starts from.
 ///
@@ -26,11 +33,49 @@ pub struct FitProblem<'a> {
     pub priors: &'a [AbsorptionPrior],
     /// The air.
     pub air: &'a Air,
+    /// Under which conditions the paths of each pair carry sound, in the order of the pairs: another attenuation, directional sources and
+    /// receivers, laws. Their materials are not used. Empty: plain air between omnidirectional ends.
+    pub under: &'a [Conditions<'a>],
 }
 
 impl<'a> FitProblem<'a> {
     /// Takes the three; the fit checks that they belong together.
     pub fn new(materials: &'a [Material], priors: &'a [AbsorptionPrior], air: &'a Air) -> Self {
-        Self { materials, priors, air }
+        Self { materials, priors, air, under: &[] }
+    }
+
+    /// The same under conditions, one for each pair.
+    #[must_use]
+    pub fn under(self, conditions: &'a [Conditions<'a>]) -> Self {
+        Self { under: conditions, ..self }
+    }
+
+    /// Everything that the traces keep while absorption is sought.
+    pub(crate) fn histories(
+        &self,
+        traces: &[Trace<'_>],
+        bin_s: f64,
+    ) -> Result<(Vec<History>, Vec<Unabsorbed>), Error> {
+        let pairs = traces.iter().map(|trace| trace.pair + 1).max().unwrap_or(0);
+        if !self.under.is_empty() && self.under.len() != pairs {
+            return Err(Error::ConditionCount { pairs, found: self.under.len() });
+        }
+        let rigid = rigid(self.materials)?;
+        let one = |trace: &Trace<'_>| -> Result<(History, Unabsorbed), Error> {
+            let Some(conditions) = self.under.get(trace.pair) else {
+                let bands = self.materials[0].bands();
+                let unabsorbed = Unabsorbed::Air(self.air.energy_exponent_per_m(bands));
+                return Ok((History::new(trace.paths, self.air, bin_s), unabsorbed));
+            };
+            let conditions = conditions.with_materials(&rigid);
+            if trace.paths.added_energy(&conditions, STEP_S, 1)?.is_some() {
+                return Err(Error::AddedSound);
+            }
+            let delays_s = trace.paths.delays_s(&conditions)?;
+            let history = History::delayed(trace.paths, conditions.air, delays_s.as_deref(), bin_s);
+            Ok((history, Unabsorbed::Under(trace.paths.energies(&conditions)?)))
+        };
+        let all = traces.par_iter().map(one).collect::<Result<Vec<_>, Error>>()?;
+        Ok(all.into_iter().unzip())
     }
 }

@@ -5,7 +5,7 @@ use crate::decay_slope::DecaySlope;
 use crate::fit::{MaterialFit, Unreachable, UnreachableReason, Warning, at_bound};
 use crate::fit_problem::FitProblem;
 use crate::group::{Band, Fitted, Group};
-use crate::history::{History, Trace, by_pair, check_paths};
+use crate::history::{Trace, by_pair, check_paths};
 use crate::single_paths::SinglePathSlope;
 use crate::uncertainty::Spread;
 use crate::unknowns::BandPrior;
@@ -62,10 +62,9 @@ impl MaterialFitter {
         target_t60_s: &PerBand<Estimate>,
         observer: &dyn Observer,
     ) -> Result<MaterialFit, Error> {
-        let FitProblem { materials, priors, air } = *problem;
         let traces: Vec<Trace<'_>> =
             paths.iter().enumerate().map(|(pair, paths)| Trace { pair, paths, share: 1.0 }).collect();
-        self.fit_traces(&traces, materials, priors, air, target_t60_s, observer)
+        self.fit_traces(&traces, problem, target_t60_s, observer)
     }
 
     /// Whether targets are in range, and paths of this duration in seconds long enough for them: what [`fit_t60`](Self::fit_t60)
@@ -95,34 +94,31 @@ impl MaterialFitter {
     pub(crate) fn fit_traces(
         &self,
         traces: &[Trace<'_>],
-        materials: &[Material],
-        priors: &[AbsorptionPrior],
-        air: &Air,
+        problem: &FitProblem<'_>,
         target_t60_s: &PerBand<Estimate>,
         observer: &dyn Observer,
     ) -> Result<MaterialFit, Error> {
+        let FitProblem { materials, priors, air, .. } = *problem;
         let paths: Vec<&PathSet> = traces.iter().map(|t| t.paths).collect();
         check_paths(&paths, materials)?;
         self.check_priors(materials, priors)?;
         let octaves = materials[0].bands();
         let targets = target_t60_s.resampled(octaves);
-        let exponents = air.energy_exponent_per_m(octaves);
         let limits_s = air_limits_s(air, octaves);
         let traced_s =
             paths.iter().map(|p| p.max_length_m()).fold(f64::INFINITY, f64::min) / air.speed_of_sound_m_s();
         self.check_t60(target_t60_s, octaves, air, traced_s)?;
 
-        let histories: Vec<History> =
-            paths.par_iter().map(|p| History::new(p, air, self.config.bin_s)).collect();
+        let (histories, unabsorbed) = problem.histories(traces, self.config.bin_s)?;
         let bands = (0..octaves.len())
             .into_par_iter()
             .map(|b| {
                 let weighted = histories
                     .iter()
+                    .zip(&unabsorbed)
                     .zip(traces)
-                    .map(|(history, trace)| {
-                        let exponent = exponents.values()[b];
-                        Ok((history, history.weights(trace.paths, materials, exponent, b, trace.share)?))
+                    .map(|((history, own), trace)| {
+                        Ok((history, history.weights(trace.paths, materials, own, b, trace.share)?))
                     })
                     .collect::<Result<Vec<_>, Error>>()?;
                 let line = match self.config.objective {

@@ -25,12 +25,27 @@ pub(crate) struct History {
     speed_m_s: f64,
 }
 
+/// What the energies of paths are if no surface absorbs.
+pub(crate) enum Unabsorbed {
+    /// By distance, scattering and air alone: the exponents of the air by band, per metre.
+    Air(PerBand<f64>),
+    /// Under conditions of their own, `[band][contribution]`.
+    Under(Vec<Vec<f32>>),
+}
+
 impl History {
     pub fn new(paths: &PathSet, air: &Air, bin_s: f64) -> Self {
+        Self::delayed(paths, air, None, bin_s)
+    }
+
+    /// Of paths that arrive later than their length says, each by so many seconds.
+    pub fn delayed(paths: &PathSet, air: &Air, delays_s: Option<&[f64]>, bin_s: f64) -> Self {
         let materials = paths.materials();
         let speed_m_s = air.speed_of_sound_m_s();
         let bins = (paths.max_length_m() / speed_m_s / bin_s).ceil() as usize;
-        let time_s = |i: usize| f64::from(paths.lengths_m()[i]) / speed_m_s;
+        let time_s = |i: usize| {
+            f64::from(paths.lengths_m()[i]) / speed_m_s + delays_s.map_or(0.0, |delays_s| delays_s[i])
+        };
         let bin_of: Vec<usize> = (0..paths.len()).map(|i| (time_s(i) / bin_s) as usize).collect();
         // Counting sort; paths past the end are left out, as they are in an energy response.
         let mut starts = vec![0u32; bins + 1];
@@ -79,21 +94,23 @@ impl History {
         self.order.len()
     }
 
-    /// Energy of each path in one band if no surface absorbed, distance, scattering and air alone, times `share`.
+    /// Energy of each path in one band if no surface absorbed, times `share`.
     pub fn weights(
         &self,
         paths: &PathSet,
         materials: &[Material],
-        air_exponent_per_m: f64,
+        unabsorbed: &Unabsorbed,
         band: usize,
         share: f64,
     ) -> Result<Vec<f32>, Error> {
-        let rigid: Vec<Material> = materials
-            .iter()
-            .map(|m| m.with_absorption(PerBand::uniform(m.bands(), 0.0)))
-            .collect::<Result<_, _>>()?;
-        let scattering = paths.log_reflectance(&rigid, band)?;
-        let exponent = air_exponent_per_m as f32;
+        let exponents = match unabsorbed {
+            Unabsorbed::Air(exponents) => exponents,
+            Unabsorbed::Under(energies) => {
+                return Ok(self.order.iter().map(|&i| share as f32 * energies[band][i as usize]).collect());
+            }
+        };
+        let scattering = paths.log_reflectance(&rigid(materials)?, band)?;
+        let exponent = exponents.values()[band] as f32;
         let log_share = share.ln() as f32;
         let weight = |&i: &u32| {
             let i = i as usize;
@@ -237,6 +254,12 @@ pub(crate) fn variance_of_sum(parts: &[f64]) -> f64 {
 /// The traces of one source-receiver pair, each a history and the weights of its paths in a band, the share of the trace in
 /// the whole included: their energies add up.
 pub(crate) type Traces<H> = Vec<(H, Vec<f32>)>;
+
+/// Materials that scatter as these and absorb nothing.
+pub(crate) fn rigid(materials: &[Material]) -> Result<Vec<Material>, Error> {
+    let one = |m: &Material| m.with_absorption(PerBand::uniform(m.bands(), 0.0));
+    Ok(materials.iter().map(one).collect::<Result<_, _>>()?)
+}
 
 /// One trace of a source-receiver pair.
 #[derive(Clone, Copy)]

@@ -37,15 +37,29 @@ impl DecayMisfit {
         materials: &[Material],
         air: &Air,
     ) -> Result<Self, Error> {
+        Self::under(pair, time_zero, &Conditions::new(materials, air))
+    }
+
+    /// The same under conditions: laws, another attenuation, directional ends.
+    ///
+    /// # Errors
+    /// As [`DecayMisfit::new`]; a law that has no value on some path.
+    pub fn under(
+        pair: MeasuredPair<'_>,
+        time_zero: TimeZero,
+        conditions: &Conditions<'_>,
+    ) -> Result<Self, Error> {
+        let Conditions { materials, air, .. } = *conditions;
         check_paths(&[pair.paths], materials)?;
         let bands = pair.measured.bands();
         if materials[0].bands() != bands {
             let (left, right) = (bands, materials[0].bands());
             return Err(sabine_acoustics::Error::BandMismatch { left, right }.into());
         }
-        let history = History::new(pair.paths, air, BIN_S);
+        let delays_s = pair.paths.delays_s(conditions)?;
+        let history = History::delayed(pair.paths, air, delays_s.as_deref(), BIN_S);
         let latency_s = latencies_s(&[pair], std::slice::from_ref(&history), time_zero)[0];
-        let energy = pair.paths.energy_response(&Conditions::new(materials, air), BIN_S)?;
+        let energy = pair.paths.energy_response(conditions, BIN_S)?;
         let filtered = filtered(pair.measured, &energy, latency_s);
         let simulated_t30_s = PerBand::from_fn(bands, |b| {
             let t30 = EnergyDecayCurve::from_energy(&filtered[b], BIN_S).decay_time_s(-5.0, -35.0)?;

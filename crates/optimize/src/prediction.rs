@@ -3,8 +3,9 @@
 use crate::Error;
 use crate::decay::{DB_PER_NEPER, slope_with_sensitivity};
 use crate::expansion::Bins;
+use crate::fit_problem::FitProblem;
 use crate::history::{History, variance_of_sum};
-use crate::history::{Trace, Traces, by_pair, check_paths};
+use crate::history::{Trace, Traces, Unabsorbed, by_pair, check_paths};
 use rayon::prelude::*;
 use sabine_acoustics::{Air, EnergyDecayCurve, Estimate, Material, NoReading, PerBand, Reading};
 use sabine_paths::PathSet;
@@ -51,9 +52,9 @@ impl PredictedChange {
         }
         let history = History::new(paths, air, BIN_S);
         let direct_s = history.times_s.iter().fold(f64::INFINITY, |first, t| first.min(*t));
-        let exponents = air.energy_exponent_per_m(bands);
+        let unabsorbed = Unabsorbed::Air(air.energy_exponent_per_m(bands));
         let read = |materials: &[Material], b: usize| -> Result<[Linear; 3], Error> {
-            let weights = history.weights(paths, materials, exponents.values()[b], b, 1.0)?;
+            let weights = history.weights(paths, materials, &unabsorbed, b, 1.0)?;
             let absorption: Vec<f64> = materials.iter().map(|m| m.absorption().values()[b]).collect();
             let bins = Bins::of(&vec![(&history, weights.clone())], &absorption);
             Ok(functionals(&bins, direct_s).map(|reading| Linear {
@@ -145,21 +146,21 @@ fn functionals(bins: &Bins, direct_s: f64) -> [Result<(f64, Vec<f64>), NoReading
 /// Reverberation time of the decay curves of several traces, in every band, the mean over pairs.
 pub(crate) fn t60_of_traces(
     traces: &[Trace<'_>],
-    materials: &[Material],
-    air: &Air,
+    problem: &FitProblem<'_>,
     bin_s: f64,
     range_db: (f64, f64),
 ) -> Result<PerBand<Reading>, Error> {
+    let materials = problem.materials;
     let bands = materials[0].bands();
-    let exponents = air.energy_exponent_per_m(bands);
-    let histories: Vec<History> = traces.par_iter().map(|t| History::new(t.paths, air, bin_s)).collect();
+    let (histories, unabsorbed) = problem.histories(traces, bin_s)?;
     let readings = (0..bands.len())
         .into_par_iter()
         .map(|b| {
             let weighted = histories
                 .iter()
+                .zip(&unabsorbed)
                 .zip(traces)
-                .map(|(h, t)| Ok((h, h.weights(t.paths, materials, exponents.values()[b], b, t.share)?)))
+                .map(|((h, u), t)| Ok((h, h.weights(t.paths, materials, u, b, t.share)?)))
                 .collect::<Result<Vec<_>, Error>>()?;
             let pairs: Vec<Traces<&History>> = by_pair(traces, weighted);
             let curve = crate::decay_slope::DecaySlope::new(pairs, range_db);

@@ -3,13 +3,12 @@
 use crate::assembly::FoundBand;
 use crate::fit::Warning;
 use crate::fit_problem::FitProblem;
-use crate::history::{History, Trace, check_paths};
+use crate::history::{History, Trace, Unabsorbed, check_paths};
 use crate::measured_decay::MeasuredDecay;
 use crate::prediction::t60_of_traces;
 use crate::response_band::ResponseBand;
 use crate::response_leaks::solve_with_leaks;
 use crate::{Error, MaterialFit, MaterialFitter};
-use rayon::prelude::*;
 use sabine_acoustics::{NoReading, Observer, PerBand, report};
 use sabine_paths::PathSet;
 use sabine_scene::{Measurement, TimeZero};
@@ -68,7 +67,7 @@ impl MaterialFitter {
         problem: &FitProblem<'_>,
         observer: &dyn Observer,
     ) -> Result<ResponseFit, Error> {
-        let FitProblem { materials, priors, air } = *problem;
+        let FitProblem { materials, priors, .. } = *problem;
         let paths: Vec<&PathSet> = pairs.iter().map(|p| p.paths).collect();
         check_paths(&paths, materials)?;
         self.check_priors(materials, priors)?;
@@ -77,8 +76,11 @@ impl MaterialFitter {
             return Err(sabine_acoustics::Error::BandMismatch { left: octaves, right: other }.into());
         }
         let config = self.config();
-        let histories: Vec<History> = paths.par_iter().map(|p| History::new(p, air, config.bin_s)).collect();
-        let (mut bands, left_out) = self.read_bands(pairs, &histories, measurement, problem)?;
+        let traces: Vec<Trace<'_>> =
+            paths.iter().enumerate().map(|(pair, paths)| Trace { pair, paths, share: 1.0 }).collect();
+        let (histories, unabsorbed) = problem.histories(&traces, config.bin_s)?;
+        let (mut bands, left_out) =
+            self.read_bands(pairs, (&histories, &unabsorbed), measurement, problem)?;
         if bands.iter().all(ResponseBand::is_empty) {
             return Err(Error::NoDecay { responses: pairs.len(), bands: octaves.len() });
         }
@@ -108,9 +110,8 @@ impl MaterialFitter {
                 fit.warnings.push(Warning::LateDecayLeftOut { band_hz });
             }
         }
-        let traces: Vec<Trace<'_>> =
-            paths.iter().enumerate().map(|(pair, paths)| Trace { pair, paths, share: 1.0 }).collect();
-        fit.predicted_t60_s = t60_of_traces(&traces, &fit.materials, air, config.bin_s, config.range_db)?;
+        let fitted = FitProblem { materials: &fit.materials, ..*problem };
+        fit.predicted_t60_s = t60_of_traces(&traces, &fitted, config.bin_s, config.range_db)?;
         let gain_db = (0..pairs.len())
             .map(|i| {
                 PerBand::from_fn(octaves, |b| {
@@ -127,20 +128,19 @@ impl MaterialFitter {
     fn read_bands<'h>(
         &self,
         pairs: &[MeasuredPair<'_>],
-        histories: &'h [History],
+        (histories, unabsorbed): (&'h [History], &[Unabsorbed]),
         measurement: Measurement,
         problem: &FitProblem<'_>,
     ) -> Result<(Vec<ResponseBand<'h>>, LeftOut), Error> {
-        let FitProblem { materials, priors, air } = *problem;
+        let FitProblem { materials, priors, .. } = *problem;
         let (octaves, config) = (materials[0].bands(), self.config());
         let latencies_s = latencies_s(pairs, histories, measurement.time_zero);
-        let exponents = air.energy_exponent_per_m(octaves);
         let mut left_out = Vec::new();
         let mut bands = Vec::with_capacity(octaves.len());
         for (b, band_hz) in octaves.iter_hz().enumerate() {
             let mut band = ResponseBand::new(priors, b, measurement.levels);
             for (i, (pair, history)) in pairs.iter().zip(histories).enumerate() {
-                let weights = history.weights(pair.paths, materials, exponents.values()[b], b, 1.0)?;
+                let weights = history.weights(pair.paths, materials, &unabsorbed[i], b, 1.0)?;
                 match pair.measured.band(b) {
                     Ok(decay) => {
                         let arrival_error_s = config.arrival_error_s;

@@ -4,7 +4,7 @@ use crate::fit_problem::FitProblem;
 use crate::history::{Trace, check_paths};
 use crate::prediction::t60_of_traces;
 use crate::{Error, MaterialFit, MaterialFitter, Unreachable, UnreachableReason};
-use sabine_acoustics::{Air, Bands, Estimate, Material, Observer, OutOfRange, PerBand, Reading, report};
+use sabine_acoustics::{Bands, Estimate, Material, Observer, OutOfRange, PerBand, Reading, report};
 use sabine_paths::PathSet;
 use std::time::Instant;
 
@@ -169,7 +169,7 @@ impl MaterialFitter {
         config: &RetraceConfig,
         observer: &dyn Observer,
     ) -> Result<RetracedFit, Error> {
-        let FitProblem { materials, priors, air } = *problem;
+        let FitProblem { materials, priors, air, .. } = *problem;
         config.check()?;
         // Before anything is traced; how long the paths are is known only then.
         if let Some(material) = materials.first() {
@@ -196,8 +196,7 @@ impl MaterialFitter {
         loop {
             rounds += 1;
             report(observer, STAGE, rounds as u64 - 1, config.max_rounds as u64)?;
-            let mut fit =
-                clock.fitting(|| self.fit_traces(&pool.shares(), materials, priors, air, &aim, observer))?;
+            let mut fit = clock.fitting(|| self.fit_traces(&pool.shares(), problem, &aim, observer))?;
             for unreachable in &mut fit.unreachable {
                 unreachable.as_read(&aim, &target);
             }
@@ -213,7 +212,8 @@ impl MaterialFitter {
                 Some(unseen) => unseen,
                 None => (effort, trace(effort, &mut clock)?),
             };
-            let verified = self.t60_of(&independent, &fit.materials, air)?;
+            let fitted = FitProblem { materials: &fit.materials, ..*problem };
+            let verified = self.t60_of(&independent, &fitted)?;
             let read = clock.tracing(|| room.read_t60_s(&independent, &fit.materials))?;
             let verdicts = verdicts(&fit, &aim, &target, &verified, read.as_ref());
             let settled =
@@ -252,17 +252,12 @@ impl MaterialFitter {
         }
     }
 
-    fn t60_of(
-        &self,
-        paths: &[PathSet],
-        materials: &[Material],
-        air: &Air,
-    ) -> Result<PerBand<Reading>, Error> {
-        check_paths(&paths.iter().collect::<Vec<_>>(), materials)?;
+    fn t60_of(&self, paths: &[PathSet], problem: &FitProblem<'_>) -> Result<PerBand<Reading>, Error> {
+        check_paths(&paths.iter().collect::<Vec<_>>(), problem.materials)?;
         let traces: Vec<Trace<'_>> =
             paths.iter().enumerate().map(|(pair, paths)| Trace { pair, paths, share: 1.0 }).collect();
         let config = self.config();
-        t60_of_traces(&traces, materials, air, config.bin_s, config.range_db)
+        t60_of_traces(&traces, problem, config.bin_s, config.range_db)
     }
 }
 

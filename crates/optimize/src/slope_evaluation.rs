@@ -1,7 +1,7 @@
 //! Cost of one band: the squared difference between the slope of its simulated decay and the slope that is wanted.
 
 use crate::decay_slope::DecaySlope;
-use crate::history::{History, check_paths};
+use crate::history::{History, Unabsorbed, check_paths};
 use crate::objective::Objective;
 use crate::single_paths::SinglePathSlope;
 use crate::slope_model::SlopeModel;
@@ -79,12 +79,12 @@ impl SlopeEvaluation {
             });
         }
         let histories: Vec<History> = paths.iter().map(|p| History::new(p, air, config.bin_s)).collect();
-        let exponent = air.energy_exponent_per_m(bands).values()[band];
+        let unabsorbed = Unabsorbed::Air(air.energy_exponent_per_m(bands));
         let pairs = histories
             .into_iter()
             .zip(paths)
             .map(|(history, paths)| {
-                let weights = history.weights(paths, materials, exponent, band, 1.0)?;
+                let weights = history.weights(paths, materials, &unabsorbed, band, 1.0)?;
                 Ok((history, weights))
             })
             .collect::<Result<Vec<_>, Error>>()?;

@@ -38,6 +38,12 @@ impl<'a> Conditions<'a> {
         Self { materials, air, attenuation: None, source: None, receiver: None, laws: None }
     }
 
+    /// The same between other surfaces.
+    #[must_use]
+    pub fn with_materials(self, materials: &'a [Material]) -> Self {
+        Self { materials, ..self }
+    }
+
     /// The same with sound attenuated as by another air; the speed of sound stays.
     #[must_use]
     pub fn with_attenuation(self, air: &'a Air) -> Self {

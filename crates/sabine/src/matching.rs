@@ -13,6 +13,7 @@ use sabine_acoustics::{
 use sabine_eqfilter::{AboveBand, EqFilter, EqFilterConfig};
 use sabine_estimator::Estimator;
 use sabine_optimize::{AbsorptionPrior, FitConfig, FitProblem, MaterialFit, MaterialFitter};
+use sabine_paths::laws::{BoundLaws, Law, LawSite};
 use sabine_paths::{Conditions, Propagator};
 use sabine_propagate::{MeshReport, PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use sabine_scene::MeasuredRoom;
@@ -53,6 +54,9 @@ pub struct MatchConfig {
     /// ([`WaveSolver`](sabine_propagate::wave::WaveSolver)) with the fitted materials, from an omnidirectional source; its time grows with
     /// the fourth power of the frequency. The fit is to the paths.
     pub wave_below_hz: Option<f64>,
+    /// Formulas that change what paths carry, those of an extended model for instance: materials are fitted and the response is rendered
+    /// under them. None that adds sound.
+    pub laws: Vec<Law>,
 }
 
 impl Default for MatchConfig {
@@ -66,6 +70,7 @@ impl Default for MatchConfig {
             largest_eq_db: 20.0,
             above_8_khz_db: Some(-50.0),
             wave_below_hz: None,
+            laws: Vec::new(),
         }
     }
 }
@@ -285,19 +290,24 @@ pub(crate) fn match_targets(
     let fitter = MaterialFitter::new(config.fit.clone())?;
     fitter.check_t60(targets.t60_s(), bands, &air, duration_s)?;
     let low_end = config.wave_below_hz.map(|hz| LowEnd::new(hz, sample_rate_hz, room, source)).transpose()?;
+    let site = LawSite::new(&scene, source, receiver, &air);
+    let laws = BoundLaws::new(&config.laws, &site).map_err(sabine_acoustics::Error::from)?;
     let paths = tracer(duration_s)?.trace(&scene, source, receiver, &air, observer)?;
     if paths.is_empty() {
         return Err(Error::NoPath { source_id: source.id.clone(), receiver: receiver.id.clone() });
     }
     clock.lap("trace");
 
+    let plain = Conditions::new(&materials_before, &air);
+    let before = if laws.is_empty() { plain } else { plain.with_laws(&laws) };
+    let under = if laws.is_empty() { Vec::new() } else { vec![before] };
+    let problem = FitProblem::new(&materials_before, &priors, &air).under(&under);
     let mut aim = targets.t60_s().clone();
     let mut corrections = 0;
     let (fit, mut response, mut parameters) = loop {
-        let fit =
-            fitter.fit_t60(&[&paths], &FitProblem::new(&materials_before, &priors, &air), &aim, observer)?;
+        let fit = fitter.fit_t60(&[&paths], &problem, &aim, observer)?;
         clock.lap("fit");
-        let response = renderer.render(&paths, &Conditions::new(&fit.materials, &air))?;
+        let response = renderer.render(&paths, &before.with_materials(&fit.materials))?;
         let parameters = RoomParameters::measure(&response, Bands::T60)?;
         clock.lap("render");
         let next = corrected(&aim, targets.t60_s(), &parameters.t30_s, &fit);
@@ -307,7 +317,7 @@ pub(crate) fn match_targets(
             _ => break (fit, response, parameters),
         }
     };
-    let response_before = renderer.render(&paths, &Conditions::new(&materials_before, &air))?;
+    let response_before = renderer.render(&paths, &before)?;
     let mut waves = None;
     if let Some(low_end) = low_end {
         let (joined, found) = low_end.join((source, receiver), &fit.materials, &air, &response, observer)?;

@@ -195,9 +195,14 @@ fn bad_input_is_named_and_nothing_is_written() {
         refuses(arguments, &out, named);
     }
     for (program, model, named) in [
-        ("trace", "centres_hz = [1000]\ncauses = []\ngain_db = [1, 2]", "gain_db"),
-        ("trace", "centres_hz = [1000]\ncauses = []\nabsorption.velvet = [1]", "velvet"),
-        ("match", "centres_hz = [1000]\n", "causes"),
+        (
+            "trace",
+            "version = 2\ncentres_hz = [1000]\n[[causes]]\nid = \"a\"\nchanges = [{ gain_db = [1, 2] }]",
+            "gain_db",
+        ),
+        ("trace", "version = 2\ncentres_hz = [1000]\nabsorption.velvet = [1]", "velvet"),
+        ("match", "version = 2\n", "centres_hz"),
+        ("match", "centres_hz = [1000]\n", "version"),
     ] {
         let path = folder.path().join("model.toml");
         std::fs::write(&path, model).unwrap();

@@ -15,6 +15,7 @@ mod listen;
 mod live;
 mod long_files;
 mod match_room;
+mod model;
 mod plan;
 #[cfg(unix)]
 #[path = "../../../acoustics/tests/faults/process.rs"]

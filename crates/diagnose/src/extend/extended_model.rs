@@ -71,6 +71,12 @@ impl ModelCause {
         Self { id: id.into(), subject: None, parameters: Vec::new(), changes }
     }
 
+    /// The same cause, of something of several: a receiver, a material.
+    #[must_use]
+    pub fn about(self, subject: impl Into<String>) -> Self {
+        Self { subject: Some(subject.into()), ..self }
+    }
+
     /// The law that is this cause, if it is one.
     pub fn law(&self) -> Option<&Law> {
         self.changes.iter().find_map(|change| match change {

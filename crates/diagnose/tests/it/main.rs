@@ -18,4 +18,5 @@ mod places;
 mod plan;
 mod rendering;
 mod rivals;
+mod starting_from;
 mod wrong_tables;

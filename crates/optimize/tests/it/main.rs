@@ -13,3 +13,4 @@ mod retracing;
 mod swinging_weights;
 mod twelve_pairs;
 mod two_room_flat;
+mod under_conditions;

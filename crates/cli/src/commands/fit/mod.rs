@@ -17,14 +17,16 @@ use sabine::acoustics::{
     Air, Bands, Error as AcousticsError, Estimate, Material, PerBand, Reading, RoomParameters, SampleFormat,
     Signal, encode_wav,
 };
+use sabine::diagnose::ExtendedModel;
 use sabine::optimize::{
     AbsorptionPrior, DecayMisfit, FitConfig, FitProblem, MaterialFit, MaterialFitter, MeasuredDecay,
     MeasuredPair, Retrace, RetraceConfig, SlopeObjective,
 };
+use sabine::paths::laws::{BoundLaws, Law, LawSite};
 use sabine::paths::{Conditions, PathSet, Propagator};
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use sabine::scene::{MeasuredRoom, Receiver, Scene, Source};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 use summary::{Compared, Seconds, Summary, mean_of};
 use verdict::Aim;
@@ -56,6 +58,10 @@ pub struct Arguments {
     objective: Slope,
     #[command(flatten)]
     place: PlaceArguments,
+    /// extended_model.toml of `diagnose`: materials are fitted with everything else of it in place that bears on paths (air, dimensions,
+    /// places, surfaces, laws). Loudspeaker, microphones, noise and recorder are left out: `sabine model refit` has them
+    #[arg(long, value_name = "F.toml")]
+    model: Option<PathBuf>,
     /// Standard deviation of the length of a reflected path by errors of positions and mesh, in metres; for --responses
     #[arg(long, default_value_t = 0.1, value_name = "M")]
     path_error_m: f64,
@@ -87,13 +93,15 @@ enum Slope {
 }
 
 /// Everything that the two ways of fitting have in common.
-struct Outcome {
+struct Outcome<'a> {
     aim: Aim,
     fit: MaterialFit,
     target_s: Vec<Option<f64>>,
     reached_s: Vec<Option<f64>>,
     /// What the response is rendered from.
     independent: PathSet,
+    /// Where it comes from, and where it is heard.
+    place: (&'a Source, &'a Receiver),
     compared: Vec<Compared>,
     /// Besides those of the fit.
     warnings: Vec<String>,
@@ -113,8 +121,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut out = OutputFolder::create(&arguments.out)?;
     // The responses of the demo are read while it is there.
     let mut demo = Demo::default();
-    let (file, _) = arguments.room.read(&mut demo)?;
-    let room = Room::new(&file, arguments)?;
+    let (mut file, _) = arguments.room.read(&mut demo)?;
+    let mut model = Model::default();
+    if let Some(path) = &arguments.model {
+        model = Model::read(path, &mut file)?;
+    }
+    let room = Room::new(&file, &model, arguments)?;
     // Settings are checked before anything is traced.
     let config = RenderConfig { sample_rate_hz: RATE_HZ, seed: arguments.seed, ..RenderConfig::default() };
     let renderer = PressureRenderer::new(config)?;
@@ -127,8 +139,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
     let names: Vec<&str> = file.scene().materials().iter().map(|m| m.name.as_str()).collect();
     let summary = Summary::new(&names, &outcome);
-    let response =
-        renderer.render(&outcome.independent, &Conditions::new(&outcome.fit.materials, &room.air))?;
+    let rendered = room.laws(outcome.place)?;
+    let response = renderer.render(&outcome.independent, &room.between(&rendered, &outcome.fit.materials))?;
     let json = serde_json::to_string_pretty(&summary)?;
     out.write("impulse_response.wav", &encode_wav(&Signal::from(response), SampleFormat::Float32)?)?;
     out.write("fit.json", json.as_bytes())?;
@@ -167,16 +179,50 @@ struct Room<'a> {
     materials: Vec<Material>,
     priors: Vec<AbsorptionPrior>,
     air: Air,
+    model: &'a Model,
     arguments: &'a Arguments,
 }
 
+/// What an extended model says of paths beside the room itself.
+#[derive(Default)]
+struct Model {
+    laws: Vec<Law>,
+    diffraction: bool,
+    cuboid_paths: usize,
+}
+
+impl Model {
+    /// Reads a model, and puts the room into the state that it describes.
+    fn read(path: &Path, room: &mut MeasuredRoom) -> Result<Self, Failure> {
+        let read = ExtendedModel::read(path)?;
+        let extended = read.room(room)?;
+        *room = extended.measured_room(room)?;
+        Ok(Self {
+            laws: read.causes.iter().filter_map(|cause| cause.law().cloned()).collect(),
+            diffraction: extended.diffraction,
+            cuboid_paths: extended.cuboid_paths,
+        })
+    }
+}
+
 impl<'a> Room<'a> {
-    fn new(file: &'a MeasuredRoom, arguments: &'a Arguments) -> Result<Self, Failure> {
+    fn new(file: &'a MeasuredRoom, model: &'a Model, arguments: &'a Arguments) -> Result<Self, Failure> {
         let materials: Vec<Material> =
             file.scene().materials().iter().map(|m| m.material.resampled(OCTAVES)).collect();
         let priors = AbsorptionPrior::of_room(file, OCTAVES);
         let scene = file.scene().with_materials(materials.clone())?;
-        Ok(Self { file, scene, materials, priors, air: file.air(), arguments })
+        Ok(Self { file, scene, materials, priors, air: file.air(), model, arguments })
+    }
+
+    /// The model's laws between a source and a receiver.
+    fn laws(&self, (source, receiver): (&Source, &Receiver)) -> Result<BoundLaws, AcousticsError> {
+        Ok(BoundLaws::new(&self.model.laws, &LawSite::new(&self.scene, source, receiver, &self.air))?)
+    }
+
+    /// Conditions under some laws.
+    fn between<'c>(&'c self, laws: &'c BoundLaws, materials: &'c [Material]) -> Conditions<'c> {
+        let plain = Conditions::new(materials, &self.air);
+        if laws.is_empty() { plain } else { plain.with_laws(laws) }
     }
 
     fn fitter(&self) -> Result<MaterialFitter, Failure> {
@@ -199,30 +245,34 @@ impl<'a> Room<'a> {
         effort: f64,
     ) -> Result<PathSet, AcousticsError> {
         let rays = (effort * self.arguments.rays as f64).ceil() as usize;
-        let config = TracerConfig { rays, duration_s, seed, ..TracerConfig::default() };
+        let Model { diffraction, cuboid_paths, .. } = *self.model;
+        let config =
+            TracerConfig { rays, duration_s, seed, diffraction, cuboid_paths, ..TracerConfig::default() };
         let tracer = PathTracer::new(config).map_err(|e| AcousticsError::implementation("tracing", e))?;
         tracer.trace(&self.scene, source, receiver, &self.air, &())
     }
 
-    fn fit_t60(&self, t60_s: &[f64], bar: &Bar) -> Result<Outcome, Failure> {
+    fn fit_t60(&self, t60_s: &[f64], bar: &Bar) -> Result<Outcome<'a>, Failure> {
         let targets = PerBand::new(OCTAVES, t60_s.iter().map(|&t| Estimate::exact(t)).collect())?;
         let longest_s = t60_s.iter().copied().fold(0.0, f64::max);
         let duration_s = (DURATION_FACTOR * longest_s).clamp(DURATION_S.0, DURATION_S.1);
         let fitter = self.fitter()?;
         fitter.check_t60(&targets, OCTAVES, &self.air, duration_s)?;
-        let retraced = Retraced { room: self, places: self.arguments.place.of(self.file)?, duration_s };
+        let place = self.arguments.place.of(self.file)?;
+        let laws = self.laws(place)?;
+        let under = if laws.is_empty() { Vec::new() } else { vec![self.between(&laws, &self.materials)] };
+        let retraced = Retraced { room: self, places: place, laws: &laws, duration_s };
         let config = RetraceConfig { seed: self.arguments.seed, ..RetraceConfig::default() };
         let done = fitter.fit_t60_retracing(
             &retraced,
-            &FitProblem::new(&self.materials, &self.priors, &self.air),
+            &FitProblem::new(&self.materials, &self.priors, &self.air).under(&under),
             &targets,
             &config,
             bar,
         )?;
         let independent = done.independent_paths.into_iter().next().ok_or("no paths")?;
-        let curve = |materials: &[Material]| {
-            independent.energy_response(&Conditions::new(materials, &self.air), 5e-3)
-        };
+        let curve =
+            |materials: &[Material]| independent.energy_response(&self.between(&laws, materials), 5e-3);
         let (before, after) = (curve(&self.materials)?, curve(&done.fit.materials)?);
         let points = |energy: &sabine::acoustics::EnergyResponse, b: usize| {
             let level = energy.decay_curve(b).level_db().into_iter().enumerate();
@@ -243,6 +293,7 @@ impl<'a> Room<'a> {
             reached_s: values(&done.read_t60_s),
             curves: curves.collect(),
             independent,
+            place,
             compared: Vec::new(),
             warnings,
             seconds: Seconds { trace, fit },
@@ -255,7 +306,7 @@ impl<'a> Room<'a> {
         self.arguments.hold_out.iter().any(|id| *id == receiver.id || *id == pair)
     }
 
-    fn fit_responses(&self, bar: &Bar) -> Result<Outcome, Failure> {
+    fn fit_responses(&self, bar: &Bar) -> Result<Outcome<'a>, Failure> {
         let entries = self.file.responses();
         let places: Vec<(&Source, &Receiver)> = entries
             .iter()
@@ -289,14 +340,21 @@ impl<'a> Room<'a> {
             measured.iter().zip(&paths).map(|(measured, paths)| MeasuredPair { measured, paths }).collect();
         let fitted: Vec<MeasuredPair<'_>> =
             pairs.iter().zip(&held_out).filter(|(_, held)| !**held).map(|(pair, _)| *pair).collect();
+        let laws = places.iter().map(|place| self.laws(*place)).collect::<Result<Vec<_>, _>>()?;
+        let under: Vec<Conditions<'_>> =
+            laws.iter().map(|laws| self.between(laws, &self.materials)).collect();
+        let of_fitted: Vec<Conditions<'_>> =
+            under.iter().zip(&held_out).filter(|(_, held)| !**held).map(|(own, _)| *own).collect();
         let start = Instant::now();
         let measurement = self.file.measurement();
-        let done = fitter.fit_responses(
-            &fitted,
-            measurement,
-            &FitProblem::new(&self.materials, &self.priors, &self.air),
-            bar,
-        )?;
+        let done =
+            fitter.fit_responses(
+                &fitted,
+                measurement,
+                &FitProblem::new(&self.materials, &self.priors, &self.air)
+                    .under(if self.model.laws.is_empty() { &[] } else { &of_fitted }),
+                bar,
+            )?;
         let fit_s = start.elapsed().as_secs_f64();
 
         // Held against rays that the fit has not seen.
@@ -304,8 +362,9 @@ impl<'a> Room<'a> {
         let (mut compared, mut curves) = (Vec::new(), Vec::new());
         for (i, (measured, paths)) in measured.iter().zip(&other).enumerate() {
             let pair = MeasuredPair { measured, paths };
-            let misfit =
-                |materials: &[Material]| DecayMisfit::new(pair, measurement.time_zero, materials, &self.air);
+            let misfit = |materials: &[Material]| {
+                DecayMisfit::under(pair, measurement.time_zero, &under[i].with_materials(materials))
+            };
             let (before, after) = (misfit(&self.materials)?, misfit(&done.fit.materials)?);
             if curves.is_empty() && (held_out[i] || !held_out.contains(&true)) {
                 curves = (0..OCTAVES.len()).map(|b| response_curves(&before, &after, b)).collect();
@@ -335,6 +394,7 @@ impl<'a> Room<'a> {
             target_s: mean(&|c| &c.measured_t30_s),
             reached_s: mean(&|c| &c.t30_after_s),
             independent: other.into_iter().next().ok_or("no paths")?,
+            place: *places.first().ok_or("no paths")?,
             fit: done.fit,
             compared,
             warnings,
@@ -348,6 +408,7 @@ impl<'a> Room<'a> {
 struct Retraced<'a> {
     room: &'a Room<'a>,
     places: (&'a Source, &'a Receiver),
+    laws: &'a BoundLaws,
     duration_s: f64,
 }
 
@@ -366,7 +427,7 @@ impl Retrace for Retraced<'_> {
         let config = RenderConfig { sample_rate_hz: RATE_HZ, seed, ..RenderConfig::default() };
         let renderer = PressureRenderer::new(config).map_err(failed)?;
         let response =
-            renderer.render(&paths[0], &Conditions::new(materials, &self.room.air)).map_err(failed)?;
+            renderer.render(&paths[0], &self.room.between(self.laws, materials)).map_err(failed)?;
         Ok(Some(RoomParameters::measure(&response, OCTAVES)?.t30_s))
     }
 }

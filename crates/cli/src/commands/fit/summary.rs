@@ -63,7 +63,7 @@ pub fn mean_of(values: impl Iterator<Item = f64>) -> Option<f64> {
 
 impl Summary {
     /// The numbers of a fit to materials of these names.
-    pub fn new(names: &[&str], outcome: &Outcome) -> Self {
+    pub fn new(names: &[&str], outcome: &Outcome<'_>) -> Self {
         let fit = &outcome.fit;
         let fitted = |k: usize| Fitted {
             absorption: fit.materials[k].absorption().values().to_vec(),
@@ -114,7 +114,7 @@ impl Summary {
     }
 
     /// Prints them, and what should be known.
-    pub fn print(&self, outcome: &Outcome, out: &Path) {
+    pub fn print(&self, outcome: &Outcome<'_>, out: &Path) {
         let row = |values: &[Option<f64>]| -> String {
             values.iter().map(|v| v.map_or("     -".to_owned(), |v| format!("{v:>6.2}"))).collect()
         };

@@ -13,6 +13,7 @@ use crate::room::{PlaceArguments, RoomArguments};
 use clap::Args;
 use sabine::acoustics::{Channel, SampleFormat, Signal, encode_wav};
 use sabine::diagnose::ExtendedModel;
+use sabine::paths::laws::{Law, LawTarget};
 use sabine::{
     FileMatch, MatchConfig, MatchFiles, MatchInput, MatchSummary, Recording, match_room_files, materials_toml,
 };
@@ -29,7 +30,7 @@ pub struct Arguments {
     speech: Option<PathBuf>,
     #[command(flatten)]
     room: RoomArguments,
-    /// extended_model.toml of `diagnose`: the simulation starts from its materials, air, dimensions and places. Loudspeaker,
+    /// extended_model.toml of `diagnose`: the simulation starts from its materials, air, dimensions, places and laws. Loudspeaker,
     /// noise and recorder of that measurement are left out: the speech has its own. Where it names standing waves, --wave-below
     /// is theirs
     #[arg(long, value_name = "F.toml")]
@@ -72,12 +73,18 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let channel = arguments.channel.unwrap_or_default();
     let (mut room, room_name) = arguments.room.read(&mut demo)?;
     let (mut diffraction, mut cuboid_paths) = (false, 0);
-    let mut wave_below_hz = arguments.wave_below;
+    let (mut wave_below_hz, mut laws) = (arguments.wave_below, Vec::new());
     if let Some(model) = &arguments.model {
         let read = ExtendedModel::read(model)?;
-        if read.causes.iter().any(|cause| cause.law().is_some()) {
-            println!("note: the laws of {} are left out: materials are fitted without them", model.display());
+        let (added, fitted): (Vec<Law>, Vec<Law>) = read
+            .causes
+            .iter()
+            .filter_map(|cause| cause.law().cloned())
+            .partition(|law| law.target() == LawTarget::Added);
+        for law in added {
+            println!("note: the law {} of {} adds sound and is left out", law.id(), model.display());
         }
+        laws = fitted;
         let extended = read.room(&room)?;
         wave_below_hz = wave_below_hz.or(extended.wave_below_hz);
         (diffraction, cuboid_paths) = (extended.diffraction, extended.cuboid_paths);
@@ -94,7 +101,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         receiver: &receiver.id,
         matched: &matched,
     };
-    let mut config = MatchConfig { seed: arguments.seed, wave_below_hz, ..MatchConfig::default() };
+    let mut config = MatchConfig { seed: arguments.seed, wave_below_hz, laws, ..MatchConfig::default() };
     config.tracer.diffraction |= diffraction;
     config.tracer.cuboid_paths = config.tracer.cuboid_paths.max(cuboid_paths);
     if let Some(rays) = arguments.rays {

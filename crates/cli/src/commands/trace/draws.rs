@@ -141,8 +141,8 @@ impl Draws {
                 y: Some((FLOOR_DB, 0.0)),
                 series: vec![
                     line("median", Look::Line, 1),
-                    line("5 %", Look::Dashed, 0),
-                    line("95 %", Look::Dashed, 2),
+                    line("5 % and 95 %", Look::Dashed, 0),
+                    Series { in_legend: false, ..line("95 %", Look::Dashed, 2) },
                 ],
                 small: false,
             };

@@ -1,0 +1,126 @@
+//! `sabine model` and what other commands make of an extended model, as a user runs them.
+
+use crate::sabine;
+use sabine::diagnose::{ExtendedModel, ModelCause, ModelChange, read_laws};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+const LAW: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/laws/carpet.toml");
+
+fn succeeds(command: &str, arguments: &[&str]) -> String {
+    let output = sabine(command).args(arguments).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn fails(command: &str, arguments: &[&str]) -> String {
+    let output = sabine(command).args(arguments).output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+/// A model with a latency, 3 ms within 0.1, and carpet that absorbs 0.3 within 0.05 in all octaves alike.
+fn model(folder: &Path) -> PathBuf {
+    let octaves = "[125, 250, 500, 1000, 2000, 4000, 8000]";
+    let numbers: Vec<String> = (0..7)
+        .map(|b| format!("\"/absorption/carpet/{b}\""))
+        .chain(["\"/causes/0/changes/0/latency_s\"".to_owned()])
+        .collect();
+    let row = |i: usize| match i {
+        7 => "[0, 0, 0, 0, 0, 0, 0, 1e-8]".to_owned(),
+        _ => format!("{:?}", vec![0.0025; i + 1]),
+    };
+    let rows: Vec<String> = (0..8).map(row).collect();
+    let text = format!(
+        "version = 2\ncentres_hz = {octaves}\nabsorption.carpet = {:?}\n[[causes]]\nid = \"time_zero\"\n\
+         changes = [{{ latency_s = 0.003 }}]\n[uncertainty]\nnumbers = [{}]\ncovariance = [{}]\n",
+        [0.3; 7],
+        numbers.join(", "),
+        rows.join(", ")
+    );
+    let path = folder.join("model.toml");
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+#[test]
+fn a_model_is_shown_joined_and_taken_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = model(folder.path());
+    let first = first.to_str().unwrap();
+    let shown = succeeds("model", &["show", first]);
+    for words in ["[time_zero]", "the latency of all responses to 3.000 ms", "0.300 ± 0.082", "8 numbers"] {
+        assert!(shown.contains(words), "{words}: {shown}");
+    }
+    let [second, joined, apart] = ["second", "joined", "apart"].map(|name| folder.path().join(name));
+    let mut other = ExtendedModel::default();
+    other.centres_hz = vec![125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0];
+    other.causes.push(ModelCause::new("room_modes", vec![ModelChange::WaveBelow(90.0)]));
+    other.causes.push(ModelCause::new("position_error", Vec::new()).about("corner"));
+    other.causes.push(ModelCause::new("position_error", Vec::new()).about("microphone"));
+    other.write(&second).unwrap();
+    let [second, joined, apart] = [&second, &joined, &apart].map(|path| path.to_str().unwrap());
+    succeeds("model", &["merge", first, second, "--out", joined]);
+    let names: Vec<String> =
+        ExtendedModel::read(joined).unwrap().causes.iter().map(ModelCause::name).collect();
+    let expected = ["time_zero", "room_modes", "position_error (corner)", "position_error (microphone)"];
+    assert_eq!(names, expected);
+    let several = fails("model", &["drop", joined, "--cause", "position_error", "--out", apart]);
+    assert!(several.contains("say which with --subject"), "{several}");
+    let drop = ["drop", joined, "--cause", "position_error", "--subject", "corner", "--out", apart];
+    succeeds("model", &drop);
+    assert_eq!(ExtendedModel::read(apart).unwrap().causes.len(), 3);
+    let unknown = fails("model", &["drop", joined, "--cause", "ghosts", "--out", apart]);
+    assert!(unknown.contains("it has time_zero, room_modes"), "{unknown}");
+    assert!(fails("model", &["merge", first, joined]).contains("time_zero"));
+    assert!(fails("model", &["sample", second]).contains("uncertainty"));
+}
+
+#[test]
+fn draws_are_models_and_open_a_band_about_the_decay() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = model(folder.path());
+    let model = model.to_str().unwrap();
+    let draws = folder.path().join("draws");
+    succeeds("model", &["sample", model, "--draws", "4", "--out", draws.to_str().unwrap()]);
+    let all: Vec<f64> = (1..=4)
+        .map(|i| ExtendedModel::read(draws.join(format!("draw_{i}.toml"))).unwrap().absorption["carpet"][3])
+        .collect();
+    assert!(all.iter().all(|a| (a - 0.3).abs() < 0.25) && all.windows(2).all(|pair| pair[0] != pair[1]));
+
+    let out = folder.path().join("traced");
+    let traced = ["--model", model, "--draws", "9", "--rays", "1000", "--duration", "0.8"];
+    let told = succeeds("trace", &[&traced[..], &["--out", out.to_str().unwrap()]].concat());
+    assert!(told.contains("9 draws from the model: T30 at 1000 Hz"), "{told}");
+    let text = std::fs::read_to_string(out.join("parameters.json")).unwrap();
+    let parameters: Value = serde_json::from_str(&text).unwrap();
+    let t30 = &parameters["draws"]["t30_s_5_50_95"][3];
+    let [low, median, high] = [0, 1, 2].map(|i| t30[i].as_f64().unwrap());
+    assert!(low < median && median < high && high < 1.5 * low, "{t30}");
+    let table = std::fs::read_to_string(out.join("decay_band.csv")).unwrap();
+    assert!(table.starts_with("time_s,low_db_125,median_db_125,high_db_125") && table.lines().count() > 50);
+    assert!(out.join("decay_band.svg").exists());
+    assert!(fails("trace", &["--model", model, "--draws", "9", "--rays", "0"]).contains("rays"));
+}
+
+/// The carpet takes more by a law: fitted under it, it absorbs less.
+#[test]
+fn materials_are_fitted_under_the_laws_of_a_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("law.toml");
+    let mut plain = ExtendedModel::default();
+    plain.centres_hz = vec![125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0];
+    let law = read_laws(LAW).unwrap().remove(0);
+    plain.with_law(law).write(&path).unwrap();
+    let fitted = |name: &str, more: &[&str]| -> Value {
+        let out = folder.path().join(name);
+        let t60 =
+            ["--t60", "0.6,0.6,0.6,0.55,0.5,0.45,0.4", "--rays", "2000", "--out", out.to_str().unwrap()];
+        succeeds("fit", &[&t60[..], more].concat());
+        serde_json::from_str(&std::fs::read_to_string(out.join("fit.json")).unwrap()).unwrap()
+    };
+    let (without, with) = (fitted("without", &[]), fitted("with", &["--model", path.to_str().unwrap()]));
+    let carpet = |fit: &Value, band: usize| fit["materials"]["carpet"]["absorption"][band].as_f64().unwrap();
+    assert!((carpet(&without, 1) - carpet(&with, 1)).abs() < 0.02);
+    assert!(carpet(&without, 5) > carpet(&with, 5) + 0.01, "{} {}", carpet(&without, 5), carpet(&with, 5));
+}

@@ -1,0 +1,172 @@
+//! Fits under laws and another attenuation, against closed forms: what a law takes at each meeting with a wall, absorption need not.
+
+use sabine_acoustics::{Bands, Estimate, Material, PerBand};
+use sabine_optimize::{
+    AbsorptionPrior, DecayMisfit, Error, FitConfig, FitProblem, MaterialFit, MaterialFitter, MeasuredDecay,
+    MeasuredPair, PredictedChange,
+};
+use sabine_paths::laws::{BoundLaws, Law, LawParameter, LawSite, LawTarget};
+use sabine_paths::{Conditions, PathSet, Propagator};
+use sabine_propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
+use sabine_scene::{Levels, MeasuredRoom, Measurement, TimeZero};
+
+/// What the law takes at each meeting with the carpet, in dB.
+const TAKEN_DB: f64 = 1.0;
+const CARPET: &str = "carpet";
+
+struct Traced {
+    room: MeasuredRoom,
+    materials: Vec<Material>,
+    paths: Vec<PathSet>,
+}
+
+impl Traced {
+    fn new() -> Self {
+        let room = MeasuredRoom::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/room")).unwrap();
+        let materials: Vec<Material> =
+            room.scene().materials().iter().map(|m| m.material.resampled(Bands::T60)).collect();
+        let config = TracerConfig { rays: 4000, duration_s: 1.2, ..TracerConfig::default() };
+        let tracer = PathTracer::new(config).unwrap();
+        let trace =
+            |receiver| tracer.trace(room.scene(), &room.sources()[0], receiver, &room.air(), &()).unwrap();
+        let paths = room.receivers()[..2].iter().map(trace).collect();
+        Self { room, materials, paths }
+    }
+
+    fn laws(&self, target: LawTarget, formula: &str) -> Vec<BoundLaws> {
+        let unit = if target == LawTarget::Delay { "ms" } else { "dB" };
+        let c = LawParameter::new(TAKEN_DB, [0.0, 3.0], unit);
+        let law = Law::new("takes", target, None, formula, [("c", c)]).unwrap();
+        let bound = |receiver| {
+            let site = LawSite::new(self.room.scene(), &self.room.sources()[0], receiver, &self.room.air());
+            BoundLaws::new(std::slice::from_ref(&law), &site).unwrap()
+        };
+        self.room.receivers()[..2].iter().map(bound).collect()
+    }
+
+    /// Priors that leave the carpet free and hold all else.
+    fn priors(&self) -> Vec<AbsorptionPrior> {
+        let sd = |name: &str| if name == CARPET { 10.0 } else { 0.0 };
+        let names = self.room.scene().materials().iter().map(|m| m.name.as_str());
+        let one = |(name, m): (&str, &Material)| AbsorptionPrior {
+            mean: m.absorption().clone(),
+            standard_deviation: PerBand::uniform(Bands::T60, sd(name)),
+        };
+        names.zip(&self.materials).map(one).collect()
+    }
+
+    fn carpet(&self, fit: &MaterialFit) -> Vec<f64> {
+        let place = self.room.scene().materials().iter().position(|m| m.name == CARPET).unwrap();
+        fit.materials[place].absorption().values().to_vec()
+    }
+
+    /// Reverberation times of the room if its carpet absorbed so much, in the first pair.
+    fn with_carpet_of(&self, absorption: f64) -> PerBand<Estimate> {
+        let mut other = self.materials.clone();
+        let place = self.room.scene().materials().iter().position(|m| m.name == CARPET).unwrap();
+        other[place] = other[place].with_absorption(PerBand::uniform(Bands::T60, absorption)).unwrap();
+        let change = PredictedChange::new(&self.paths[0], &self.materials, &other, &self.room.air()).unwrap();
+        change.after.t60_s.map(|t60| Estimate::exact(t60.as_ref().unwrap().value))
+    }
+
+    fn fit(&self, under: &[Conditions<'_>]) -> Result<MaterialFit, Error> {
+        let paths: Vec<&PathSet> = self.paths.iter().collect();
+        let targets = self.with_carpet_of(0.6);
+        let (priors, air) = (self.priors(), self.room.air());
+        let problem = FitProblem::new(&self.materials, &priors, &air).under(under);
+        MaterialFitter::new(FitConfig::default()).unwrap().fit_t60(&paths, &problem, &targets, &())
+    }
+}
+
+#[test]
+fn absorption_leaves_to_a_law_what_the_law_takes() {
+    let traced = Traced::new();
+    let air = traced.room.air();
+    let laws = traced.laws(LawTarget::Path, "-c * hits(carpet)");
+    let plain: Vec<Conditions<'_>> = vec![Conditions::new(&traced.materials, &air); 2];
+    let under: Vec<Conditions<'_>> =
+        plain.iter().zip(&laws).map(|(conditions, laws)| conditions.with_laws(laws)).collect();
+    let without = traced.fit(&[]).unwrap();
+    // Conditions that change nothing change nothing.
+    for (a, b) in traced.carpet(&without).iter().zip(traced.carpet(&traced.fit(&plain).unwrap())) {
+        assert!((a - b).abs() < 1e-4, "{a} {b}");
+    }
+    let with = traced.fit(&under).unwrap();
+    let mut compared = 0;
+    for (plain, under) in traced.carpet(&without).iter().zip(traced.carpet(&with)) {
+        // (1 - a) 10^(-c/10) is what comes back: the same in both.
+        let expected = 1.0 - (1.0 - plain) * 10f64.powf(0.1 * TAKEN_DB);
+        if expected > 0.01 && *plain < 0.95 {
+            assert!((under - expected).abs() < 2e-3, "{under} for {expected}");
+            compared += 1;
+        }
+    }
+    assert!(compared >= 3, "{:?} {:?}", traced.carpet(&without), traced.carpet(&with));
+    for (a, b) in without.predicted_t60_s.values().iter().zip(with.predicted_t60_s.values()) {
+        let (a, b) = (a.as_ref().unwrap().value, b.as_ref().unwrap().value);
+        assert!((a - b).abs() < 2e-3 * a, "{a} s and {b} s");
+    }
+}
+
+/// Responses rendered under a law are met by the materials that they were rendered with, if the fit knows of the law.
+#[test]
+fn responses_under_a_law_give_their_materials_back() {
+    let traced = Traced::new();
+    let air = traced.room.air();
+    let laws = traced.laws(LawTarget::Path, "-c * hits(carpet)");
+    let conditions: Vec<Conditions<'_>> =
+        laws.iter().map(|laws| Conditions::new(&traced.materials, &air).with_laws(laws)).collect();
+    let config = RenderConfig { sample_rate_hz: 48_000, ..RenderConfig::default() };
+    let renderer = PressureRenderer::new(config).unwrap();
+    let decay = |(paths, conditions): (&PathSet, &Conditions<'_>)| {
+        MeasuredDecay::new(&renderer.render(paths, conditions).unwrap(), Bands::T60).unwrap()
+    };
+    let measured: Vec<MeasuredDecay> = traced.paths.iter().zip(&conditions).map(decay).collect();
+    let pairs: Vec<MeasuredPair<'_>> = measured
+        .iter()
+        .zip(&traced.paths)
+        .map(|(measured, paths)| MeasuredPair { measured, paths })
+        .collect();
+    let priors = traced.priors();
+    let fit = |under: &[Conditions<'_>]| {
+        let problem = FitProblem::new(&traced.materials, &priors, &air).under(under);
+        let measurement = Measurement { levels: Levels::Common, time_zero: TimeZero::Emission };
+        MaterialFitter::new(FitConfig::default())
+            .unwrap()
+            .fit_responses(&pairs, measurement, &problem, &())
+            .unwrap()
+            .fit
+    };
+    let (knowing, ignorant) = (fit(&conditions), fit(&[]));
+    let place = traced.room.scene().materials().iter().position(|m| m.name == CARPET).unwrap();
+    let truth = traced.materials[place].absorption().values();
+    let off = |fit: &MaterialFit| {
+        let all = traced.carpet(fit);
+        all.iter().zip(truth).map(|(found, truth)| found - truth).sum::<f64>() / truth.len() as f64
+    };
+    // Who does not know of the law gives the carpet some 20 % of the sound more: 10^-0.1 of what it reflects.
+    assert!(off(&knowing).abs() < 0.05 && off(&ignorant) > 0.1, "{} {}", off(&knowing), off(&ignorant));
+    let misfit = |fit: &MaterialFit| {
+        let conditions = conditions[0].with_materials(&fit.materials);
+        let found = DecayMisfit::under(pairs[0], TimeZero::Emission, &conditions).unwrap();
+        found.rmse_db.values().iter().map(|rmse| rmse.as_ref().unwrap()).sum::<f64>()
+    };
+    assert!(misfit(&knowing) < misfit(&ignorant));
+}
+
+#[test]
+fn conditions_that_cannot_be_fitted_under_are_refused() {
+    let traced = Traced::new();
+    let air = traced.room.air();
+    let plain = Conditions::new(&traced.materials, &air);
+    assert!(matches!(traced.fit(&[plain]), Err(Error::ConditionCount { pairs: 2, found: 1 })));
+    let laws = traced.laws(LawTarget::Added, "-c * 60");
+    let under = [plain.with_laws(&laws[0]), plain.with_laws(&laws[1])];
+    assert!(matches!(traced.fit(&under), Err(Error::AddedSound)));
+    // A delay that all have alike moves no slope.
+    let laws = traced.laws(LawTarget::Delay, "10 * c");
+    let late = traced.fit(&[plain.with_laws(&laws[0]), plain.with_laws(&laws[1])]).unwrap();
+    for (a, b) in traced.carpet(&traced.fit(&[]).unwrap()).iter().zip(traced.carpet(&late)) {
+        assert!((a - b).abs() < 0.01, "{a} {b}");
+    }
+}
