@@ -77,6 +77,30 @@ fn a_model_is_shown_joined_and_taken_apart() {
 }
 
 #[test]
+fn the_page_shows_a_model_that_is_read() {
+    let page = include_str!("../../../../docs/how-to/extended-model.md");
+    let text = page.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("model.toml");
+    std::fs::write(&path, text).unwrap();
+    let read = ExtendedModel::read(&path).unwrap();
+    let fixture = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/room");
+    let room = sabine::scene::MeasuredRoom::read(fixture).unwrap();
+    assert!((read.room(&room).unwrap().air.temperature_c() - 26.1).abs() < 1e-9);
+    // Every kind of change that the page names is one, and none is left out.
+    let kinds = page.split("**Changes** by name: ").nth(1).unwrap().split(". An unknown").next().unwrap();
+    std::fs::write(&path, text.replace("temperature_c = 26.1 }", "wishes = 1 }")).unwrap();
+    let refused = ExtendedModel::read(&path).unwrap_err().to_string();
+    let known = refused.split("expected one of ").nth(1).unwrap();
+    let names = |text: &str| -> Vec<String> {
+        let mut all: Vec<String> = text.split('`').skip(1).step_by(2).map(str::to_owned).collect();
+        all.sort();
+        all
+    };
+    assert_eq!(names(kinds), names(known.lines().next().unwrap()));
+}
+
+#[test]
 fn draws_are_models_and_open_a_band_about_the_decay() {
     let folder = tempfile::tempdir().unwrap();
     let model = model(folder.path());
