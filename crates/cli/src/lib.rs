@@ -29,6 +29,7 @@ mod commands;
 mod demo;
 mod failure;
 mod laws;
+mod modelled;
 mod outline;
 pub mod output;
 pub mod page;

@@ -5,10 +5,10 @@ use crate::decay::{DB_PER_NEPER, slope_with_sensitivity};
 use crate::expansion::Bins;
 use crate::fit_problem::FitProblem;
 use crate::history::{History, variance_of_sum};
-use crate::history::{Trace, Traces, Unabsorbed, by_pair, check_paths};
+use crate::history::{Trace, Traces, Unabsorbed, by_pair, check_paths, rigid};
 use rayon::prelude::*;
 use sabine_acoustics::{Air, EnergyDecayCurve, Estimate, Material, NoReading, PerBand, Reading};
-use sabine_paths::PathSet;
+use sabine_paths::{Conditions, PathSet};
 
 /// Early sound ends this long after the direct sound, in seconds (ISO 3382-1, A.2.3: speech).
 const EARLY_S: f64 = 0.05;
@@ -44,17 +44,44 @@ impl PredictedChange {
     /// For paths and materials that do not belong together.
     pub fn new(paths: &PathSet, before: &[Material], after: &[Material], air: &Air) -> Result<Self, Error> {
         check_paths(&[paths], before)?;
+        let unabsorbed = || Unabsorbed::Air(air.energy_exponent_per_m(before[0].bands()));
+        Self::between(History::new(paths, air, BIN_S), paths, (before, &unabsorbed()), (after, &unabsorbed()))
+    }
+
+    /// The same under conditions, with their materials before and others after: laws, another attenuation, directional ends.
+    ///
+    /// # Errors
+    /// As [`PredictedChange::new`]; a law that has no value on some path.
+    pub fn under(paths: &PathSet, before: &Conditions<'_>, after: &[Material]) -> Result<Self, Error> {
+        check_paths(&[paths], before.materials)?;
+        let unabsorbed = |materials: &[Material]| -> Result<Unabsorbed, Error> {
+            Ok(Unabsorbed::Under(paths.energies(&before.with_materials(&rigid(materials)?))?))
+        };
+        let delays_s = paths.delays_s(before)?;
+        let history = History::delayed(paths, before.air, delays_s.as_deref(), BIN_S);
+        let sides = (unabsorbed(before.materials)?, unabsorbed(after)?);
+        Self::between(history, paths, (before.materials, &sides.0), (after, &sides.1))
+    }
+
+    /// Between two sets of materials, each with the energies of the paths if it absorbed nothing.
+    fn between(
+        history: History,
+        paths: &PathSet,
+        (before, unabsorbed_before): (&[Material], &Unabsorbed),
+        (after, unabsorbed_after): (&[Material], &Unabsorbed),
+    ) -> Result<Self, Error> {
         check_paths(&[paths], after)?;
         let bands = before[0].bands();
         if after[0].bands() != bands {
             let (left, right) = (bands, after[0].bands());
             return Err(sabine_acoustics::Error::BandMismatch { left, right }.into());
         }
-        let history = History::new(paths, air, BIN_S);
         let direct_s = history.times_s.iter().fold(f64::INFINITY, |first, t| first.min(*t));
-        let unabsorbed = Unabsorbed::Air(air.energy_exponent_per_m(bands));
-        let read = |materials: &[Material], b: usize| -> Result<[Linear; 3], Error> {
-            let weights = history.weights(paths, materials, &unabsorbed, b, 1.0)?;
+        let read = |materials: &[Material],
+                    unabsorbed: &Unabsorbed,
+                    b: usize|
+         -> Result<[Linear; 3], Error> {
+            let weights = history.weights(paths, materials, unabsorbed, b, 1.0)?;
             let absorption: Vec<f64> = materials.iter().map(|m| m.absorption().values()[b]).collect();
             let bins = Bins::of(&vec![(&history, weights.clone())], &absorption);
             Ok(functionals(&bins, direct_s).map(|reading| Linear {
@@ -65,7 +92,7 @@ impl PredictedChange {
         };
         let all = (0..bands.len())
             .into_par_iter()
-            .map(|b| Ok((read(before, b)?, read(after, b)?)))
+            .map(|b| Ok((read(before, unabsorbed_before, b)?, read(after, unabsorbed_after, b)?)))
             .collect::<Result<Vec<_>, Error>>()?;
         let collect = |of: &dyn Fn(&Both, usize) -> Reading| {
             let column = |i: usize| PerBand::from_fn(bands, |b| of(&all[b], i));

@@ -9,6 +9,7 @@ use crate::bar::Bar;
 use crate::chart::{Chart, Look, Scale, Series};
 use crate::demo::Demo;
 use crate::failure::Failure;
+use crate::modelled::{ModelArguments, PathModel, conditions};
 use crate::output::OutputFolder;
 use crate::page::Page;
 use crate::room::{PlaceArguments, RoomArguments};
@@ -17,16 +18,15 @@ use sabine::acoustics::{
     Air, Bands, Error as AcousticsError, Estimate, Material, PerBand, Reading, RoomParameters, SampleFormat,
     Signal, encode_wav,
 };
-use sabine::diagnose::ExtendedModel;
 use sabine::optimize::{
     AbsorptionPrior, DecayMisfit, FitConfig, FitProblem, MaterialFit, MaterialFitter, MeasuredDecay,
     MeasuredPair, Retrace, RetraceConfig, SlopeObjective,
 };
-use sabine::paths::laws::{BoundLaws, Law, LawSite};
+use sabine::paths::laws::BoundLaws;
 use sabine::paths::{Conditions, PathSet, Propagator};
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use sabine::scene::{MeasuredRoom, Receiver, Scene, Source};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 use summary::{Compared, Seconds, Summary, mean_of};
 use verdict::Aim;
@@ -58,10 +58,8 @@ pub struct Arguments {
     objective: Slope,
     #[command(flatten)]
     place: PlaceArguments,
-    /// extended_model.toml of `diagnose`: materials are fitted with everything else of it in place that bears on paths (air, dimensions,
-    /// places, surfaces, laws). Loudspeaker, microphones, noise and recorder are left out: `sabine model refit` has them
-    #[arg(long, value_name = "F.toml")]
-    model: Option<PathBuf>,
+    #[command(flatten)]
+    model: ModelArguments,
     /// Standard deviation of the length of a reflected path by errors of positions and mesh, in metres; for --responses
     #[arg(long, default_value_t = 0.1, value_name = "M")]
     path_error_m: f64,
@@ -121,11 +119,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut out = OutputFolder::create(&arguments.out)?;
     // The responses of the demo are read while it is there.
     let mut demo = Demo::default();
-    let (mut file, _) = arguments.room.read(&mut demo)?;
-    let mut model = Model::default();
-    if let Some(path) = &arguments.model {
-        model = Model::read(path, &mut file)?;
-    }
+    let (file, _) = arguments.room.read(&mut demo)?;
+    let (file, model) = arguments.model.apply(file)?;
     let room = Room::new(&file, &model, arguments)?;
     // Settings are checked before anything is traced.
     let config = RenderConfig { sample_rate_hz: RATE_HZ, seed: arguments.seed, ..RenderConfig::default() };
@@ -140,7 +135,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let names: Vec<&str> = file.scene().materials().iter().map(|m| m.name.as_str()).collect();
     let summary = Summary::new(&names, &outcome);
     let rendered = room.laws(outcome.place)?;
-    let response = renderer.render(&outcome.independent, &room.between(&rendered, &outcome.fit.materials))?;
+    let response =
+        renderer.render(&outcome.independent, &conditions(&outcome.fit.materials, &room.air, &rendered))?;
     let json = serde_json::to_string_pretty(&summary)?;
     out.write("impulse_response.wav", &encode_wav(&Signal::from(response), SampleFormat::Float32)?)?;
     out.write("fit.json", json.as_bytes())?;
@@ -179,34 +175,12 @@ struct Room<'a> {
     materials: Vec<Material>,
     priors: Vec<AbsorptionPrior>,
     air: Air,
-    model: &'a Model,
+    model: &'a PathModel,
     arguments: &'a Arguments,
 }
 
-/// What an extended model says of paths beside the room itself.
-#[derive(Default)]
-struct Model {
-    laws: Vec<Law>,
-    diffraction: bool,
-    cuboid_paths: usize,
-}
-
-impl Model {
-    /// Reads a model, and puts the room into the state that it describes.
-    fn read(path: &Path, room: &mut MeasuredRoom) -> Result<Self, Failure> {
-        let read = ExtendedModel::read(path)?;
-        let extended = read.room(room)?;
-        *room = extended.measured_room(room)?;
-        Ok(Self {
-            laws: read.causes.iter().filter_map(|cause| cause.law().cloned()).collect(),
-            diffraction: extended.diffraction,
-            cuboid_paths: extended.cuboid_paths,
-        })
-    }
-}
-
 impl<'a> Room<'a> {
-    fn new(file: &'a MeasuredRoom, model: &'a Model, arguments: &'a Arguments) -> Result<Self, Failure> {
+    fn new(file: &'a MeasuredRoom, model: &'a PathModel, arguments: &'a Arguments) -> Result<Self, Failure> {
         let materials: Vec<Material> =
             file.scene().materials().iter().map(|m| m.material.resampled(OCTAVES)).collect();
         let priors = AbsorptionPrior::of_room(file, OCTAVES);
@@ -215,14 +189,8 @@ impl<'a> Room<'a> {
     }
 
     /// The model's laws between a source and a receiver.
-    fn laws(&self, (source, receiver): (&Source, &Receiver)) -> Result<BoundLaws, AcousticsError> {
-        Ok(BoundLaws::new(&self.model.laws, &LawSite::new(&self.scene, source, receiver, &self.air))?)
-    }
-
-    /// Conditions under some laws.
-    fn between<'c>(&'c self, laws: &'c BoundLaws, materials: &'c [Material]) -> Conditions<'c> {
-        let plain = Conditions::new(materials, &self.air);
-        if laws.is_empty() { plain } else { plain.with_laws(laws) }
+    fn laws(&self, place: (&Source, &Receiver)) -> Result<BoundLaws, AcousticsError> {
+        self.model.laws_between(&self.scene, place, &self.air)
     }
 
     fn fitter(&self) -> Result<MaterialFitter, Failure> {
@@ -245,9 +213,8 @@ impl<'a> Room<'a> {
         effort: f64,
     ) -> Result<PathSet, AcousticsError> {
         let rays = (effort * self.arguments.rays as f64).ceil() as usize;
-        let Model { diffraction, cuboid_paths, .. } = *self.model;
-        let config =
-            TracerConfig { rays, duration_s, seed, diffraction, cuboid_paths, ..TracerConfig::default() };
+        let config = TracerConfig { rays, duration_s, seed, ..TracerConfig::default() };
+        let config = self.model.tracer(config);
         let tracer = PathTracer::new(config).map_err(|e| AcousticsError::implementation("tracing", e))?;
         tracer.trace(&self.scene, source, receiver, &self.air, &())
     }
@@ -260,7 +227,8 @@ impl<'a> Room<'a> {
         fitter.check_t60(&targets, OCTAVES, &self.air, duration_s)?;
         let place = self.arguments.place.of(self.file)?;
         let laws = self.laws(place)?;
-        let under = if laws.is_empty() { Vec::new() } else { vec![self.between(&laws, &self.materials)] };
+        let under =
+            if laws.is_empty() { Vec::new() } else { vec![conditions(&self.materials, &self.air, &laws)] };
         let retraced = Retraced { room: self, places: place, laws: &laws, duration_s };
         let config = RetraceConfig { seed: self.arguments.seed, ..RetraceConfig::default() };
         let done = fitter.fit_t60_retracing(
@@ -271,8 +239,9 @@ impl<'a> Room<'a> {
             bar,
         )?;
         let independent = done.independent_paths.into_iter().next().ok_or("no paths")?;
-        let curve =
-            |materials: &[Material]| independent.energy_response(&self.between(&laws, materials), 5e-3);
+        let curve = |materials: &[Material]| {
+            independent.energy_response(&conditions(materials, &self.air, &laws), 5e-3)
+        };
         let (before, after) = (curve(&self.materials)?, curve(&done.fit.materials)?);
         let points = |energy: &sabine::acoustics::EnergyResponse, b: usize| {
             let level = energy.decay_curve(b).level_db().into_iter().enumerate();
@@ -342,7 +311,7 @@ impl<'a> Room<'a> {
             pairs.iter().zip(&held_out).filter(|(_, held)| !**held).map(|(pair, _)| *pair).collect();
         let laws = places.iter().map(|place| self.laws(*place)).collect::<Result<Vec<_>, _>>()?;
         let under: Vec<Conditions<'_>> =
-            laws.iter().map(|laws| self.between(laws, &self.materials)).collect();
+            laws.iter().map(|laws| conditions(&self.materials, &self.air, laws)).collect();
         let of_fitted: Vec<Conditions<'_>> =
             under.iter().zip(&held_out).filter(|(_, held)| !**held).map(|(own, _)| *own).collect();
         let start = Instant::now();
@@ -427,7 +396,7 @@ impl Retrace for Retraced<'_> {
         let config = RenderConfig { sample_rate_hz: RATE_HZ, seed, ..RenderConfig::default() };
         let renderer = PressureRenderer::new(config).map_err(failed)?;
         let response =
-            renderer.render(&paths[0], &self.room.between(self.laws, materials)).map_err(failed)?;
+            renderer.render(&paths[0], &conditions(materials, &self.room.air, self.laws)).map_err(failed)?;
         Ok(Some(RoomParameters::measure(&response, OCTAVES)?.t30_s))
     }
 }

@@ -8,6 +8,7 @@ mod session;
 
 use crate::demo::Demo;
 use crate::failure::Failure;
+use crate::modelled::ModelArguments;
 use crate::room::{PlaceArguments, RoomArguments};
 use clap::Args;
 use matcher::Matcher;
@@ -27,6 +28,8 @@ pub struct Arguments {
     speech: Option<PathBuf>,
     #[command(flatten)]
     room: RoomArguments,
+    #[command(flatten)]
+    model: ModelArguments,
     #[command(flatten)]
     place: PlaceArguments,
     /// Sound that is heard in the room meanwhile, again and again (WAV) [default: the built-in demo]
@@ -68,6 +71,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let dry = read_audio(&dry_path, Channel::Mono)?;
     Recording { name: &demo.name(&dry_path), signal: &dry }.check_not_silent()?;
     let (room, _) = arguments.room.read(&mut demo)?;
+    let (room, model) = arguments.model.apply(room)?;
     let (source, receiver) = arguments.place.of(&room)?;
 
     let estimator = Estimator::pretrained()?;
@@ -75,7 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     // A sound card delivers the rate that it is asked for; a file is brought to it before it is streamed.
     let speech = resample(&speech, live.sample_rate_hz())?;
     let dry = resample(&dry, matcher::SAMPLE_RATE_HZ)?;
-    let matcher = Matcher::new(&room, source, receiver, arguments.rays, arguments.seed)?;
+    let matcher = Matcher::new(&room, source, receiver, &model, (arguments.rays, arguments.seed))?;
     println!(
         "room of the file: traced and rendered in {:.2} s; listening in blocks of {} ms",
         matcher.start_s(),

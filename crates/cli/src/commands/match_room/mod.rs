@@ -8,12 +8,11 @@ use crate::bar::Bar;
 use crate::channel::channel;
 use crate::demo::Demo;
 use crate::failure::Failure;
+use crate::modelled::ModelArguments;
 use crate::output::OutputFolder;
 use crate::room::{PlaceArguments, RoomArguments};
 use clap::Args;
 use sabine::acoustics::{Channel, SampleFormat, Signal, encode_wav};
-use sabine::diagnose::ExtendedModel;
-use sabine::paths::laws::{Law, LawTarget};
 use sabine::{
     FileMatch, MatchConfig, MatchFiles, MatchInput, MatchSummary, Recording, match_room_files, materials_toml,
 };
@@ -30,11 +29,8 @@ pub struct Arguments {
     speech: Option<PathBuf>,
     #[command(flatten)]
     room: RoomArguments,
-    /// extended_model.toml of `diagnose`: the simulation starts from its materials, air, dimensions, places and laws. Loudspeaker,
-    /// noise and recorder of that measurement are left out: the speech has its own. Where it names standing waves, --wave-below
-    /// is theirs
-    #[arg(long, value_name = "F.toml")]
-    model: Option<PathBuf>,
+    #[command(flatten)]
+    model: ModelArguments,
     #[command(flatten)]
     place: PlaceArguments,
     /// Sound to place in the room (WAV) [default: the built-in demo]
@@ -71,25 +67,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     // A folder that cannot be written to should not cost the user a computation first.
     let mut out = OutputFolder::create(&arguments.out)?;
     let channel = arguments.channel.unwrap_or_default();
-    let (mut room, room_name) = arguments.room.read(&mut demo)?;
-    let (mut diffraction, mut cuboid_paths) = (false, 0);
-    let (mut wave_below_hz, mut laws) = (arguments.wave_below, Vec::new());
-    if let Some(model) = &arguments.model {
-        let read = ExtendedModel::read(model)?;
-        let (added, fitted): (Vec<Law>, Vec<Law>) = read
-            .causes
-            .iter()
-            .filter_map(|cause| cause.law().cloned())
-            .partition(|law| law.target() == LawTarget::Added);
-        for law in added {
-            println!("note: the law {} of {} adds sound and is left out", law.id(), model.display());
-        }
-        laws = fitted;
-        let extended = read.room(&room)?;
-        wave_below_hz = wave_below_hz.or(extended.wave_below_hz);
-        (diffraction, cuboid_paths) = (extended.diffraction, extended.cuboid_paths);
-        room = extended.measured_room(&room)?;
-    }
+    let (room, room_name) = arguments.room.read(&mut demo)?;
+    let (room, model) = arguments.model.apply(room)?;
     let (source, receiver) = arguments.place.of(&room)?;
     let matched = out.path_of(MATCHED);
     let files = MatchFiles {
@@ -101,9 +80,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         receiver: &receiver.id,
         matched: &matched,
     };
-    let mut config = MatchConfig { seed: arguments.seed, wave_below_hz, laws, ..MatchConfig::default() };
-    config.tracer.diffraction |= diffraction;
-    config.tracer.cuboid_paths = config.tracer.cuboid_paths.max(cuboid_paths);
+    let wave_below_hz = arguments.wave_below.or(model.wave_below_hz);
+    let mut config = MatchConfig { seed: arguments.seed, wave_below_hz, ..MatchConfig::default() };
+    config.tracer = model.tracer(config.tracer);
+    config.laws = model.laws;
     if let Some(rays) = arguments.rays {
         config.tracer.rays = rays;
     }

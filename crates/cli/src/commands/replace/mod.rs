@@ -9,6 +9,7 @@ use crate::bar::Bar;
 use crate::channel::channel;
 use crate::demo::Demo;
 use crate::failure::Failure;
+use crate::modelled::{ModelArguments, conditions};
 use crate::output::OutputFolder;
 use crate::room::{PlaceArguments, RoomArguments};
 use clap::Args;
@@ -19,7 +20,7 @@ use sabine::acoustics::{
 };
 use sabine::eqfilter::convolve;
 use sabine::optimize::{PredictedChange, RoomPrediction};
-use sabine::paths::{Conditions, Propagator};
+use sabine::paths::Propagator;
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -48,6 +49,8 @@ pub struct Arguments {
     absorption: Option<Vec<f64>>,
     #[command(flatten)]
     place: PlaceArguments,
+    #[command(flatten)]
+    model: ModelArguments,
     /// Dry voice to hear in both rooms, its first 20 s (WAV) [default: the built-in demo]
     #[arg(long, value_name = "F.wav")]
     dry: Option<PathBuf>,
@@ -102,6 +105,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut out = OutputFolder::create(&arguments.out)?;
     let mut demo = Demo::default();
     let (room, room_name) = arguments.room.read(&mut demo)?;
+    let (room, model) = arguments.model.apply(room)?;
     let dry_path = demo.or(arguments.dry.as_deref(), "speech/dry_guest.wav")?;
     let dry = excerpt(&read_audio(&dry_path, arguments.channel.unwrap_or_default())?)?;
     let (source, receiver) = arguments.place.of(&room)?;
@@ -125,23 +129,28 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut middle = before.clone();
     middle[replaced] = between(&before[replaced], &after[replaced])?;
     let scene = room.scene().with_materials(middle)?;
-    let config = TracerConfig {
+    let config = model.tracer(TracerConfig {
         rays: arguments.rays,
         duration_s: arguments.duration_s,
         seed: arguments.seed,
         ..TracerConfig::default()
-    };
+    });
     let bar = Bar::new();
     let air = room.air();
     let paths = PathTracer::new(config)?.trace(&scene, source, receiver, &air, &bar)?;
     bar.finish();
-    let change = PredictedChange::new(&paths, &before, &after, &air)?;
+    let laws = model.laws_between(&scene, (source, receiver), &air)?;
+    let change = if laws.is_empty() {
+        PredictedChange::new(&paths, &before, &after, &air)?
+    } else {
+        PredictedChange::under(&paths, &conditions(&before, &air, &laws), &after)?
+    };
     let render = RenderConfig { seed: arguments.seed, ..RenderConfig::default() };
     let renderer_rate_hz = render.sample_rate_hz;
     let renderer = PressureRenderer::new(render)?;
     let mut voices = Vec::new();
     for (file, materials) in [("before.wav", &before), ("after.wav", &after)] {
-        let response = Signal::from(renderer.render(&paths, &Conditions::new(materials, &air))?);
+        let response = Signal::from(renderer.render(&paths, &conditions(materials, &air, &laws))?);
         out.write(file, &encode_wav(&response, SampleFormat::Float32)?)?;
         voices.push(convolve(resample(&dry, response.sample_rate_hz())?.samples(), response.samples()));
     }

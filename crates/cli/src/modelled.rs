@@ -1,0 +1,86 @@
+//! A room as an extended model has it, for commands that trace and fit: everything of the model that bears on paths.
+
+use crate::failure::Failure;
+use clap::Args;
+use sabine::acoustics::{Air, Error as ValueError, Material};
+use sabine::diagnose::ExtendedModel;
+use sabine::paths::Conditions;
+use sabine::paths::laws::{BoundLaws, Law, LawSite, LawTarget};
+use sabine::propagate::TracerConfig;
+use sabine::scene::{MeasuredRoom, Receiver, Scene, Source};
+use std::path::PathBuf;
+
+/// The option of these commands.
+#[derive(Args, Debug, Default)]
+pub struct ModelArguments {
+    /// extended_model.toml of `diagnose`: the room is as it says in all that bears on paths (absorption, air, dimensions, places, surfaces,
+    /// laws). Loudspeaker, microphones, noise and recorder are left out
+    #[arg(long = "model", value_name = "F.toml")]
+    file: Option<PathBuf>,
+}
+
+/// What a model says of paths beside the room itself.
+#[derive(Clone, Debug, Default)]
+pub struct PathModel {
+    /// Formulas under which paths carry sound; none that adds sound.
+    pub laws: Vec<Law>,
+    /// Below this frequency in Hz responses are those of the wave equation.
+    pub wave_below_hz: Option<f64>,
+    diffraction: bool,
+    cuboid_paths: usize,
+}
+
+impl ModelArguments {
+    /// The room as the model has it, and the rest of what bears on paths; the room as stated without one. What is left out is printed.
+    ///
+    /// # Errors
+    /// The model cannot be read or does not fit the room: the error names file or field.
+    pub fn apply(&self, stated: MeasuredRoom) -> Result<(MeasuredRoom, PathModel), Failure> {
+        let Some(file) = &self.file else { return Ok((stated, PathModel::default())) };
+        let model = ExtendedModel::read(file)?;
+        let extended = model.room(&stated)?;
+        let all = model.causes.iter().filter_map(|cause| cause.law().cloned());
+        let (added, laws): (Vec<Law>, Vec<Law>) = all.partition(|law| law.target() == LawTarget::Added);
+        for law in added {
+            println!("note: the law {} of {} adds sound and is left out", law.id(), file.display());
+        }
+        let own = PathModel {
+            laws,
+            wave_below_hz: extended.wave_below_hz,
+            diffraction: extended.diffraction,
+            cuboid_paths: extended.cuboid_paths,
+        };
+        Ok((extended.measured_room(&stated)?, own))
+    }
+}
+
+impl PathModel {
+    /// Settings of a tracer that finds the paths of the model.
+    #[must_use]
+    pub fn tracer(&self, config: TracerConfig) -> TracerConfig {
+        TracerConfig {
+            diffraction: config.diffraction || self.diffraction,
+            cuboid_paths: config.cuboid_paths.max(self.cuboid_paths),
+            ..config
+        }
+    }
+
+    /// The laws between a source and a receiver.
+    ///
+    /// # Errors
+    /// A law that does not fit the room.
+    pub fn laws_between(
+        &self,
+        scene: &Scene,
+        (source, receiver): (&Source, &Receiver),
+        air: &Air,
+    ) -> Result<BoundLaws, ValueError> {
+        Ok(BoundLaws::new(&self.laws, &LawSite::new(scene, source, receiver, air))?)
+    }
+}
+
+/// Surfaces and air under laws, if there are any.
+pub fn conditions<'a>(materials: &'a [Material], air: &'a Air, laws: &'a BoundLaws) -> Conditions<'a> {
+    let plain = Conditions::new(materials, air);
+    if laws.is_empty() { plain } else { plain.with_laws(laws) }
+}
