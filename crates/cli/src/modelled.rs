@@ -31,6 +31,11 @@ pub struct PathModel {
 }
 
 impl ModelArguments {
+    /// Whether there is one.
+    pub fn is_given(&self) -> bool {
+        self.file.is_some()
+    }
+
     /// The room as the model has it, and the rest of what bears on paths; the room as stated without one. What is left out is printed.
     ///
     /// # Errors

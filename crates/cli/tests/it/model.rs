@@ -148,3 +148,42 @@ fn materials_are_fitted_under_the_laws_of_a_model() {
     assert!((carpet(&without, 1) - carpet(&with, 1)).abs() < 0.02);
     assert!(carpet(&without, 5) > carpet(&with, 5) + 0.01, "{} {}", carpet(&without, 5), carpet(&with, 5));
 }
+
+/// Commands that render take the room from the model: here, one in which the carpet swallows nearly all.
+#[test]
+fn a_walk_and_a_replacement_happen_in_the_room_of_the_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("soft.toml");
+    let mut soft = ExtendedModel::default();
+    soft.centres_hz = vec![125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0];
+    soft.absorption.insert("carpet".to_owned(), vec![0.95; 7]);
+    soft.with_law(read_laws(LAW).unwrap().remove(0)).write(&path).unwrap();
+    let model = ["--model", path.to_str().unwrap()];
+    let replaced = |name: &str, more: &[&str]| -> f64 {
+        let out = folder.path().join(name);
+        let few = ["--rays", "2000", "--duration-s", "1.5", "--out", out.to_str().unwrap()];
+        succeeds("replace", &[&few[..], more].concat());
+        let text = std::fs::read_to_string(out.join("change.json")).unwrap();
+        let change: Value = serde_json::from_str(&text).unwrap();
+        change["rows"][0]["before"][4].as_f64().unwrap()
+    };
+    let (stated, modelled) = (replaced("stated", &[]), replaced("modelled", &model));
+    assert!(modelled < 0.9 * stated, "{modelled} {stated}");
+
+    let neutral = folder.path().join("neutral.toml");
+    let mut stated = ExtendedModel::default();
+    stated.centres_hz = vec![1000.0];
+    stated.write(&neutral).unwrap();
+    let walked = |name: &str, more: &[&str]| -> Vec<u8> {
+        let out = folder.path().join(name);
+        let room = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/room");
+        let few = ["--room", room, "--rays", "100", "--speed", "20", "--out", out.to_str().unwrap()];
+        succeeds("walk", &[&few[..], more].concat());
+        std::fs::read(&out).unwrap()
+    };
+    // Sound is scaled to its peak: it is another one, or the same to the byte.
+    let plain = walked("stated.wav", &[]);
+    assert!(plain != walked("soft.wav", &model));
+    assert!(plain == walked("neutral.wav", &["--model", neutral.to_str().unwrap()]));
+    assert!(fails("walk", &model).contains("--model changes the room of --room"));
+}

@@ -5,6 +5,7 @@ mod route;
 use crate::bar::Bar;
 use crate::demo::Demo;
 use crate::failure::Failure;
+use crate::modelled::{ModelArguments, PathModel, conditions};
 use crate::room::read_room;
 use clap::{Args, ValueEnum};
 use route::{Walk, read_corners};
@@ -44,6 +45,8 @@ pub struct Arguments {
     /// Tables of materials instead of the room's: a materials.toml as `fit` and `match` write it
     #[arg(long, value_name = "F", requires = "room")]
     materials: Option<PathBuf>,
+    #[command(flatten)]
+    model: ModelArguments,
     /// Corners of the walk, a line each: x y z in metres
     #[arg(long, value_name = "FILE")]
     path: Option<PathBuf>,
@@ -94,9 +97,12 @@ enum Mode {
 /// # Errors
 /// Whatever stands in the way, in words for the user.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let (scene, air, source, mut corners) = match &arguments.room {
-        Some(folder) => furnished(folder, arguments.allow_outside, arguments.materials.as_deref())?,
-        None => two_rooms()?,
+    let ((scene, air, source, mut corners), model) = match &arguments.room {
+        Some(folder) => furnished(folder, arguments)?,
+        None if arguments.model.is_given() => {
+            return Err("--model changes the room of --room, and there is none".into());
+        }
+        None => (two_rooms()?, PathModel::default()),
     };
     if let Some(path) = &arguments.path {
         corners = read_corners(path)?;
@@ -121,14 +127,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     walk.check_size(arguments.rate, renderer.channels(arguments))?;
     println!("{}", walk.line());
     let materials: Vec<Material> = scene.materials().iter().map(|named| named.material.clone()).collect();
-    let tracer = TracerConfig {
+    let tracer = model.tracer(TracerConfig {
         rays: arguments.rays,
         duration_s: arguments.duration,
         image_order: 2,
         seed: arguments.seed,
         ..Default::default()
-    };
-    let mut tracer = MovingTracer::new(scene, air, MovingConfig { tracer, ..Default::default() })?;
+    });
+    let mut tracer = MovingTracer::new(scene.clone(), air, MovingConfig { tracer, ..Default::default() })?;
 
     let rate = f64::from(arguments.rate);
     let block = (arguments.rate as usize / 375).next_power_of_two().max(16);
@@ -139,7 +145,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         fade_blocks: update_blocks - BLOCKS_BEFORE_FADE,
     };
     let blocks = (walk.duration_s() * rate / block as f64).ceil() as usize;
-    let conditions = Conditions::new(&materials, &air);
     let mut work = Work::default();
     // A response for a place, and how long it took to find.
     let mut respond = |time_s: f64, work: &mut Work| -> Result<Vec<Vec<f32>>, Failure> {
@@ -149,7 +154,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         work.trace_s.push(start.elapsed().as_secs_f64());
         work.effective_rays = frame.effective_rays;
         let start = Instant::now();
-        let response = renderer.response(&frame.paths, &conditions, walk.facing(time_s)?)?;
+        let laws = model.laws_between(&scene, (&source, &receiver), &air)?;
+        let between = conditions(&materials, &air, &laws);
+        let response = renderer.response(&frame.paths, &between, walk.facing(time_s)?)?;
         work.render_s.push(start.elapsed().as_secs_f64());
         Ok(response)
     };
@@ -305,11 +312,12 @@ impl Renderer {
 
 type Setting = (Scene, Air, Source, Vec<[f64; 3]>);
 
-fn furnished(folder: &Path, allow_outside: bool, materials: Option<&Path>) -> Result<Setting, Failure> {
-    let room = read_room(folder, allow_outside, materials)?;
+fn furnished(folder: &Path, arguments: &Arguments) -> Result<(Setting, PathModel), Failure> {
+    let room = read_room(folder, arguments.allow_outside, arguments.materials.as_deref())?;
+    let (room, model) = arguments.model.apply(room)?;
     let source = room.sources().first().ok_or("the room has no source")?.clone();
     let corners = room.receivers().iter().map(|receiver| receiver.position_m).collect();
-    Ok((room.scene().clone(), room.air(), source, corners))
+    Ok(((room.scene().clone(), room.air(), source, corners), model))
 }
 
 /// A hard room of 6 x 5 x 3 m and a soft one of 5 x 4 x 3 m, joined by a doorway 1 m wide and 2.1 m high.
