@@ -6,7 +6,7 @@ use crate::room::Room;
 use pyo3::prelude::*;
 use sabine::diagnose::{DiagnoseConfig, Diagnoser, catalogue};
 
-/// Diagnoses a room that was read from a folder: the diagnosis as JSON, in the form of `diagnosis.json`, and the extended model as TOML.
+/// Diagnoses a room that was read from a folder: the diagnosis as JSON, as in `diagnosis.json`, and the extended model as TOML.
 ///
 /// # Errors
 /// Settings are refused, the room has no responses, or what [`Diagnoser::diagnose`] says.

@@ -197,10 +197,11 @@ pub fn fit_responses<'py>(
     }
     let fitter = MaterialFitter::new(FitConfig::default())?;
     let found = interruptible(py, |observer| {
-        let decays: Vec<MeasuredDecay> = responses
-            .iter()
-            .map(|(_, _, response)| Ok(MeasuredDecay::new(response, bands)?))
-            .collect::<Result<_, Failure>>()?;
+        let decay = |(index, (_, _, response)): (usize, &Placed)| {
+            MeasuredDecay::new(response, bands)
+                .map_err(|error| refused(format!("responses[{index}]: {error}")))
+        };
+        let decays: Vec<MeasuredDecay> = responses.iter().enumerate().map(decay).collect::<Result<_, _>>()?;
         let times = decays.iter().flat_map(|decay| decay.t30_s().values()).flatten();
         let longest_s = times.map(|t30| t30.value).fold(0.0, f64::max);
         let prepared = Prepared::new(room, bands, rays, allow_leaks, longest_s, observer)?;

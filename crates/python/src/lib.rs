@@ -5,8 +5,8 @@
 //! [`sabine`], and puts dictionaries of arrays together.
 //!
 //! # Rules of the border
-//! - Whatever computes lets go of Python's lock. What may take long hears Ctrl-C ([`interrupt`]).
-//! - Errors of the library become `ValueError`, or `OSError` where a file is at fault, with the library's words ([`failure`]).
+//! - Whatever computes lets go of Python's lock. What may take long hears Ctrl-C (`interrupt.rs`).
+//! - Errors of the library become `ValueError`, or `OSError` where a file is at fault, with the library's words (`failure.rs`).
 //! - Samples arrive as one contiguous channel of `float32`. The library checks that they are finite and not empty.
 //! - The same seed gives the same result.
 //!

@@ -48,7 +48,7 @@ impl Room {
         bands_hz: Vec<f64>,
         surfaces: [(Vec<f64>, Vec<f64>); 6],
         absorption_sd: f64,
-        air: (f64, f64, f64),
+        air: [f64; 3],
         sources: Vec<NamedPlace>,
         receivers: Vec<NamedPlace>,
     ) -> Result<Self, Failure> {
@@ -57,12 +57,13 @@ impl Room {
             Ok(Material::new(PerBand::new(bands, absorption)?, PerBand::new(bands, scattering)?)?)
         };
         let [x0, x1, y0, y1, floor, ceiling] = surfaces.map(material);
+        let [temperature_c, humidity_percent, pressure_kpa] = air;
         let source = |(id, position_m)| Ok(Source::omni(id, position_m)?);
         let receiver = |(id, position_m)| Ok(Receiver::omni(id, position_m)?);
         Ok(Self {
             scene: Scene::shoebox(size_m, [x0?, x1?, y0?, y1?, floor?, ceiling?])?,
             absorption_sd: vec![PerBand::uniform(bands, absorption_sd); 6],
-            air: Air::new(air.0, air.1, air.2)?,
+            air: Air::new(temperature_c, humidity_percent, pressure_kpa)?,
             sources: sources.into_iter().map(source).collect::<Result<_, Failure>>()?,
             receivers: receivers.into_iter().map(receiver).collect::<Result<_, Failure>>()?,
             measured: None,

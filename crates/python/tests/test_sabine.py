@@ -141,6 +141,7 @@ class Trace(unittest.TestCase):
     def test_ctrl_c_stops_it_and_other_threads_go_on_meanwhile(self):
         press = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
         began = time.monotonic()
+        self.addCleanup(press.cancel)
         press.start()
         with self.assertRaises(KeyboardInterrupt):
             diffuse_box(0.02).trace(SOURCE_M, RECEIVER_M, rays=5_000_000)
@@ -259,10 +260,11 @@ class BadInput(unittest.TestCase):
                 self.assert_refused("not finite", call, np.append(tone.astype(float), bad), RATE_HZ)
             for rate_hz in (0, -1, 44.1, 999, 1e9, np.nan, np.inf, 44100.5):
                 self.assert_refused("sample.rate", call, tone, rate_hz)
-            self.assert_refused("real number", call, tone, "fast", error=TypeError)
+            self.assert_refused("sample_rate: expected a number", call, tone, "fast")
         self.assert_refused("bands_hz", sabine.measure, tone, RATE_HZ, bands_hz=[])
         self.assert_refused("bands_hz", sabine.measure, tone, RATE_HZ, bands_hz=[125, 1000])
         self.assert_refused("bands_hz", sabine.measure, tone, RATE_HZ, bands_hz=[np.nan])
+        self.assert_refused("bands_hz", sabine.measure, tone, RATE_HZ, bands_hz="octaves")
         self.assert_refused("8000", sabine.estimate, tone, 8000)
         self.assert_refused("0.0", sabine.estimate, tone, RATE_HZ)
 
@@ -285,7 +287,7 @@ class BadInput(unittest.TestCase):
         refused("the face x0 has none", SIZE_M)
         refused("no face 'roof'", SIZE_M, {"roof": 0.1})
         refused("scattering", SIZE_M, 0.1, scattering=-0.1)
-        refused("carpet", SIZE_M, materials="carpet_thinn")
+        refused("carpet", SIZE_M, materials="carpet_x")
         refused("absorption_sd", SIZE_M, 0.1, absorption_sd=0)
         refused("bands_hz", SIZE_M, 0.1, bands_hz=[1, 2, 3])
         refused("temperature", SIZE_M, 0.1, temperature_c=1e6)
@@ -303,6 +305,7 @@ class BadInput(unittest.TestCase):
         self.assert_refused("rays", trace, SOURCE_M, RECEIVER_M, rays=1e3)
         self.assert_refused("seed", trace, SOURCE_M, RECEIVER_M, seed=-1)
         self.assert_refused("duration_s", trace, SOURCE_M, RECEIVER_M, duration_s=np.nan)
+        self.assert_refused("duration_s", trace, SOURCE_M, RECEIVER_M, duration_s="long")
         self.assert_refused("sample_rate", trace, SOURCE_M, RECEIVER_M, sample_rate=1e6)
         self.assert_refused("sample_rate", trace, SOURCE_M, RECEIVER_M, sample_rate=-1)
         self.assert_refused("image_order", trace, SOURCE_M, RECEIVER_M, image_order=11)
@@ -319,6 +322,9 @@ class BadInput(unittest.TestCase):
         self.assert_refused("not both", sabine.fit, box, 0.5, responses=[])
         self.assert_refused("time_zero", sabine.fit, box, responses=[(SOURCE_M, RECEIVER_M, tone, 48e3)], time_zero="?")
         self.assert_refused("responses\\[0\\]: shape", sabine.fit, box, responses=[(SOURCE_M, RECEIVER_M, [tone], 48e3)])
+        self.assert_refused("responses\\[0\\]: expected", sabine.fit, box, responses=[(SOURCE_M, RECEIVER_M)])
+        self.assert_refused("responses\\[0\\]: .*no direct sound", sabine.fit, box, responses=[(SOURCE_M, RECEIVER_M, 0 * tone, 48e3)])
+        self.assert_refused("room: expected a Room", sabine.fit, "box", 0.5)
         self.assert_refused("no measured responses", sabine.diagnose, box)
         self.assert_refused("no effect \"gremlins\"", sabine.diagnose, FIXTURES / "room", effects=["gremlins"])
         self.assert_refused("effects: expected a list", sabine.diagnose, FIXTURES / "room", effects="time_zero")

@@ -5,8 +5,8 @@
     >>> response = room.trace([1, 1, 1.5], [4, 3, 1.2], seed=1)
     >>> parameters = sabine.measure(response.samples, response.sample_rate)
 
-Units: seconds, metres, Hz, dB; absorption and scattering are shares of energy at random incidence. A number that cannot be read is NaN,
-and its reason stands beside it. Results have ``plot()`` (needs matplotlib); responses have ``to_pyfar()`` (needs pyfar).
+Units: seconds, metres, Hz, dB; absorption and scattering are shares of energy at random incidence. A number that cannot be read
+is NaN, and its reason stands beside it. Results have ``plot()`` (needs matplotlib); responses have ``to_pyfar()`` (needs pyfar).
 
 Errors: ValueError for what cannot be computed, OSError for files, each with a message that names the field.
 """

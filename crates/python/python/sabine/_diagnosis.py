@@ -30,7 +30,7 @@ class Diagnosis:
 
     @property
     def causes(self) -> List[dict]:
-        """Named causes, each with ``effect``, ``explanation``, ``probability``, ``nats``, ``parameters`` by name with 90 % intervals ..."""
+        """Named causes: ``effect``, ``explanation``, ``probability``, ``nats``, ``parameters`` with 90 % intervals, and more."""
         return self.data["causes"]
 
     @property
@@ -104,8 +104,8 @@ def diagnose(
 
 
 def _names(names: Sequence[str], what: str) -> List[str]:
-    if isinstance(names, str):
-        raise ValueError(f"{what}: expected a list of names, found the text {names!r}")
+    if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+        raise ValueError(f"{what}: expected a list of names, found {names!r}")
     return list(names)
 
 

@@ -7,7 +7,7 @@ from typing import Dict, Sequence, Tuple
 
 import numpy as np
 
-from . import _inputs, _sabine
+from . import _inputs, _plots, _sabine
 from ._inputs import Place
 from ._readings import Readings
 from ._room import ROOM_OCTAVES, Room, Surface
@@ -55,16 +55,19 @@ class Fit:
 
     def plot(self, ax=None):
         """Draws fitted absorption with its standard error, and what it was before (dashed); returns the axes."""
-        ax = self.room.plot(ax)
-        for line, surface in zip(ax.get_lines()[:: len(ax.get_lines()) // len(self.surfaces)], self.before.surfaces.values()):
-            ax.plot(self.before.bands_hz, surface.absorption, "--", color=line.get_color(), alpha=0.6)
+        ax = _plots.new_axes(ax)
+        for after, before in zip(self.surfaces.values(), self.before.surfaces.values()):
+            colour = _plots.absorption(ax, self.room.bands_hz, after)
+            ax.plot(self.before.bands_hz, before.absorption, "--", color=colour, alpha=0.6)
+        _plots.absorption_axes(ax, self.room.bands_hz)
         return ax
 
     def __repr__(self) -> str:
-        absorption = [
-            f"  {surface.name}: " + ", ".join(f"{a:.2f} ± {sd:.2f}" for a, sd in zip(surface.absorption, surface.absorption_sd))
-            for surface in self.surfaces.values()
-        ]
+        def row(surface: Surface) -> str:
+            cells = zip(surface.absorption, surface.absorption_sd)
+            return f"  {surface.name}: " + ", ".join(f"{value:.2f} ± {sd:.2f}" for value, sd in cells)
+
+        absorption = [row(surface) for surface in self.surfaces.values()]
         told = [f"  not reached at {hz:g} Hz: {why}" for hz, why in self.unreachable.items()]
         told += [f"  not determined: {what}" for what in self.not_determined]
         told += [f"  note: {note}" for note in self.notes]
@@ -99,8 +102,9 @@ def fit(
         source: name or position (x, y, z) in metres; the room's first by default.
         receiver: the same.
         responses: (source, receiver, samples, sample rate) of each measured response.
-        time_zero: what the first sample of ``responses`` is: ``emission``, ``common`` (one unknown latency) or ``per_response``.
-        levels: what their levels mean: ``absolute`` (1 is the direct sound at 1 m), ``common`` (one unknown gain), ``per_response``.
+        time_zero: what the first sample of ``responses`` is: ``emission``, ``common`` (one unknown latency), ``per_response``.
+        levels: what their levels mean: ``absolute`` (1 is the direct sound at 1 m), ``common`` (one unknown gain),
+            ``per_response``.
         bands_hz: nominal centres of the bands of the fit; those of readings count instead.
         rays: rays of the first trace, 1 to 100 million; a fit to reverberation times traces more where they are too few.
         seed: of rays and noise.
@@ -110,34 +114,38 @@ def fit(
         ValueError: a target, a place, a response or a setting is refused, or there is nothing to fit to.
         KeyboardInterrupt: somebody pressed Ctrl-C.
     """
+    if not isinstance(room, Room):
+        raise ValueError(f"room: expected a Room, found {room!r}")
     if t60_s is not None and responses is not None:
         raise ValueError("responses: give these or t60_s, not both")
     settings = (_inputs.count(rays, "rays"), _inputs.count(seed, "seed"), allow_leaks)
     if t60_s is None:
         if responses is not None:
-            responses = [_recorded(i, *response) for i, response in enumerate(responses)]
-        bands_hz = [float(hz) for hz in bands_hz]
-        found = _sabine.fit_responses(room._handle, bands_hz, responses, time_zero, levels, *settings)
+            responses = [_recorded(i, response) for i, response in enumerate(responses)]
+        found = _sabine.fit_responses(room._handle, _inputs.bands(bands_hz), responses, time_zero, levels, *settings)
         return Fit._of(room, found)
     if isinstance(t60_s, Readings):
         known = ~np.isnan(t60_s.value)
         bands_hz, values, errors = t60_s.bands_hz[known], t60_s.value[known], t60_s.standard_error[known]
     else:
+        bands_hz = _inputs.bands(bands_hz)
         values = _inputs.numbers(t60_s, "t60_s", (len(bands_hz),))
         errors = np.zeros(len(values))
     places = (
         _inputs.place(_or_first(source, room.sources, "source"), "source"),
         _inputs.place(_or_first(receiver, room.receivers, "receiver"), "receiver"),
     )
-    bands_hz = [float(hz) for hz in bands_hz]
-    found = _sabine.fit_t60(room._handle, bands_hz, values.tolist(), errors.tolist(), *places, *settings)
+    found = _sabine.fit_t60(room._handle, list(bands_hz), values.tolist(), errors.tolist(), *places, *settings)
     return Fit._of(room, found)
 
 
-def _recorded(index: int, source: Place, receiver: Place, samples, sample_rate: float) -> tuple:
+def _recorded(index: int, response) -> tuple:
     name = f"responses[{index}]"
+    if not isinstance(response, (tuple, list)) or len(response) != 4:
+        raise ValueError(f"{name}: expected (source, receiver, samples, sample rate)")
+    source, receiver, samples, sample_rate = response
     places = _inputs.place(source, f"{name} source"), _inputs.place(receiver, f"{name} receiver")
-    return (*places, _inputs.samples(samples, name), sample_rate)
+    return (*places, _inputs.samples(samples, name), _inputs.number(sample_rate, f"{name} sample rate"))
 
 
 def _or_first(place: Place | None, named: Dict[str, np.ndarray], what: str) -> Place:

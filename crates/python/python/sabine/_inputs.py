@@ -23,6 +23,22 @@ def samples(values, name: str) -> np.ndarray:
         return np.ascontiguousarray(array, dtype=np.float32)
 
 
+def number(value, name: str) -> float:
+    """A number; its range is checked where it is used."""
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name}: expected a number, found {value!r}") from None
+
+
+def bands(centres_hz, name: str = "bands_hz") -> list:
+    """Centres of bands, in Hz."""
+    array = np.asarray(centres_hz)
+    if array.ndim != 1 or array.dtype.kind not in "fiu":
+        raise ValueError(f"{name}: expected centres in Hz, found {centres_hz!r}")
+    return array.astype(float).tolist()
+
+
 def numbers(values, name: str, shape: tuple) -> np.ndarray:
     """Numbers of this shape; one number stands for all."""
     try:

@@ -95,6 +95,5 @@ def measure(response, sample_rate: float, *, bands_hz: Sequence[float] = OCTAVES
     Raises:
         ValueError: the response is empty, of another shape or type or not finite; a sample rate or bands out of range.
     """
-    return MeasuredParameters._of(
-        _sabine.measure(_inputs.samples(response, "response"), sample_rate, list(bands_hz))
-    )
+    samples, sample_rate = _inputs.samples(response, "response"), _inputs.number(sample_rate, "sample_rate")
+    return MeasuredParameters._of(_sabine.measure(samples, sample_rate, _inputs.bands(bands_hz)))

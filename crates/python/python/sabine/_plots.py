@@ -13,7 +13,7 @@ def new_axes(ax):
         from matplotlib import pyplot
     except ImportError as error:
         raise ImportError("plot() needs matplotlib: pip install matplotlib") from error
-    return pyplot.subplots()[1]
+    return pyplot.subplots(layout="constrained")[1]
 
 
 def band_axis(ax, bands_hz: np.ndarray) -> None:
@@ -23,3 +23,17 @@ def band_axis(ax, bands_hz: np.ndarray) -> None:
     ax.minorticks_off()
     ax.set_xlabel("Frequency (Hz)")
     ax.grid(True, alpha=0.3)
+
+
+def absorption(ax, bands_hz: np.ndarray, surface):
+    """Draws the absorption of a surface with its standard deviation; returns the colour."""
+    label = f"{surface.name} ({surface.area_m2:.1f} m²)"
+    drawn = ax.errorbar(bands_hz, surface.absorption, surface.absorption_sd, fmt="o-", capsize=3, label=label)
+    return drawn[0].get_color()
+
+
+def absorption_axes(ax, bands_hz: np.ndarray) -> None:
+    """Axes and legend of absorption over frequency."""
+    band_axis(ax, bands_hz)
+    ax.set(ylabel="Absorption", ylim=(0, 1))
+    ax.legend()

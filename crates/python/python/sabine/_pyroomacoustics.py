@@ -8,6 +8,10 @@ import numpy as np
 
 #: Names of the faces of a box there, in the order of those here.
 _WALLS = ("west", "east", "south", "north", "floor", "ceiling")
+#: A humidity below this is none that was stated: it is 0 or 0.3 there by default ...
+_LEAST_HUMIDITY_PERCENT = 1.0
+#: ... and air absorbs then as a table for 30 to 50 % says.
+_HUMIDITY_PERCENT = 40.0
 
 
 def shoebox(room, bands_hz: Sequence[float], faces: Sequence[str]) -> dict:
@@ -30,6 +34,7 @@ def shoebox(room, bands_hz: Sequence[float], faces: Sequence[str]) -> dict:
         values = np.atleast_1d(values).astype(float).round(6)
         return values[nearest] if len(values) > 1 else np.full(len(bands_hz), values[0])
 
+    humidity_percent = float(room.physics.H)
     microphones = room.mic_array.R.T if room.mic_array is not None else ()
     return {
         "size_m": np.asarray(room.shoebox_dim, dtype=float),
@@ -39,5 +44,7 @@ def shoebox(room, bands_hz: Sequence[float], faces: Sequence[str]) -> dict:
         "sources": {f"s{i + 1}": np.asarray(source.position) for i, source in enumerate(room.sources)},
         "receivers": {f"r{i + 1}": np.asarray(position) for i, position in enumerate(microphones)},
         "temperature_c": float(room.physics.T),
-        "humidity_percent": float(room.physics.H),
+        "humidity_percent": (
+            humidity_percent if humidity_percent >= _LEAST_HUMIDITY_PERCENT else _HUMIDITY_PERCENT
+        ),
     }

@@ -43,7 +43,7 @@ class Surface:
 class Room:
     """A room that can be traced, fitted and, if responses were measured in it, diagnosed.
 
-    Made by :class:`ShoeBox`, :meth:`Room.read` and :meth:`Room.from_pyroomacoustics`. It does not change: a fit makes another room.
+    Made by :class:`ShoeBox`, :meth:`Room.read` and :meth:`Room.from_pyroomacoustics`. It does not change: a fit makes another.
     """
 
     def __init__(self, handle: _sabine.Room):
@@ -73,8 +73,9 @@ class Room:
     def from_pyroomacoustics(room) -> Room:
         """The same room as a ``pyroomacoustics.ShoeBox``: size, absorption, scattering, air, sources and microphones.
 
-        Sources are named ``s1``, ``s2``, ..., microphones ``r1``, ``r2``, ... Absorption is brought to octaves from 125 Hz to 8 kHz,
-        each taking the value of the nearest octave; where pyroomacoustics has one value, all take it.
+        Sources are named ``s1``, ``s2``, ..., microphones ``r1``, ``r2``, ... Octaves from 125 Hz to 8 kHz take the absorption
+        of the nearest octave there, or the one value that there is. The air always absorbs here; where no humidity was stated
+        there, it is 40 %.
 
         Raises:
             ValueError: the room is no box in three dimensions.
@@ -162,9 +163,9 @@ class Room:
         settings = {
             "rays": _inputs.count(rays, "rays"),
             "seed": _inputs.count(seed, "seed"),
-            "duration_s": duration_s,
+            "duration_s": None if duration_s is None else _inputs.number(duration_s, "duration_s"),
             "image_order": _inputs.count(image_order, "image_order"),
-            "sample_rate": sample_rate,
+            "sample_rate": _inputs.number(sample_rate, "sample_rate"),
             "diffraction": diffraction,
             "allow_leaks": allow_leaks,
         }
@@ -172,14 +173,11 @@ class Room:
         return Response._of(_sabine.trace(self._handle, source, receiver, settings))
 
     def plot(self, ax=None):
-        """Draws the absorption of each surface over frequency; returns the axes (new ones by default)."""
+        """Draws the absorption of each surface over frequency, with its standard deviation; returns the axes (new ones by default)."""
         ax = _plots.new_axes(ax)
         for surface in self.surfaces.values():
-            label = f"{surface.name} ({surface.area_m2:.1f} m²)"
-            ax.errorbar(self.bands_hz, surface.absorption, surface.absorption_sd, fmt="o-", capsize=3, label=label)
-        _plots.band_axis(ax, self.bands_hz)
-        ax.set(ylabel="Absorption", ylim=(0, 1))
-        ax.legend()
+            _plots.absorption(ax, self.bands_hz, surface)
+        _plots.absorption_axes(ax, self.bands_hz)
         return ax
 
     def __repr__(self) -> str:
@@ -225,9 +223,11 @@ class ShoeBox(Room):
         humidity_percent: float = 50.0,
         pressure_kpa: float = 101.325,
     ):
+        absorption_sd = _inputs.number(absorption_sd, "absorption_sd")
         if not 1e-4 <= absorption_sd <= 1.0:
             raise ValueError(f"absorption_sd: {absorption_sd} is not between 0.0001 and 1")
-        bands_hz = [float(hz) for hz in bands_hz]
+        air = {"temperature_c": temperature_c, "humidity_percent": humidity_percent, "pressure_kpa": pressure_kpa}
+        bands_hz = _inputs.bands(bands_hz)
         named = _by_face(materials, "materials")
         absorptions, scatterings = _by_face(absorption, "absorption"), _by_face(scattering, "scattering")
 
@@ -250,7 +250,7 @@ class ShoeBox(Room):
                 bands_hz,
                 [surface(face) for face in FACES],
                 absorption_sd,
-                (temperature_c, humidity_percent, pressure_kpa),
+                [_inputs.number(value, name) for name, value in air.items()],
                 [(name, _inputs.position(at, f"source {name}")) for name, at in (sources or {}).items()],
                 [(name, _inputs.position(at, f"receiver {name}")) for name, at in (receivers or {}).items()],
             )

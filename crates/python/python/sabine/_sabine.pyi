@@ -15,7 +15,7 @@ class Room:
         bands_hz: List[float],
         surfaces: List[Tuple[List[float], List[float]]],
         absorption_sd: float,
-        air: Tuple[float, float, float],
+        air: List[float],
         sources: _NamedPlaces,
         receivers: _NamedPlaces,
     ) -> Room: ...

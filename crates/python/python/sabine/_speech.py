@@ -44,7 +44,8 @@ def estimate(speech, sample_rate: float) -> SpeechEstimate:
         ValueError: the recording is empty, too short, silent, too loud, not finite, or of another shape or type; the sample rate
             is too low.
     """
-    heard = _sabine.estimate(_inputs.samples(speech, "speech"), sample_rate)
+    samples, sample_rate = _inputs.samples(speech, "speech"), _inputs.number(sample_rate, "sample_rate")
+    heard = _sabine.estimate(samples, sample_rate)
     return SpeechEstimate(
         t60_s=Readings._of(heard["t60_bands_hz"], heard["t60_s"]),
         eq_db=Readings._of(heard["eq_bands_hz"], heard["eq_db"]),
