@@ -4,6 +4,7 @@
 #
 #   crates/python/test_wheel.sh [FOLDER]    with a folder: builds with optimisation for users, and leaves the wheel there
 set -euo pipefail
+folder=${1:+$(realpath -m "$1")}
 cd "$(dirname "$0")"
 export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/../../target}"
 most_bytes=15000000
@@ -16,6 +17,7 @@ skip() {
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 command -v python3 >/dev/null || skip "there is no python3"
+python3 -c 'import sys; sys.exit(sys.version_info < (3, 9))' || skip "python3 is older than 3.9"
 python3 -m venv "$scratch/env" 2>/dev/null || skip "python3 has no venv"
 python=$scratch/env/bin/python
 install() {
@@ -26,9 +28,9 @@ install 'maturin>=1.7,<2' 'numpy>=1.22' || skip "maturin and numpy cannot be ins
 # The profile of the tests is optimised, and quick to build after them.
 profile=dev
 wheels=$scratch/wheels
-if [ $# -gt 0 ]; then
+if [ -n "$folder" ]; then
     profile=release
-    wheels=$1
+    wheels=$folder
 fi
 "$scratch/env/bin/maturin" build --quiet --locked --strip --profile "$profile" --out "$wheels"
 
@@ -41,4 +43,4 @@ install --no-index --no-deps "$wheel"
 tests=$PWD/tests
 # From elsewhere: what is tested is what was installed.
 cd "$scratch"
-"$python" -W error "$tests/test_sabine.py"
+"$python" -I -W error "$tests/test_sabine.py"

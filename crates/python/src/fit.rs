@@ -17,7 +17,7 @@ use sabine::optimize::{
 };
 use sabine::paths::{PathSet, Propagator};
 use sabine::propagate::{PathTracer, TracerConfig};
-use sabine::scene::{Levels, Measurement, Receiver, Scene, Source, TimeZero};
+use sabine::scene::{Levels, MeasuredRoom, Measurement, Receiver, ResponseEntry, Scene, Source, TimeZero};
 
 /// Paths are looked for as long as this many times the longest reverberation time, within these limits in seconds.
 const DURATION_FACTOR: f64 = 1.25;
@@ -60,14 +60,22 @@ impl<'py> Fitted<'py> {
     }
 }
 
+/// How to trace.
+#[derive(Clone, Copy, FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Settings {
+    rays: usize,
+    seed: u64,
+    allow_leaks: bool,
+}
+
 /// A room on the bands of a fit.
 struct Prepared<'a> {
     room: &'a Room,
     scene: Scene,
     materials: Vec<Material>,
     priors: Vec<AbsorptionPrior>,
-    rays: usize,
-    allow_leaks: bool,
+    settings: Settings,
     duration_s: f64,
     observer: &'a dyn Observer,
 }
@@ -76,24 +84,15 @@ impl<'a> Prepared<'a> {
     fn new(
         room: &'a Room,
         bands: Bands,
-        rays: usize,
-        allow_leaks: bool,
+        settings: Settings,
         longest_t60_s: f64,
         observer: &'a dyn Observer,
     ) -> Result<Self, Failure> {
         let materials = room.materials(bands);
         let scene = room.scene.with_materials(materials.clone())?;
         let duration_s = (DURATION_FACTOR * longest_t60_s).clamp(DURATION_S.0, DURATION_S.1);
-        Ok(Self {
-            room,
-            scene,
-            materials,
-            priors: room.priors(bands),
-            rays,
-            allow_leaks,
-            duration_s,
-            observer,
-        })
+        let priors = room.priors(bands);
+        Ok(Self { room, scene, materials, priors, settings, duration_s, observer })
     }
 
     fn problem(&self) -> FitProblem<'_> {
@@ -108,10 +107,10 @@ impl<'a> Prepared<'a> {
         effort: f64,
     ) -> Result<PathSet, AcousticsError> {
         let tracer = PathTracer::new(TracerConfig {
-            rays: (effort * self.rays as f64).ceil() as usize,
+            rays: (effort * self.settings.rays as f64).ceil() as usize,
             duration_s: self.duration_s,
             seed,
-            allow_leaks: self.allow_leaks,
+            allow_leaks: self.settings.allow_leaks,
             ..TracerConfig::default()
         });
         let tracer = tracer.map_err(|error| AcousticsError::implementation("tracing", error))?;
@@ -119,36 +118,30 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// Fits to reverberation times between two places.
+/// Fits to reverberation times between two places; of each band its nominal centre in Hz, the time and its standard error in seconds.
 ///
 /// # Errors
 /// Places, targets or settings are refused, or the mesh leaks.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "each is an argument of Python's `fit`, which names them")]
 pub fn fit_t60<'py>(
     py: Python<'py>,
     room: &Room,
-    bands_hz: Vec<f64>,
-    t60_s: Vec<f64>,
-    t60_error_s: Vec<f64>,
-    source: Place,
-    receiver: Place,
-    rays: usize,
-    seed: u64,
-    allow_leaks: bool,
+    targets: Vec<(f64, f64, f64)>,
+    places: (Place, Place),
+    settings: Settings,
 ) -> Result<Fitted<'py>, Failure> {
-    let (source, receiver) = (source.source(&room.sources)?, receiver.receiver(&room.receivers)?);
-    let bands = bands(&bands_hz)?;
-    let targets = t60_s.iter().zip(&t60_error_s).map(|(&t60_s, &error_s)| Estimate::new(t60_s, error_s));
+    let (source, receiver) = (places.0.source(&room.sources)?, places.1.receiver(&room.receivers)?);
+    let bands = bands(&targets.iter().map(|target| target.0).collect::<Vec<_>>())?;
+    let longest_s = targets.iter().map(|target| target.1).fold(0.0, f64::max);
+    let targets = targets.iter().map(|&(_, t60_s, error_s)| Estimate::new(t60_s, error_s));
     let targets = PerBand::new(bands, targets.collect())?;
-    let longest_s = t60_s.iter().copied().fold(0.0, f64::max);
     let fitter = MaterialFitter::new(FitConfig::default())?;
     let found = interruptible(py, |observer| {
-        let prepared = Prepared::new(room, bands, rays, allow_leaks, longest_s, observer)?;
+        let prepared = Prepared::new(room, bands, settings, longest_s, observer)?;
         fitter.check_t60(&targets, bands, &room.air, prepared.duration_s)?;
         // T60 of the paths themselves: that of one response would bring the chance of its interference into the absorption.
         let trace = |seed, effort| Ok(vec![prepared.trace(&source, &receiver, seed, effort)?]);
-        let config = RetraceConfig { seed, ..RetraceConfig::default() };
+        let config = RetraceConfig { seed: settings.seed, ..RetraceConfig::default() };
         Ok(fitter.fit_t60_retracing(&trace, &prepared.problem(), &targets, &config, observer)?)
     })?;
     let notes = found.not_verified.iter().map(ToString::to_string).collect();
@@ -161,39 +154,27 @@ type Recorded<'py> = (Place, Place, Samples<'py>, f64);
 /// A measured response and the places between which it was measured.
 type Placed = (Source, Receiver, ImpulseResponse);
 
-/// Fits to measured responses: those given, or those of the room's folder.
+/// Fits to measured responses: those given, with the words of a room file for their time zero and levels, or those of the room's folder.
 ///
 /// # Errors
 /// Places, responses or settings are refused, there are none, or the mesh leaks.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "each is an argument of Python's `fit`, which names them")]
 pub fn fit_responses<'py>(
     py: Python<'py>,
     room: &Room,
     bands_hz: Vec<f64>,
     responses: Option<Vec<Recorded<'py>>>,
-    time_zero: &str,
-    levels: &str,
-    rays: usize,
-    seed: u64,
-    allow_leaks: bool,
+    meaning: (String, String),
+    settings: Settings,
 ) -> Result<Fitted<'py>, Failure> {
     let bands = bands(&bands_hz)?;
-    let (responses, measurement) = match (responses, &room.measured) {
-        (Some(recorded), _) => (placed(room, &recorded)?, measurement(time_zero, levels)?),
-        (None, Some(measured)) => {
-            let load = |(index, entry): (usize, &sabine::scene::ResponseEntry)| -> Result<Placed, Failure> {
-                let [source, receiver] = [entry.source, entry.receiver];
-                let response = measured.load_response(index)?;
-                Ok((room.sources[source].clone(), room.receivers[receiver].clone(), response))
-            };
-            let responses = measured.responses().iter().enumerate().map(load).collect::<Result<_, _>>()?;
-            (responses, measured.measurement())
-        }
-        (None, None) => (Vec::new(), measurement(time_zero, levels)?),
+    let (responses, measurement) = match (&responses, &room.measured) {
+        (Some(recorded), _) => (placed(room, recorded)?, measurement(&meaning)?),
+        (None, Some(measured)) => (py.detach(|| of_folder(measured))?, measured.measurement()),
+        (None, None) => (Vec::new(), measurement(&meaning)?),
     };
     if responses.is_empty() {
-        return Err(refused("responses: there are none, neither given nor in the room; or give t60"));
+        return Err(refused("responses: there are none, neither given nor in the room; or give t60_s"));
     }
     let fitter = MaterialFitter::new(FitConfig::default())?;
     let found = interruptible(py, |observer| {
@@ -204,10 +185,10 @@ pub fn fit_responses<'py>(
         let decays: Vec<MeasuredDecay> = responses.iter().enumerate().map(decay).collect::<Result<_, _>>()?;
         let times = decays.iter().flat_map(|decay| decay.t30_s().values()).flatten();
         let longest_s = times.map(|t30| t30.value).fold(0.0, f64::max);
-        let prepared = Prepared::new(room, bands, rays, allow_leaks, longest_s, observer)?;
+        let prepared = Prepared::new(room, bands, settings, longest_s, observer)?;
         let paths: Vec<PathSet> = responses
             .iter()
-            .map(|(source, receiver, _)| Ok(prepared.trace(source, receiver, seed, 1.0)?))
+            .map(|(source, receiver, _)| Ok(prepared.trace(source, receiver, settings.seed, 1.0)?))
             .collect::<Result<_, Failure>>()?;
         let pairs: Vec<MeasuredPair<'_>> =
             decays.iter().zip(&paths).map(|(measured, paths)| MeasuredPair { measured, paths }).collect();
@@ -218,6 +199,14 @@ pub fn fit_responses<'py>(
     Fitted::new(py, room, &found.fit, &found.fit.predicted_t60_s, notes)
 }
 
+fn of_folder(room: &MeasuredRoom) -> Result<Vec<Placed>, Failure> {
+    let one = |(index, entry): (usize, &ResponseEntry)| -> Result<Placed, Failure> {
+        let (source, receiver) = (&room.sources()[entry.source], &room.receivers()[entry.receiver]);
+        Ok((source.clone(), receiver.clone(), room.load_response(index)?))
+    };
+    room.responses().iter().enumerate().map(one).collect()
+}
+
 fn placed(room: &Room, recorded: &[Recorded]) -> Result<Vec<Placed>, Failure> {
     let one = |(source, receiver, samples, sample_rate): &Recorded| -> Result<Placed, Failure> {
         let (source, receiver) = (source.source(&room.sources)?, receiver.receiver(&room.receivers)?);
@@ -226,7 +215,7 @@ fn placed(room: &Room, recorded: &[Recorded]) -> Result<Vec<Placed>, Failure> {
     recorded.iter().map(one).collect()
 }
 
-fn measurement(time_zero: &str, levels: &str) -> Result<Measurement, Failure> {
+fn measurement((time_zero, levels): &(String, String)) -> Result<Measurement, Failure> {
     let unknown =
         |field: &str, word: &str, words: &str| refused(format!("{field}: {word:?} is none of {words}"));
     Ok(Measurement {

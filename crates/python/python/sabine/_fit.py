@@ -18,7 +18,7 @@ class Fit:
     """What :func:`fit` found.
 
     Attributes:
-        room: the room with the fitted absorption, to be traced.
+        room: the room with the fitted absorption, on the bands of the fit, to be traced.
         before: the room as it was.
         t60_s: reverberation time of the fitted room in seconds, T30 of the decay curves of its paths; after a fit to reverberation
             times of rays that the fit has not seen.
@@ -118,11 +118,15 @@ def fit(
         raise ValueError(f"room: expected a Room, found {room!r}")
     if t60_s is not None and responses is not None:
         raise ValueError("responses: give these or t60_s, not both")
-    settings = (_inputs.count(rays, "rays"), _inputs.count(seed, "seed"), allow_leaks)
+    settings = {
+        "rays": _inputs.count(rays, "rays"),
+        "seed": _inputs.count(seed, "seed"),
+        "allow_leaks": allow_leaks,
+    }
     if t60_s is None:
         if responses is not None:
             responses = [_recorded(i, response) for i, response in enumerate(responses)]
-        found = _sabine.fit_responses(room._handle, _inputs.bands(bands_hz), responses, time_zero, levels, *settings)
+        found = _sabine.fit_responses(room._handle, _inputs.bands(bands_hz), responses, (time_zero, levels), settings)
         return Fit._of(room, found)
     if isinstance(t60_s, Readings):
         known = ~np.isnan(t60_s.value)
@@ -135,7 +139,8 @@ def fit(
         _inputs.place(_or_first(source, room.sources, "source"), "source"),
         _inputs.place(_or_first(receiver, room.receivers, "receiver"), "receiver"),
     )
-    found = _sabine.fit_t60(room._handle, list(bands_hz), values.tolist(), errors.tolist(), *places, *settings)
+    targets = [(float(hz), float(t60), float(error)) for hz, t60, error in zip(bands_hz, values, errors)]
+    found = _sabine.fit_t60(room._handle, targets, places, settings)
     return Fit._of(room, found)
 
 

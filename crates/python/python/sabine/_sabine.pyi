@@ -48,24 +48,16 @@ def estimate(samples: np.ndarray, sample_rate: float) -> dict[str, Any]: ...
 def trace(room: Room, source: _Place, receiver: _Place, settings: dict[str, Any]) -> dict[str, Any]: ...
 def fit_t60(
     room: Room,
-    bands_hz: List[float],
-    t60_s: List[float],
-    t60_error_s: List[float],
-    source: _Place,
-    receiver: _Place,
-    rays: int,
-    seed: int,
-    allow_leaks: bool,
+    targets: List[Tuple[float, float, float]],
+    places: Tuple[_Place, _Place],
+    settings: dict[str, Any],
 ) -> dict[str, Any]: ...
 def fit_responses(
     room: Room,
     bands_hz: List[float],
     responses: Optional[List[Tuple[_Place, _Place, np.ndarray, float]]],
-    time_zero: str,
-    levels: str,
-    rays: int,
-    seed: int,
-    allow_leaks: bool,
+    meaning: Tuple[str, str],
+    settings: dict[str, Any],
 ) -> dict[str, Any]: ...
 def diagnose(
     room: Room,
