@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
 
 /// Each package and the packages of this workspace that it may import.
-const MAY_IMPORT: [(&str, &[&str]); 16] = [
+const MAY_IMPORT: [(&str, &[&str]); 17] = [
     ("sabine-acoustics", &[]),
     ("sabine-features", &["sabine-acoustics"]),
     ("sabine-eqfilter", &["sabine-acoustics"]),
@@ -39,18 +39,20 @@ const MAY_IMPORT: [(&str, &[&str]); 16] = [
     ("sabine-testkit", &["sabine-acoustics", "sabine-paths", "sabine-scene"]),
     ("sabine-cli", &["sabine"]),
     ("sabine-examples", &["sabine"]),
+    ("sabine-python", &["sabine"]),
     ("sabine-validation", &["sabine", "sabine-cli", "sabine-testkit"]),
     ("xtask", &[]),
 ];
 
 /// Libraries that live behind one crate alone, so that nobody else's users compile them.
-const LIVES_IN: [(&str, &str); 6] = [
+const LIVES_IN: [(&str, &str); 7] = [
     ("parry3d", "sabine-propagate"),
     ("candle-core", "sabine-estimator"),
     ("candle-nn", "sabine-estimator"),
     ("gltf", "sabine-scene"),
     ("hdf5-pure", "sabine-scene"),
     ("hound", "sabine-acoustics"),
+    ("pyo3", "sabine-python"),
 ];
 
 /// Normal dependencies of every package of the workspace: what its users compile.
