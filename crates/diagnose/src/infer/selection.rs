@@ -22,7 +22,7 @@ pub(crate) struct Selection {
     probabilities: Vec<(usize, f64)>,
     /// The last cause and those that explain as much.
     pub rivals: Vec<String>,
-    /// All effects beside the baseline.
+    /// All effects beside the baseline, and beside the causes that were given.
     pub first: Vec<EffectScore>,
     /// Causes at the end of the search, and all other effects beside them, where none of these was worth a name.
     pub last: Option<(Vec<usize>, Vec<EffectScore>)>,

@@ -134,7 +134,8 @@ pub struct Cause {
     pub other_subjects: Vec<String>,
     /// One sentence for people.
     pub explanation: String,
-    /// Posterior probability against its absence and all other effects, when it was named.
+    /// Posterior probability against its absence and all other effects, when it was named; of a cause of the model that the diagnosis started
+    /// from, against its absence alone.
     pub probability: f64,
     /// Evidence for it beside the other causes, in nats, before correction for the number tried.
     pub nats: f64,
