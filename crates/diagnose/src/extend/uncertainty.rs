@@ -84,7 +84,7 @@ impl Uncertainty {
             for (k, &value) in row.iter().enumerate() {
                 let most = (row[i] * self.covariance[k][k]).sqrt();
                 // Rounding may bring a correlation of one just above it.
-                if !(value.abs() <= most * 1.001 + f64::MIN_POSITIVE) {
+                if value.is_nan() || value.abs() > most * 1.001 + f64::MIN_POSITIVE {
                     return Err(fault(value, "at most the product of the two standard deviations"));
                 }
             }
