@@ -18,5 +18,6 @@ mod places;
 mod plan;
 mod rendering;
 mod rivals;
+mod round_trip;
 mod starting_from;
 mod wrong_tables;
