@@ -14,9 +14,10 @@ use crate::output::OutputFolder;
 use crate::page::Page;
 use crate::room::{PlaceArguments, RoomArguments};
 use clap::{Args, ValueEnum};
+use rayon::prelude::*;
 use sabine::acoustics::{
-    Air, Bands, Error as AcousticsError, Estimate, Material, PerBand, Reading, RoomParameters, SampleFormat,
-    Signal, encode_wav,
+    Air, Bands, Error as AcousticsError, Estimate, Material, NoReading, PerBand, Reading, RoomParameters,
+    SampleFormat, Signal, encode_wav,
 };
 use sabine::optimize::{
     AbsorptionPrior, DecayMisfit, FitConfig, FitProblem, MaterialFit, MaterialFitter, MeasuredDecay,
@@ -33,6 +34,9 @@ use verdict::Aim;
 
 /// Octaves of targets and materials: 125 Hz to 8 kHz.
 const OCTAVES: Bands = Bands::T60;
+/// T30 is read from so many renderings that differ in the phases of their late sound. One alone scatters: its standard deviation is some
+/// 0.55 / sqrt(B T) of it, with B the width of the octave (ISO 3382-2, 7.1), a tenth at 125 Hz and 0.25 s, and materials would follow it.
+const RENDERINGS: u64 = 8;
 /// Rate of what is rendered, in Hz.
 const RATE_HZ: u32 = 48_000;
 /// Paths are looked for as long as this many times the longest reverberation time, within these limits in seconds.
@@ -392,13 +396,28 @@ impl Retrace for Retraced<'_> {
         materials: &[Material],
     ) -> Result<Option<PerBand<Reading>>, AcousticsError> {
         let failed = |e| AcousticsError::implementation("rendering", e);
-        let seed = self.room.arguments.seed;
-        let config = RenderConfig { sample_rate_hz: RATE_HZ, seed, ..RenderConfig::default() };
-        let renderer = PressureRenderer::new(config).map_err(failed)?;
-        let response =
-            renderer.render(&paths[0], &conditions(materials, &self.room.air, self.laws)).map_err(failed)?;
-        Ok(Some(RoomParameters::measure(&response, OCTAVES)?.t30_s))
+        let between = conditions(materials, &self.room.air, self.laws);
+        let read = |rendering: u64| -> Result<PerBand<Reading>, AcousticsError> {
+            let seed = self.room.arguments.seed.wrapping_add(rendering);
+            let config = RenderConfig { sample_rate_hz: RATE_HZ, seed, ..RenderConfig::default() };
+            let response = PressureRenderer::new(config)
+                .and_then(|own| own.render(&paths[0], &between))
+                .map_err(failed)?;
+            Ok(RoomParameters::measure(&response, OCTAVES)?.t30_s)
+        };
+        let all = (0..RENDERINGS).into_par_iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        Ok(Some(PerBand::from_fn(OCTAVES, |band| mean_reading(all.iter().map(|one| &one.values()[band])))))
     }
+}
+
+/// Mean of readings of the same quantity, with the standard error of their scatter; the reason of the first that could not be read.
+fn mean_reading<'r>(readings: impl Iterator<Item = &'r Reading>) -> Reading {
+    let values = readings.map(|r| r.as_ref().map(|t| t.value).map_err(NoReading::clone));
+    let values = values.collect::<Result<Vec<f64>, _>>()?;
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    Ok(Estimate::new(mean, (variance / count).sqrt()))
 }
 
 fn values(readings: &PerBand<Reading>) -> Vec<Option<f64>> {
