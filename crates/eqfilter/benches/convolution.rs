@@ -2,7 +2,8 @@
 #![allow(missing_docs)] // criterion's macros
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use sabine_eqfilter::{PartitionedConfig, PartitionedConvolver, convolve};
+use sabine_acoustics::ImpulseResponse;
+use sabine_eqfilter::{PartitionedConfig, PartitionedConvolver, RoomReverb, RoomReverbConfig, convolve};
 use std::hint::black_box;
 
 fn noise(length: usize) -> Vec<f32> {
@@ -54,5 +55,44 @@ fn partitioned(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, offline, partitioned);
+/// One second of a callback of 64 frames at 48 kHz with responses of 3 s: the time is the load of one core. Beside it, one convolver
+/// for each pair of channels.
+fn room_reverb(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("room reverb, 3 s, block 64");
+    let response = ImpulseResponse::new(noise(144_000), 48_000).expect("finite");
+    for (inputs, outputs) in [(1, 1), (1, 2), (1, 4), (1, 9), (2, 2)] {
+        let name = format!("{inputs} in, {outputs} out");
+        let config = RoomReverbConfig { inputs, outputs, ..RoomReverbConfig::default() };
+        let responses = vec![response.clone(); inputs * outputs];
+        let mut reverb = RoomReverb::new(&responses, config).expect("valid");
+        let second = noise(48_000 * inputs);
+        let mut out = vec![0.0; 64 * outputs];
+        group.bench_function(BenchmarkId::new("shared", &name), |b| {
+            b.iter(|| {
+                for frames in black_box(&second).chunks_exact(64 * inputs) {
+                    reverb.process_interleaved(frames, &mut out).expect("whole frames");
+                    black_box(&out);
+                }
+            });
+        });
+        let separate = PartitionedConfig { block: 64, ..PartitionedConfig::default() };
+        let mut convolvers: Vec<_> = (0..inputs * outputs)
+            .map(|_| PartitionedConvolver::new(response.samples(), separate).expect("valid"))
+            .collect();
+        let mut out = vec![0.0; 64];
+        group.bench_function(BenchmarkId::new("separate", &name), |b| {
+            b.iter(|| {
+                for block in black_box(&second[..48_000]).chunks_exact(64) {
+                    for convolver in &mut convolvers {
+                        convolver.process_block(block, &mut out).expect("one block");
+                        black_box(&out);
+                    }
+                }
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, offline, partitioned, room_reverb);
 criterion_main!(benches);
