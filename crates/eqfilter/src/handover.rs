@@ -90,6 +90,11 @@ impl RoomReverbControl {
         Self { layout, sample_rate_hz, shared }
     }
 
+    /// Sample rate that responses must have, in Hz.
+    pub fn sample_rate_hz(&self) -> u32 {
+        self.sample_rate_hz
+    }
+
     /// Gain of the convolved sound, as a factor of amplitude from -1000 to 1000. It is reached in a straight line within the
     /// fade of the reverb's settings.
     ///

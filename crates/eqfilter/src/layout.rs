@@ -97,9 +97,9 @@ impl Layout {
             check_taps(response, self.config.longest_response)?;
             let (head, tail) =
                 response.split_at(response.len().min(self.head_partitions * self.config.block));
-            prepared.heads.push(self.head.partition(head, self.head_partitions));
-            if let Some((transform, partitions)) = &self.tail {
-                prepared.tails.push(transform.partition(tail, *partitions));
+            prepared.heads.push(self.head.partition(head));
+            if let Some((transform, _)) = &self.tail {
+                prepared.tails.push(transform.partition(tail));
             }
         }
         Ok(prepared)
