@@ -28,7 +28,7 @@ struct Engine {
     _track: TrackHandle,
 }
 
-/// An engine whose only sound, 0.2 s of noise, goes to the main track and, by this volume, to a room on a send track.
+/// An engine whose only sound, a second of noise, goes to the main track and, by this volume, to a room on a send track.
 fn engine(sample_rate_hz: u32, room_volume: Decibels) -> Engine {
     let settings = AudioManagerSettings {
         backend_settings: OfflineSettings { sample_rate_hz },
@@ -40,7 +40,7 @@ fn engine(sample_rate_hz: u32, room_volume: Decibels) -> Engine {
     let send = manager.add_send_track(send).unwrap();
     let mut track = manager.add_sub_track(TrackBuilder::new().with_send(&send, room_volume)).unwrap();
     let mut state = 1_u32;
-    let frames = (0..sample_rate_hz / 5)
+    let frames = (0..sample_rate_hz)
         .map(|_| {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             Frame::from_mono(0.02 * (state as f32 / u32::MAX as f32 - 0.5))
@@ -114,8 +114,15 @@ fn another_room_and_another_sample_rate_are_heard_while_it_plays() {
     }
     let too_long = ImpulseResponse::new(vec![0.1; 400_000], rate_hz).unwrap();
     assert!(engine.room.change_room([pulse(0.5), too_long]).is_err());
+
     engine.manager.backend_mut().change_sample_rate(2 * rate_hz);
-    let after = render(&mut engine, 2000);
-    assert!(after.iter().flatten().all(|s| s.is_finite()));
+    let [left, right] = render(&mut engine, 4000);
+    let different = |from: usize, left: &[f32], right: &[f32]| {
+        left[from..].iter().zip(&right[from..]).filter(|(l, r)| (*l - *r).abs() > 1e-4).count()
+    };
+    assert!(different(3000, &left, &right) > 900, "the room is heard at the new rate");
     engine.room.change_room([pulse(0.0), pulse(0.0)]).unwrap();
+    let [left, right] = render(&mut engine, 6000);
+    assert_eq!(different(5000, &left, &right), 0, "and the handle changes it");
+    assert!(left[5000..].iter().any(|s| s.abs() > 1e-3), "while the sound goes on");
 }
