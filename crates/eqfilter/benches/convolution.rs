@@ -55,19 +55,21 @@ fn partitioned(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// One second of a callback of 64 frames at 48 kHz with responses of 3 s: the time is the load of one core. Beside it, one convolver
-/// for each pair of channels.
+/// One second of a callback of 64 frames at 48 kHz: the time is the load of one core. Beside it, one convolver for each pair of
+/// channels.
 fn room_reverb(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("room reverb, 3 s, block 64");
-    let response = ImpulseResponse::new(noise(144_000), 48_000).expect("finite");
-    for (inputs, outputs) in [(1, 1), (1, 2), (1, 4), (1, 9), (2, 2)] {
-        let name = format!("{inputs} in, {outputs} out");
-        let config = RoomReverbConfig { inputs, outputs, ..RoomReverbConfig::default() };
+    for (seconds, inputs, outputs) in
+        [(3.0, 1, 1), (3.0, 1, 2), (3.0, 2, 2), (3.0, 1, 9), (0.3, 1, 2), (0.3, 1, 9)]
+    {
+        let mut group =
+            criterion.benchmark_group(format!("room reverb, {seconds} s, {inputs} in, {outputs} out"));
+        let response = ImpulseResponse::new(noise((48e3 * seconds) as usize), 48_000).expect("finite");
+        let config = RoomReverbConfig { inputs, outputs, longest_s: seconds, ..RoomReverbConfig::default() };
         let responses = vec![response.clone(); inputs * outputs];
         let mut reverb = RoomReverb::new(&responses, config).expect("valid");
         let second = noise(48_000 * inputs);
         let mut out = vec![0.0; 64 * outputs];
-        group.bench_function(BenchmarkId::new("shared", &name), |b| {
+        group.bench_function("shared transforms", |b| {
             b.iter(|| {
                 for frames in black_box(&second).chunks_exact(64 * inputs) {
                     reverb.process_interleaved(frames, &mut out).expect("whole frames");
@@ -75,12 +77,14 @@ fn room_reverb(criterion: &mut Criterion) {
                 }
             });
         });
-        let separate = PartitionedConfig { block: 64, ..PartitionedConfig::default() };
-        let mut convolvers: Vec<_> = (0..inputs * outputs)
-            .map(|_| PartitionedConvolver::new(response.samples(), separate).expect("valid"))
+        let longest_response = response.samples().len();
+        let config = PartitionedConfig { block: 64, longest_response, ..PartitionedConfig::default() };
+        let mut convolvers: Vec<_> = responses
+            .iter()
+            .map(|response| PartitionedConvolver::new(response.samples(), config).expect("valid"))
             .collect();
         let mut out = vec![0.0; 64];
-        group.bench_function(BenchmarkId::new("separate", &name), |b| {
+        group.bench_function("separate convolvers", |b| {
             b.iter(|| {
                 for block in black_box(&second[..48_000]).chunks_exact(64) {
                     for convolver in &mut convolvers {
@@ -90,8 +94,8 @@ fn room_reverb(criterion: &mut Criterion) {
                 }
             });
         });
+        group.finish();
     }
-    group.finish();
 }
 
 criterion_group!(benches, offline, partitioned, room_reverb);

@@ -265,3 +265,31 @@ fn settings_responses_and_buffers_that_do_not_fit_are_named() {
     assert!(matches!(uneven, Err(Error::Frames { side: "input", expected: 4, found: 3 })));
     reverb.process_interleaved(&[], &mut []).unwrap();
 }
+
+/// Ten minutes of callbacks of 64 frames at 48 kHz with a stereo response of 3 s, each call timed. In release mode:
+/// `cargo test --release -p sabine-eqfilter --test it ten_minutes -- --ignored --nocapture`.
+#[test]
+#[ignore = "times of single calls: for a quiet machine, in release mode"]
+fn ten_minutes_of_callbacks_take_little_of_a_core() {
+    let response = |seed| ImpulseResponse::new(noise(144_000, seed), 48_000).unwrap();
+    let mut reverb = RoomReverb::new(&[response(1), response(2)], RoomReverbConfig::default()).unwrap();
+    let (input, mut output) = (noise(64, 3), vec![0.0; 128]);
+    let mut times_s: Vec<f64> = (0..600 * 750)
+        .map(|_| {
+            let start = std::time::Instant::now();
+            reverb.process_interleaved(&input, &mut output).unwrap();
+            start.elapsed().as_secs_f64()
+        })
+        .collect();
+    let load = times_s.iter().sum::<f64>() / 600.0;
+    times_s.sort_by(f64::total_cmp);
+    let deadline_s = 64.0 / 48_000.0;
+    let missed = times_s.iter().filter(|&&t| t > deadline_s).count();
+    let [median, most, slowest] = [0.5, 0.99, 1.0].map(|q| 1e6 * times_s[(q * 449_999.0) as usize]);
+    println!(
+        "load {:.2} % of a core; calls {median:.0} us (median), {most:.0} us (all but one in 100), {slowest:.0} us (slowest)",
+        100.0 * load
+    );
+    println!("{missed} of 450,000 took longer than {:.0} us", 1e6 * deadline_s);
+    assert!(load < 0.03, "{load}");
+}

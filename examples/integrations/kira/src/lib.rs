@@ -49,7 +49,8 @@ impl EffectBuilder for RoomEffectBuilder {
 
     fn build(self) -> (Box<dyn Effect>, RoomHandle) {
         let room = Arc::new(Mutex::new(self.room));
-        let effect = RoomEffect { reverb: Some(self.reverb), room: Arc::clone(&room) };
+        let config = self.reverb.config();
+        let effect = RoomEffect { config, reverb: Some(self.reverb), room: Arc::clone(&room) };
         (Box::new(effect), RoomHandle { room })
     }
 }
@@ -81,6 +82,7 @@ impl RoomHandle {
 }
 
 struct RoomEffect {
+    config: RoomReverbConfig,
     /// None at a sample rate that the responses cannot be brought to: the effect is silent then.
     reverb: Option<RoomReverb>,
     /// Shared with the handle. [`Effect::process`] does not touch it.
@@ -94,11 +96,10 @@ impl Effect for RoomEffect {
 
     fn on_change_sample_rate(&mut self, sample_rate_hz: u32) {
         let mut room = lock(&self.room);
-        let Some(config) = self.reverb.as_ref().map(RoomReverb::config) else { return };
-        if config.sample_rate_hz != sample_rate_hz {
-            let config = RoomReverbConfig { sample_rate_hz, ..config };
+        if self.config.sample_rate_hz != sample_rate_hz {
+            self.config.sample_rate_hz = sample_rate_hz;
             let responses = at_rate(&room.responses, sample_rate_hz);
-            self.reverb = responses.and_then(|responses| RoomReverb::new(&responses, config)).ok();
+            self.reverb = responses.and_then(|responses| RoomReverb::new(&responses, self.config)).ok();
             if let Some(reverb) = &self.reverb {
                 room.control = reverb.control();
             }

@@ -115,6 +115,9 @@ fn another_room_and_another_sample_rate_are_heard_while_it_plays() {
     let too_long = ImpulseResponse::new(vec![0.1; 400_000], rate_hz).unwrap();
     assert!(engine.room.change_room([pulse(0.5), too_long]).is_err());
 
+    // A rate that no room runs at silences the room alone, until the next change.
+    engine.manager.backend_mut().change_sample_rate(999);
+    render(&mut engine, 10);
     engine.manager.backend_mut().change_sample_rate(2 * rate_hz);
     let [left, right] = render(&mut engine, 4000);
     let different = |from: usize, left: &[f32], right: &[f32]| {
