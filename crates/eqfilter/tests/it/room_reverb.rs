@@ -191,6 +191,27 @@ fn responses_that_wait_give_way_to_newer_ones() {
     }
 }
 
+/// Responses of one sample each, exchanged by a thread that does nothing else while the callback runs.
+#[test]
+fn a_busy_thread_does_not_disturb_the_callback() {
+    let gain = |gain: u16| [ImpulseResponse::new(vec![f32::from(gain)], RATE_HZ).unwrap()];
+    let mut reverb = RoomReverb::new(&gain(1), config(1, 1, 16, 10)).unwrap();
+    run(&mut reverb, &[vec![1.0; 100]], &[33]);
+    let control = reverb.control();
+    let busy = std::thread::spawn(move || (1..=2000).for_each(|g| control.exchange(&gain(g)).unwrap()));
+    let mut last = 1.0;
+    while !busy.is_finished() {
+        for y in run(&mut reverb, &[vec![1.0; 256]], &[16])[0].iter() {
+            // Later responses are louder, by 1999 at most, and a fade is a straight line of 160 samples.
+            assert!(*y > last - 1e-2 && *y < last + 1999.0 / 160.0 + 1e-2, "{y} after {last}");
+            last = *y;
+        }
+    }
+    busy.join().unwrap();
+    let end = run(&mut reverb, &[vec![1.0; 1000]], &[16]);
+    assert!((end[0][999] - 2000.0).abs() < 0.01, "the last responses are heard: {}", end[0][999]);
+}
+
 #[test]
 fn gains_move_in_a_straight_line() {
     let one = [ImpulseResponse::new(vec![1.0], RATE_HZ).unwrap()];
