@@ -3,6 +3,8 @@
 /// The code in `docs/how-to/` is compiled and run with the tests.
 #[cfg(doctest)]
 mod how_to {
+    #[doc = include_str!("../../docs/how-to/audio-engines.md")]
+    mod audio_engines {}
     #[doc = include_str!("../../docs/how-to/calibrate-a-room.md")]
     mod calibrate_a_room {}
     #[doc = include_str!("../../docs/how-to/live-use.md")]

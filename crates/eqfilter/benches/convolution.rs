@@ -2,7 +2,8 @@
 #![allow(missing_docs)] // criterion's macros
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use sabine_eqfilter::{PartitionedConfig, PartitionedConvolver, convolve};
+use sabine_acoustics::ImpulseResponse;
+use sabine_eqfilter::{PartitionedConfig, PartitionedConvolver, RoomReverb, RoomReverbConfig, convolve};
 use std::hint::black_box;
 
 fn noise(length: usize) -> Vec<f32> {
@@ -54,5 +55,48 @@ fn partitioned(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, offline, partitioned);
+/// One second of a callback of 64 frames at 48 kHz: the time is the load of one core. Beside it, one convolver for each pair of
+/// channels.
+fn room_reverb(criterion: &mut Criterion) {
+    for (seconds, inputs, outputs) in
+        [(3.0, 1, 1), (3.0, 1, 2), (3.0, 2, 2), (3.0, 1, 9), (0.3, 1, 2), (0.3, 1, 9)]
+    {
+        let mut group =
+            criterion.benchmark_group(format!("room reverb, {seconds} s, {inputs} in, {outputs} out"));
+        let response = ImpulseResponse::new(noise((48e3 * seconds) as usize), 48_000).expect("finite");
+        let config = RoomReverbConfig { inputs, outputs, longest_s: seconds, ..RoomReverbConfig::default() };
+        let responses = vec![response.clone(); inputs * outputs];
+        let mut reverb = RoomReverb::new(&responses, config).expect("valid");
+        let second = noise(48_000 * inputs);
+        let mut out = vec![0.0; 64 * outputs];
+        group.bench_function("shared transforms", |b| {
+            b.iter(|| {
+                for frames in black_box(&second).chunks_exact(64 * inputs) {
+                    reverb.process_interleaved(frames, &mut out).expect("whole frames");
+                    black_box(&out);
+                }
+            });
+        });
+        let longest_response = response.samples().len();
+        let config = PartitionedConfig { block: 64, longest_response, ..PartitionedConfig::default() };
+        let mut convolvers: Vec<_> = responses
+            .iter()
+            .map(|response| PartitionedConvolver::new(response.samples(), config).expect("valid"))
+            .collect();
+        let mut out = vec![0.0; 64];
+        group.bench_function("separate convolvers", |b| {
+            b.iter(|| {
+                for block in black_box(&second[..48_000]).chunks_exact(64) {
+                    for convolver in &mut convolvers {
+                        convolver.process_block(block, &mut out).expect("one block");
+                        black_box(&out);
+                    }
+                }
+            });
+        });
+        group.finish();
+    }
+}
+
+criterion_group!(benches, offline, partitioned, room_reverb);
 criterion_main!(benches);

@@ -60,6 +60,38 @@ pub enum Error {
         /// Index of the first such sample.
         index: usize,
     },
+    /// Another number of responses than the pairs of input and output channels.
+    Responses {
+        /// Pairs of input and output channels.
+        expected: usize,
+        /// Responses given.
+        found: usize,
+    },
+    /// A response at another sample rate than the reverb.
+    ResponseRate {
+        /// Sample rate of the reverb in Hz.
+        reverb_hz: u32,
+        /// Sample rate of the response in Hz.
+        response_hz: u32,
+    },
+    /// Another number of channels than the reverb has.
+    ChannelCount {
+        /// "input" or "output".
+        side: &'static str,
+        /// Channels of the reverb.
+        expected: usize,
+        /// Channels given.
+        found: usize,
+    },
+    /// Interleaved samples that do not make whole frames, or channels and buffers that differ in their number of frames.
+    Frames {
+        /// "input" or "output".
+        side: &'static str,
+        /// Samples that fit the first channel of the input.
+        expected: usize,
+        /// Samples given.
+        found: usize,
+    },
     /// A value of the vocabulary that cannot be built: a signal that overflowed, an unknown band.
     Acoustics(sabine_acoustics::Error),
 }
@@ -92,6 +124,24 @@ impl fmt::Display for Error {
                 write!(f, "the response has {found} samples; it must have between 1 and {most}")
             }
             Self::NotFinite { index } => write!(f, "sample {index} of the response is not finite"),
+            Self::Responses { expected, found } => {
+                write!(
+                    f,
+                    "{found} responses are given; there must be {expected}, one for each pair of input and output"
+                )
+            }
+            Self::ResponseRate { reverb_hz, response_hz } => {
+                write!(
+                    f,
+                    "the reverb runs at {reverb_hz} Hz, the response is at {response_hz} Hz; resample it first"
+                )
+            }
+            Self::ChannelCount { side, expected, found } => {
+                write!(f, "{found} {side} channels are given; the reverb has {expected}")
+            }
+            Self::Frames { side, expected, found } => {
+                write!(f, "the {side} has {found} samples; it must have {expected}")
+            }
             Self::Acoustics(error) => error.fmt(f),
         }
     }

@@ -38,7 +38,8 @@
 //! | filtering a signal | [`EqFilter::apply`] (aligned), [`EqFilter::apply_with_delay`] (whole) |
 //! | convolving two signals | [`convolve`] |
 //! | convolving a file of any length in little memory | [`BlockConvolver`] |
-//! | convolving a live stream with a room | [`PartitionedConvolver`] |
+//! | convolving a live stream with a room, block by block | [`PartitionedConvolver`] |
+//! | a reverb in an audio callback: any number of frames, several channels | [`RoomReverb`] |
 //!
 //! # Units and conventions
 //!
@@ -56,7 +57,7 @@
 //! bands is steep or shallow as the taps permit, and where neighbours differ by 30 dB it passes through zeros at the
 //! edges. A shorter delay resolves less: what it cannot meet, [`EqFilter::realised_db`] reports. Minimum phase keeps
 //! these gains within 0.1 dB. Convolution agrees with the plain sum to the rounding of single precision
-//! (`tests/it/convolution.rs`).
+//! (`tests/it/convolution.rs`, `tests/it/room_reverb.rs`).
 //!
 //! # References
 //!
@@ -73,9 +74,14 @@ mod designer;
 mod error;
 mod filter;
 mod grid;
+mod handover;
+mod layout;
+mod matrix;
 mod octave;
 mod partitioned;
 mod plans;
+mod ramp;
+mod room_reverb;
 mod solve;
 mod uniform;
 mod variants;
@@ -86,4 +92,7 @@ pub use convolve::convolve;
 pub use designer::EqDesigner;
 pub use error::Error;
 pub use filter::{EqFilter, Phase};
-pub use partitioned::{PartitionedConfig, PartitionedConvolver, PreparedResponse, ResponsePreparer};
+pub use handover::RoomReverbControl;
+pub use layout::{PartitionedConfig, PreparedResponse};
+pub use partitioned::{PartitionedConvolver, ResponsePreparer};
+pub use room_reverb::{RoomReverb, RoomReverbConfig};

@@ -19,9 +19,9 @@ impl BlockTransform {
         self.block + 1
     }
 
-    /// Spectra of a response cut into `partitions` blocks, one after the other; scaled so that the inverse needs no scale.
-    pub fn partition(&self, response: &[f32], partitions: usize) -> Vec<Complex<f32>> {
-        let mut spectra = vec![Complex::default(); partitions * self.bins()];
+    /// Spectra of a response cut into blocks, one after the other; scaled so that the inverse needs no scale.
+    pub fn partition(&self, response: &[f32]) -> Vec<Complex<f32>> {
+        let mut spectra = vec![Complex::default(); response.len().div_ceil(self.block) * self.bins()];
         let mut time = vec![0.0; 2 * self.block];
         let mut scratch = self.scratch();
         let scale = 0.5 / self.block as f32;
@@ -95,10 +95,10 @@ impl Stage {
         self.transform.forward(&mut self.time, slot, &mut self.scratch);
     }
 
-    /// Adds to `sum` the products of the partitions `from..to` of a response with the blocks that they meet.
+    /// Adds to `sum` the products of the partitions `from..to` of a response, as far as it goes, with the blocks that they meet.
     pub fn accumulate(&self, response: &[Complex<f32>], from: usize, to: usize, sum: &mut [Complex<f32>]) {
         let bins = self.transform.bins();
-        for partition in from..to {
+        for partition in from..to.min(response.len() / bins) {
             let slot = (self.newest + partition) % self.partitions;
             let x = &self.spectra[slot * bins..][..bins];
             let h = &response[partition * bins..][..bins];

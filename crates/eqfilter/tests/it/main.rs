@@ -6,3 +6,4 @@ mod convolution;
 mod cross_fade;
 mod design;
 mod filter_bank;
+mod room_reverb;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
 
 /// Each package and the packages of this workspace that it may import.
-const MAY_IMPORT: [(&str, &[&str]); 17] = [
+const MAY_IMPORT: [(&str, &[&str]); 19] = [
     ("sabine-acoustics", &[]),
     ("sabine-features", &["sabine-acoustics"]),
     ("sabine-eqfilter", &["sabine-acoustics"]),
@@ -41,18 +41,22 @@ const MAY_IMPORT: [(&str, &[&str]); 17] = [
     ("sabine-examples", &["sabine"]),
     ("sabine-python", &["sabine"]),
     ("sabine-validation", &["sabine", "sabine-cli", "sabine-testkit"]),
+    ("sabine-with-kira", &["sabine-acoustics", "sabine-eqfilter"]),
+    ("sabine-with-rodio", &["sabine-acoustics", "sabine-eqfilter"]),
     ("xtask", &[]),
 ];
 
 /// Libraries that live behind one crate alone, so that nobody else's users compile them.
-const LIVES_IN: [(&str, &str); 7] = [
+const LIVES_IN: [(&str, &str); 9] = [
     ("parry3d", "sabine-propagate"),
     ("candle-core", "sabine-estimator"),
     ("candle-nn", "sabine-estimator"),
     ("gltf", "sabine-scene"),
     ("hdf5-pure", "sabine-scene"),
     ("hound", "sabine-acoustics"),
+    ("kira", "sabine-with-kira"),
     ("pyo3", "sabine-python"),
+    ("rodio", "sabine-with-rodio"),
 ];
 
 /// Normal dependencies of every package of the workspace: what its users compile.
