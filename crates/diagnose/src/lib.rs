@@ -75,6 +75,7 @@ mod effect;
 mod effects;
 mod error;
 mod extend;
+mod found_parameter;
 #[cfg(test)]
 mod hand_made;
 mod infer;
@@ -105,6 +106,7 @@ pub use extend::law_file::read_laws;
 pub use extend::model_change::ModelChange;
 pub use extend::moved_mesh::DisplacementError;
 pub use extend::uncertainty::Uncertainty;
+pub use found_parameter::FoundParameter;
 pub use likelihood::multilateration::{UnassignedPeak, UnassignedPeaks};
 pub use observe::pre_arrival::PreArrival;
 pub use plan::config::PlanConfig;
@@ -115,8 +117,8 @@ pub use plan::measurement::PlannedMeasurement;
 pub use plan::outcome::{Chosen, Decision, EffectSize, LookAlikes, Plan, Weighing};
 pub use plan::planner::Planner;
 pub use report::diagnosis::{
-    CandidateScore, Cause, DecayCurves, Diagnosis, FitTest, FittedMaterial, FoundParameter, HeldOut,
-    HeldOutGain, Isolability, LackOfFit, ResidualCell, Verdict,
+    CandidateScore, Cause, DecayCurves, Diagnosis, FitTest, FittedMaterial, HeldOut, HeldOutGain,
+    Isolability, LackOfFit, ResidualCell, Verdict,
 };
 pub use simulate::scene_tracer::{EachScene, PreparedTracer, SceneTracer};
 pub use simulate::tables::{Tables, Unprepared};

@@ -1,7 +1,7 @@
 //! A case as the fit left it.
 
 use crate::effect::Nuisance;
-use crate::report::diagnosis::FoundParameter;
+use crate::found_parameter::FoundParameter;
 use crate::survey::Survey;
 use sabine_acoustics::Material;
 

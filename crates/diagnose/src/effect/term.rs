@@ -2,9 +2,9 @@
 
 use crate::effect::reflection_gate::ReflectionGate;
 use crate::extend::displaced_surface::DisplacedSurface;
+use crate::found_parameter::FoundParameter;
 use crate::likelihood::multilateration::UnassignedPeaks;
 use crate::observe::pre_arrival::PreArrival;
-use crate::report::diagnosis::FoundParameter;
 use crate::simulate::tables::{Tables, Unprepared};
 use crate::simulate::traced_views::TracedRoomView;
 use crate::simulate::views::{ArrivalView, BandView};

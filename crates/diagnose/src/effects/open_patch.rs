@@ -6,7 +6,7 @@ use crate::effect::reflection_gate::ReflectionGate;
 use crate::effect::{AuxiliaryEvidence, Case, DecayTerm, Effect, FittedCase, Parameter, ReflectionEvidence};
 use crate::extend::applied_changes::ThinPanel;
 use crate::extend::model_change::ModelChange;
-use crate::report::diagnosis::FoundParameter;
+use crate::found_parameter::FoundParameter;
 use crate::simulate::views::BandView;
 use crate::survey::Survey;
 use crate::survey::planes::Plane;

@@ -6,11 +6,12 @@ use crate::extend::extended_room::ExtendedRoom;
 use crate::extend::model_change::ModelChange;
 use crate::extend::model_checks::Fault;
 use crate::extend::uncertainty::Uncertainty;
-use crate::report::diagnosis::FoundParameter;
+use crate::found_parameter::FoundParameter;
 use sabine_acoustics::{Error as Cause, OutOfRange, write_atomically};
 use sabine_paths::laws::Law;
 use sabine_scene::MeasuredRoom;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::Path;
@@ -148,7 +149,7 @@ impl ExtendedModel {
             }
         }
         self.applied().check()?;
-        self.uncertainty.as_ref().map_or(Ok(()), |uncertainty| uncertainty.check(self))
+        self.uncertainty.as_ref().map_or(Ok(()), |uncertainty| uncertainty.check(&self.numbers()))
     }
 
     /// What all changes make of the room together.
@@ -231,7 +232,29 @@ impl ExtendedModel {
             ..self.clone()
         };
         let Some(uncertainty) = &self.uncertainty else { return Ok(vec![plain; count]) };
-        uncertainty.draws(&plain, count, seed).map_err(in_model)
+        let build = |numbers| plain.with_numbers(numbers).filter(|model| model.check().is_ok());
+        uncertainty.draws(&plain.numbers(), build, count, seed).map_err(in_model)
+    }
+
+    /// The 90 % interval of each number whose uncertainty the model states, by its JSON pointer.
+    pub fn intervals_90(&self) -> Vec<(&str, [f64; 2])> {
+        self.uncertainty.as_ref().map_or_else(Vec::new, |own| own.intervals_90(&self.numbers()))
+    }
+
+    /// Absorption and changes as JSON, in which a pointer finds a number.
+    fn numbers(&self) -> Value {
+        let changes = |cause: &ModelCause| json!({ "changes": cause.changes });
+        json!({ "absorption": self.absorption, "causes": self.causes.iter().map(changes).collect::<Vec<_>>() })
+    }
+
+    /// The model with other numbers in its absorption and changes.
+    fn with_numbers(&self, mut numbers: Value) -> Option<Self> {
+        let mut model = self.clone();
+        model.absorption = serde_json::from_value(numbers["absorption"].take()).ok()?;
+        for (i, cause) in model.causes.iter_mut().enumerate() {
+            cause.changes = serde_json::from_value(numbers["causes"][i]["changes"].take()).ok()?;
+        }
+        Some(model)
     }
 }
 

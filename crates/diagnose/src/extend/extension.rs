@@ -5,10 +5,11 @@ use crate::extend::extended_model::{ExtendedModel, ModelCause};
 use crate::extend::model_change::ModelChange;
 use crate::extend::number_slopes::{Input, InputKind, NumberSlopes, Origin};
 use crate::extend::uncertainty::absorption_at;
+use crate::found_parameter::{HALF_90, interval_90};
 use crate::infer::search::{Search, State};
 use crate::likelihood::arrivals;
 use crate::likelihood::parameters::assignment;
-use crate::report::found_parameters::{HALF_90, interval_90, parameters, place_of};
+use crate::report::found_parameters::{parameters, place_of};
 
 /// A reflection is confirmed by a peak within this of its instant, in seconds.
 const NEAR_S: f64 = 1.5e-4;

@@ -1,8 +1,7 @@
 //! How sure the numbers of a model are, all together.
 
-use crate::extend::extended_model::{ExtendedModel, ModelCause};
 use crate::extend::model_checks::Fault;
-use crate::report::found_parameters::HALF_90;
+use crate::found_parameter::HALF_90;
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -41,21 +40,20 @@ impl Uncertainty {
         (!numbers.is_empty()).then_some(Self { numbers, covariance })
     }
 
-    /// The 90 % interval of each number: its place, its ends.
-    pub fn intervals_90(&self, model: &ExtendedModel) -> Vec<(&str, [f64; 2])> {
-        let values = numbers_of(model);
-        let one = |(i, place): (usize, &'_ String)| {
-            let value = values.pointer(place)?.as_f64()?;
-            let half = HALF_90 * self.covariance[i][i].sqrt();
+    /// The 90 % interval of each number that a document has: its place, its ends.
+    pub(super) fn intervals_90(&self, numbers: &Value) -> Vec<(&str, [f64; 2])> {
+        let one = |(place, row): (&'_ String, &Vec<f64>)| {
+            let value = numbers.pointer(place)?.as_f64()?;
+            let half = HALF_90 * row.last()?.sqrt();
             let (low, high) = range_of(place);
-            Some((i, [(value - half).max(low), (value + half).min(high)]))
+            Some([(value - half).max(low), (value + half).min(high)])
         };
-        let found = self.numbers.iter().enumerate().filter_map(one);
-        found.map(|(i, interval)| (self.numbers[i].as_str(), interval)).collect()
+        let found = self.numbers.iter().zip(&self.covariance);
+        found.filter_map(|(place, row)| Some((place.as_str(), one((place, row))?))).collect()
     }
 
-    /// Everything that can be wrong with it in a model.
-    pub(super) fn check(&self, model: &ExtendedModel) -> Result<(), Fault> {
+    /// Everything that can be wrong with it beside a document of numbers.
+    pub(super) fn check(&self, numbers: &Value) -> Result<(), Fault> {
         let fault = |value: f64, range: &'static str| {
             let error = OutOfRange { field: "value", value, range };
             ("uncertainty.covariance".to_owned(), Cause::OutOfRange(error))
@@ -63,9 +61,8 @@ impl Uncertainty {
         if self.numbers.len() > MOST_NUMBERS {
             return Err(fault(self.numbers.len() as f64, "of at most 4000 numbers"));
         }
-        let values = numbers_of(model);
         let mut seen = BTreeSet::new();
-        let is_known = |id: &str| values.pointer(id).is_some_and(Value::is_number);
+        let is_known = |id: &str| numbers.pointer(id).is_some_and(Value::is_number);
         if let Some(id) = self.numbers.iter().find(|id| !is_known(id) || !seen.insert(*id)) {
             return Err(("uncertainty.numbers".to_owned(), Cause::UnknownId { id: id.clone() }));
         }
@@ -135,26 +132,26 @@ impl Uncertainty {
         Some(all)
     }
 
-    /// [`ExtendedModel::draws`] about a model that has no uncertainty of its own.
-    pub(super) fn draws(
+    /// So many draws about a document of numbers; what `build` makes nothing of is drawn again.
+    pub(super) fn draws<T>(
         &self,
-        about: &ExtendedModel,
+        centre: &Value,
+        build: impl Fn(Value) -> Option<T>,
         count: usize,
         seed: u64,
-    ) -> Result<Vec<ExtendedModel>, Fault> {
-        self.check(about)?;
+    ) -> Result<Vec<T>, Fault> {
+        self.check(centre)?;
         let (factor, n) = (self.factor(), self.numbers.len());
-        let centre = numbers_of(about);
         let mut random = Pcg64Mcg::seed_from_u64(seed);
         let mut draws = Vec::with_capacity(count);
         let mut refused = 0;
         while draws.len() < count {
             let normal = DVector::from_fn(n, |_, _| StandardNormal.sample(&mut random));
             let away: DVector<f64> = &factor * normal;
-            match self.moved_by(about, &centre, &away) {
-                Some(model) => {
+            match self.moved_by(centre, &away).and_then(&build) {
+                Some(drawn) => {
                     refused = 0;
-                    draws.push(model);
+                    draws.push(drawn);
                 }
                 None if refused < MOST_REFUSED => refused += 1,
                 None => {
@@ -189,8 +186,8 @@ impl Uncertainty {
         factor
     }
 
-    /// A model whose numbers lie elsewhere, if it is one.
-    fn moved_by(&self, about: &ExtendedModel, centre: &Value, away: &DVector<f64>) -> Option<ExtendedModel> {
+    /// The document with its numbers elsewhere.
+    fn moved_by(&self, centre: &Value, away: &DVector<f64>) -> Option<Value> {
         let mut numbers = centre.clone();
         for (place, away) in self.numbers.iter().zip(away.iter()) {
             let (low, high) = range_of(place);
@@ -198,9 +195,7 @@ impl Uncertainty {
             *numbers.pointer_mut(place)? = json!(value);
             widen(&mut numbers, place, value);
         }
-        let mut model = with_numbers(about, numbers)?;
-        model.uncertainty = None;
-        model.check().is_ok().then_some(model)
+        Some(numbers)
     }
 }
 
@@ -212,22 +207,6 @@ fn widen(numbers: &mut Value, place: &str, value: f64) {
             *end = json!(pick(end.as_f64().unwrap_or(value), value));
         }
     }
-}
-
-/// Absorption and changes of a model as JSON, in which a pointer finds a number.
-pub(super) fn numbers_of(model: &ExtendedModel) -> Value {
-    let changes = |cause: &ModelCause| json!({ "changes": cause.changes });
-    json!({ "absorption": model.absorption, "causes": model.causes.iter().map(changes).collect::<Vec<_>>() })
-}
-
-/// A model with other numbers in its absorption and changes.
-fn with_numbers(model: &ExtendedModel, mut numbers: Value) -> Option<ExtendedModel> {
-    let mut model = model.clone();
-    model.absorption = serde_json::from_value(numbers["absorption"].take()).ok()?;
-    for (i, cause) in model.causes.iter_mut().enumerate() {
-        cause.changes = serde_json::from_value(numbers["causes"][i]["changes"].take()).ok()?;
-    }
-    Some(model)
 }
 
 /// The cause (its place) that a number belongs to, and the rest of its pointer.

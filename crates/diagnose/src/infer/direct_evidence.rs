@@ -2,11 +2,11 @@
 
 use crate::effect::reflection_gate::ReflectionGate;
 use crate::effect::{AuxiliaryEvidence, Case, Observable, ReflectionEvidence};
+use crate::found_parameter::FoundParameter;
 use crate::infer::baseline::Baseline;
 use crate::infer::candidates::{Candidate, cases_of};
 use crate::likelihood::arrivals;
 use crate::likelihood::laplace::LaplaceFit;
-use crate::report::diagnosis::FoundParameter;
 
 /// What a fit says of the parameters of its cases.
 #[derive(Clone, Copy)]

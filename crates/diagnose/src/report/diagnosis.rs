@@ -1,6 +1,7 @@
 //! What a diagnosis says.
 
 use crate::extend::extended_model::ExtendedModel;
+use crate::found_parameter::FoundParameter;
 use sabine_acoustics::{Bands, PerBand};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -65,22 +66,6 @@ pub struct FitTest {
     pub subject: Option<String>,
     /// Probability of as much by chance, corrected for the places looked at, not for the number of tests.
     pub p_value: f64,
-}
-
-/// A parameter of a named cause.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[non_exhaustive]
-pub struct FoundParameter {
-    /// Name.
-    pub name: String,
-    /// Most probable value.
-    pub value: f64,
-    /// Ends of the 90 % interval.
-    pub low: f64,
-    /// Upper end.
-    pub high: f64,
-    /// Unit.
-    pub unit: String,
 }
 
 /// What is gained at positions that the fit has not seen.

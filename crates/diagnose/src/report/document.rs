@@ -1,6 +1,7 @@
 //! A diagnosis as a document: the keys that `docs/versioning.md` promises.
 
-use crate::report::diagnosis::{Cause, Diagnosis, FittedMaterial, FoundParameter, HeldOutGain, ResidualCell};
+use crate::found_parameter::FoundParameter;
+use crate::report::diagnosis::{Cause, Diagnosis, FittedMaterial, HeldOutGain, ResidualCell};
 use serde::ser::{Serialize, SerializeMap, SerializeStruct, Serializer};
 
 /// Pairs as a map, in their order.

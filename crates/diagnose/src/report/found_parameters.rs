@@ -1,20 +1,13 @@
 //! What was found of a cause, with its intervals.
 
 use crate::effect::{Nuisance, Observable};
+use crate::found_parameter::{FoundParameter, interval_90};
 use crate::infer::direct_evidence::merged;
 use crate::infer::search::{Search, State};
 use crate::likelihood::laplace::LaplaceFit;
-use crate::report::diagnosis::FoundParameter;
 
-/// Half the width of a 90 % interval in standard deviations.
-pub(crate) const HALF_90: f64 = 1.645;
 /// The data speak of a parameter if they leave less than this share of what was known of it beforehand.
 const TOLD_SHARE: f64 = 0.8;
-
-/// The 90 % interval of a normal distribution, no wider than its bounds.
-pub(crate) fn interval_90(value: f64, sd: f64, bounds: (f64, f64)) -> [f64; 2] {
-    [(value - HALF_90 * sd).max(bounds.0), (value + HALF_90 * sd).min(bounds.1)]
-}
 
 /// Fitted parameters of a chosen candidate, what it frees among what every fit leaves open included.
 pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -> Vec<FoundParameter> {

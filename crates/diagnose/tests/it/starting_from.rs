@@ -34,7 +34,7 @@ fn warm_model() -> ExtendedModel {
     assert_eq!(model, found.model);
     // Numbers of the model stand in the parameters' intervals, and vary by as much.
     let parameter = &model.causes[0].parameters[0];
-    let intervals = model.uncertainty.as_ref().unwrap().intervals_90(&model);
+    let intervals = model.intervals_90();
     let own = intervals.iter().find(|(place, _)| *place == "/causes/0/changes/0/temperature_c").unwrap().1;
     assert!((own[0] - parameter.low).abs() < 1e-3 && (own[1] - parameter.high).abs() < 1e-3, "{own:?}");
     model

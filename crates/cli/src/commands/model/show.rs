@@ -49,8 +49,7 @@ fn title(cause: &ModelCause) -> String {
 
 /// Absorption by octave, with half the width of the 90 % interval.
 fn absorption(text: &mut String, model: &ExtendedModel) {
-    let known: BTreeMap<&str, [f64; 2]> =
-        model.uncertainty.iter().flat_map(|uncertainty| uncertainty.intervals_90(model)).collect();
+    let known: BTreeMap<&str, [f64; 2]> = model.intervals_90().into_iter().collect();
     let _ = write!(text, "absorption{:<18}", "");
     for &hz in &model.centres_hz {
         let _ = write!(text, "{:>14}", words::hertz(hz));

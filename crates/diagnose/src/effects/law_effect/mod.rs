@@ -5,7 +5,7 @@ pub(super) mod tabulated_law;
 use crate::effect::{Case, DecayTerm, Effect, EffectInfo, FittedCase, Parameter, Stage};
 use crate::error::Error;
 use crate::extend::model_change::ModelChange;
-use crate::report::found_parameters::HALF_90;
+use crate::found_parameter::HALF_90;
 use crate::simulate::tables::{Tables, Unprepared};
 use crate::simulate::traced_views::TracedRoomView;
 use crate::simulate::views::BandView;

@@ -3,9 +3,9 @@
 
 use crate::effect::{AuxiliaryEvidence, Parameter};
 use crate::error::Error;
+use crate::found_parameter::FoundParameter;
 use crate::likelihood::laplace::{LaplaceFit, Model, Prior, Slopes, maximise};
 use crate::observe::pre_arrival::{PreArrival, PreArrivalBand};
-use crate::report::diagnosis::FoundParameter;
 use crate::statistics::log_density;
 
 /// The second and the third harmonic of an exponential sweep come earlier by the logarithms of 2 and 3.
