@@ -16,7 +16,7 @@ const STEP_S: f64 = 0.01;
 /// Lower end of the chart, in dB.
 const FLOOR_DB: f64 = -60.0;
 
-/// What is drawn and rendered: a model of a room, one of its pairs (indices), and how.
+/// What is drawn and rendered: a model of a room, one of its pairs (indices), and how. Waves are not joined to the paths.
 pub struct Drawing<'a> {
     pub model: &'a ExtendedModel,
     pub room: &'a MeasuredRoom,
@@ -72,12 +72,13 @@ impl Drawing<'_> {
         let (source, receiver) = (&extended.sources[from], &extended.receivers[to]);
         let materials: Vec<_> =
             extended.scene.materials().iter().map(|named| named.material.clone()).collect();
-        let tracer = PathTracer::new(TracerConfig {
-            diffraction: extended.diffraction,
-            cuboid_paths: extended.cuboid_paths,
-            ..self.tracer.clone()
-        })?;
-        let paths = tracer.trace(&extended.scene, source, receiver, &extended.air, &())?;
+        let paths = PathTracer::new(self.tracer.clone())?.trace(
+            &extended.scene,
+            source,
+            receiver,
+            &extended.air,
+            &(),
+        )?;
         let response = self.renderer.render(&paths, &extended.conditions(&materials, from, to))?;
         Ok(extended.finish(&source.id, &receiver.id, response, self.tracer.seed)?)
     }

@@ -47,7 +47,7 @@ pub struct Arguments {
     #[arg(long, value_name = "F.toml")]
     model: Option<PathBuf>,
     /// Render so many draws from how sure the numbers of --model are, too: what that leaves open in T30 and, in the folder, decay_band.csv
-    /// and decay_band.svg
+    /// and decay_band.svg; of paths alone, without --wave-below
     #[arg(long, value_name = "N", requires = "model", value_parser = clap::value_parser!(u32).range(5..=1000))]
     draws: Option<u32>,
     /// Formulas that change what paths carry, `[[laws]]` in TOML: response, ambisonics, plan and parameters are those under them; beside
