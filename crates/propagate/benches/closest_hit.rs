@@ -65,6 +65,15 @@ fn closest_hits(criterion: &mut Criterion) {
                 }
             });
         });
+        let merged = MeshScene::merged(&scene).unwrap();
+        group.bench_function("sabine, flat walls merged", |bencher| {
+            bencher.iter(|| {
+                for (origin, direction) in &rays {
+                    let hit = merged.closest_hit(*origin, *direction, f64::INFINITY);
+                    black_box(hit.map(|h| (h.distance, normals[h.triangle as usize])));
+                }
+            });
+        });
         group.bench_function("sabine, any hit within 2 m", |bencher| {
             bencher.iter(|| {
                 for (origin, direction) in &rays {
@@ -94,6 +103,13 @@ fn building(criterion: &mut Criterion) {
         group.bench_with_input(BenchmarkId::new("sabine", &name), &scene, |bencher, scene| {
             bencher.iter(|| MeshScene::new(scene).unwrap());
         });
+        group.bench_with_input(
+            BenchmarkId::new("sabine, flat walls merged", &name),
+            &scene,
+            |bencher, scene| {
+                bencher.iter(|| MeshScene::merged(scene).unwrap());
+            },
+        );
         group.bench_with_input(BenchmarkId::new("parry3d", &name), &scene, |bencher, scene| {
             bencher.iter(|| tri_mesh(scene));
         });

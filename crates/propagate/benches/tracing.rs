@@ -18,10 +18,15 @@ fn traces(criterion: &mut Criterion) {
         (Source::omni("S", [2.0, 3.0, 1.5]).unwrap(), Receiver::omni("R", [7.0, 4.0, 1.6]).unwrap());
     let rays = 10_000;
     group.throughput(Throughput::Elements(rays as u64));
-    for (cells, scattering) in [1, 29, 64].into_iter().flat_map(|cells| [(cells, 0.0), (cells, 0.3)]) {
+    let meshes = [(1, true), (29, false), (29, true), (64, false), (64, true)];
+    for ((cells, merge_coplanar), scattering) in
+        meshes.into_iter().flat_map(|mesh| [(mesh, 0.0), (mesh, 0.3)])
+    {
         let scene = finely_meshed(cells, 0.1, scattering);
-        let tracer = PathTracer::new(TracerConfig { rays, duration_s: 1.5, ..Default::default() }).unwrap();
-        let name = format!("{} triangles, scattering {scattering}", scene.triangles().len());
+        let config = TracerConfig { rays, duration_s: 1.5, merge_coplanar, ..Default::default() };
+        let tracer = PathTracer::new(config).unwrap();
+        let merged = if merge_coplanar { "merged" } else { "each met by itself" };
+        let name = format!("{} triangles, {merged}, scattering {scattering}", scene.triangles().len());
         for threads in [1, 2] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             group.bench_function(BenchmarkId::new(&name, format!("{threads} threads")), |bencher| {

@@ -107,8 +107,13 @@ impl Hierarchy {
     }
 
     /// The triangle nearest to a point and its distance (m), if one is nearer than `limit`; the first of several.
-    /// `distance` tells that of a triangle.
-    pub fn nearest(&self, point: [f32; 3], limit: (u32, f64), distance: impl Fn(u32) -> f64) -> (u32, f64) {
+    /// `distance` tells that of a triangle, and the number under which to report it.
+    pub fn nearest(
+        &self,
+        point: [f32; 3],
+        limit: (u32, f64),
+        distance: impl Fn(u32) -> (u32, f64),
+    ) -> (u32, f64) {
         // Rounding moves the distance of a box by about 1e-7 of the largest coordinate: boxes are wider than that unless
         // the point is far away.
         let slack = 1e-6 * point.iter().fold(0.0f32, |largest, c| largest.max(c.abs()));
@@ -130,7 +135,7 @@ impl Hierarchy {
                 }
                 Child::Pack(pack) => {
                     for triangle in self.packs[pack as usize].triangles() {
-                        let found = distance(triangle);
+                        let (triangle, found) = distance(triangle);
                         if found < least || (found == least && triangle < index) {
                             (index, least) = (triangle, found);
                         }

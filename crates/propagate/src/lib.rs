@@ -113,6 +113,7 @@ mod hierarchy;
 mod hierarchy_builder;
 mod image_sources;
 mod joining;
+mod merged_faces;
 mod mesh_edges;
 mod mesh_report;
 mod mesh_scene;

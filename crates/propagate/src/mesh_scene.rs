@@ -2,7 +2,8 @@
 
 use crate::Error;
 use crate::hierarchy::Hierarchy;
-use crate::surfaces::{Surfaces, distance_to};
+use crate::merged_faces::merged;
+use crate::surfaces::{Surface, Surfaces, distance_to};
 use crate::vector::{Vec3, along, norm, sub};
 use crate::wide_node::LocalRay;
 use sabine_paths::{RayHit, RayScene};
@@ -12,7 +13,8 @@ use std::ops::ControlFlow;
 /// The mesh of a [`Scene`], ready for rays: a bounding volume hierarchy chooses the candidates in single precision, a test
 /// in double precision decides.
 ///
-/// It answers as [`BruteForceScene`](crate::BruteForceScene) does, to the bit. Neighbouring triangles overlap by 1e-8 of
+/// It answers as [`BruteForceScene`](crate::BruteForceScene) does, to the bit unless triangles are merged
+/// ([`MeshScene::merged`]). Neighbouring triangles overlap by 1e-8 of
 /// their sides, so that no ray slips through an edge by rounding.
 ///
 /// ```
@@ -30,6 +32,9 @@ use std::ops::ControlFlow;
 /// ```
 pub struct MeshScene {
     pub(crate) surfaces: Surfaces,
+    /// What rays are tested against, if that is not every triangle of the scene.
+    merged: Option<Vec<Surface>>,
+    /// Over the merged faces, or over all triangles.
     hierarchy: Hierarchy,
     /// Triangles without area: nothing hits them, but a point can be near them.
     degenerate: Vec<u32>,
@@ -38,33 +43,78 @@ pub struct MeshScene {
 }
 
 impl MeshScene {
-    /// Builds the hierarchy.
+    /// Builds the hierarchy over all triangles.
     ///
     /// # Errors
     /// [`Error::NoSurface`] if all triangles have zero area.
     pub fn new(scene: &Scene) -> Result<Self, Error> {
+        Ok(Self::over(Surfaces::new(scene)?, None))
+    }
+
+    /// Builds the hierarchy over flat patches: connected triangles of one plane and one material are merged and cut into as few
+    /// triangles as their outline allows, so that a ray in a finely meshed box meets 12 of them.
+    ///
+    /// Rays meet the same points, but for rounding: triangles are merged where they lie in one plane to 1e-7 of the size of the
+    /// scene, and patches keep their outline to as much. What cannot be merged without loss stays as it is; a scene without
+    /// anything to merge answers as [`MeshScene::new`] does, to the bit. [`RayHit::triangle`] is the largest triangle of the
+    /// patch that is hit, whose material, plane and side are those of the triangle at that point.
+    ///
+    /// ```
+    /// # use sabine_acoustics::{Bands, Material};
+    /// # use sabine_scene::{NamedMaterial, Scene, Triangle};
+    /// # use sabine_propagate::MeshScene;
+    /// // A square about its middle: four triangles, where two suffice.
+    /// let vertices = vec![[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 2.0, 0.0], [0.0, 2.0, 0.0], [1.0, 1.0, 0.0]];
+    /// let triangles = (0..4).map(|i| Triangle { vertices: [i, (i + 1) % 4, 4], material: 0 }).collect();
+    /// let material = Material::uniform(Bands::SIMULATION, 0.1, 0.1)?;
+    /// let scene = Scene::new(vertices, triangles, vec![NamedMaterial { name: "floor".into(), material }])?;
+    /// assert_eq!(MeshScene::new(&scene)?.tested_triangles(), 4);
+    /// assert_eq!(MeshScene::merged(&scene)?.tested_triangles(), 2);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::NoSurface`] if all triangles have zero area.
+    pub fn merged(scene: &Scene) -> Result<Self, Error> {
         let surfaces = Surfaces::new(scene)?;
-        let (degenerate, solid): (Vec<u32>, Vec<u32>) = (0..surfaces.triangles.len() as u32)
-            .partition(|&i| surfaces.triangles[i as usize].is_degenerate());
+        let merged = merged(scene, &surfaces);
+        Ok(Self::over(surfaces, merged))
+    }
+
+    fn over(surfaces: Surfaces, merged: Option<Vec<Surface>>) -> Self {
         let centre_m = surfaces.centre_m;
-        let triangles: Vec<(u32, [Vec3; 3])> = solid
-            .into_iter()
-            .map(|i| {
-                let surface = &surfaces.triangles[i as usize];
-                (i, [sub(surface.corner, centre_m), surface.edge1, surface.edge2])
-            })
+        let faces = merged.as_ref().unwrap_or(&surfaces.triangles);
+        let triangles: Vec<(u32, [Vec3; 3])> = (0..)
+            .zip(faces)
+            .filter(|(_, face)| !face.is_degenerate())
+            .map(|(i, face)| (i, [sub(face.corner, centre_m), face.edge1, face.edge2]))
             .collect();
         let hierarchy = Hierarchy::new(&triangles, surfaces.size_m);
-        Ok(Self { surfaces, hierarchy, degenerate, centre_m })
+        let flat = |i: &u32| surfaces.triangles[*i as usize].is_degenerate();
+        let degenerate = (0..surfaces.triangles.len() as u32).filter(flat).collect();
+        Self { surfaces, merged, hierarchy, degenerate, centre_m }
+    }
+
+    /// Number of triangles that rays are tested against: those of the scene that have an area, or fewer if they were merged.
+    pub fn tested_triangles(&self) -> usize {
+        self.faces().iter().filter(|face| !face.is_degenerate()).count()
+    }
+
+    #[inline]
+    fn faces(&self) -> &[Surface] {
+        self.merged.as_ref().unwrap_or(&self.surfaces.triangles)
     }
 
     /// The triangle nearest to a point, and its distance in metres.
     pub(crate) fn nearest(&self, point: Vec3) -> (usize, f64) {
-        let distance = |i: u32| distance_to(&self.surfaces.triangles[i as usize], point);
-        let flat = self.degenerate.iter().map(|&i| (i, distance(i)));
+        let distance = |surface: &Surface| distance_to(surface, point);
+        let flat = self.degenerate.iter().map(|&i| (i, distance(&self.surfaces.triangles[i as usize])));
         let flat = flat.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((u32::MAX, f64::INFINITY));
-        let (triangle, distance_m) =
-            self.hierarchy.nearest(single(sub(point, self.centre_m)), flat, distance);
+        let faces = self.faces();
+        let (triangle, distance_m) = self.hierarchy.nearest(single(sub(point, self.centre_m)), flat, |i| {
+            let face = &faces[i as usize];
+            (face.triangle, distance(face))
+        });
         (triangle as usize, distance_m)
     }
 
@@ -100,12 +150,14 @@ impl RayScene for MeshScene {
     fn closest_hit(&self, origin: Vec3, direction: Vec3, max_distance: f64) -> Option<RayHit> {
         let mut nearest: Option<RayHit> = None;
         let mut limit = max_distance;
-        self.candidates(origin, direction, max_distance, |triangle| {
-            if let Some(distance) = self.surfaces.triangles[triangle as usize].intersect(origin, direction)
+        let faces = self.faces();
+        self.candidates(origin, direction, max_distance, |face| {
+            let face = &faces[face as usize];
+            if let Some(distance) = face.intersect(origin, direction)
                 && distance <= limit
-                && nearest.is_none_or(|hit| distance < hit.distance || triangle < hit.triangle)
+                && nearest.is_none_or(|hit| distance < hit.distance || face.triangle < hit.triangle)
             {
-                nearest = Some(RayHit { distance, triangle });
+                nearest = Some(RayHit { distance, triangle: face.triangle });
                 limit = distance;
             }
             ControlFlow::Continue(limit)
@@ -115,9 +167,11 @@ impl RayScene for MeshScene {
 
     fn any_hit(&self, origin: Vec3, direction: Vec3, max_distance: f64) -> bool {
         let mut hit = false;
-        self.candidates(origin, direction, max_distance, |triangle| {
-            let surface = &self.surfaces.triangles[triangle as usize];
-            hit = surface.intersect(origin, direction).is_some_and(|distance| distance <= max_distance);
+        let faces = self.faces();
+        self.candidates(origin, direction, max_distance, |face| {
+            hit = faces[face as usize]
+                .intersect(origin, direction)
+                .is_some_and(|distance| distance <= max_distance);
             if hit { ControlFlow::Break(()) } else { ControlFlow::Continue(max_distance) }
         });
         hit

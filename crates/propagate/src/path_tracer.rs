@@ -13,8 +13,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Parts of the rays between which their paths are gathered.
 const PARTS_AT_ONCE: usize = 64;
-/// Side of the patches on which rays meet, as a share of the radius of the spheres: about as blurred.
-const PATCH_SIDE: f64 = 0.7;
 
 /// Settings of [`PathTracer`].
 #[derive(Clone, Debug, PartialEq)]
@@ -43,6 +41,9 @@ pub struct TracerConfig {
     /// Adds the ways around one edge where the direct line is blocked ([`DiffractingEdges`](crate::DiffractingEdges)), so that a
     /// screen casts a shadow and not a black hole.
     pub diffraction: bool,
+    /// Rays meet flat walls of many triangles as few ([`MeshScene::merged`](crate::MeshScene::merged)): the same points, but
+    /// for rounding, in less time. Materials, areas, edges and image sources are those of the scene's own triangles.
+    pub merge_coplanar: bool,
     /// Trace a mesh through whose holes more than one ray in a thousand escapes: what escapes is lost, as through an open
     /// window.
     pub allow_leaks: bool,
@@ -59,6 +60,7 @@ impl Default for TracerConfig {
             cuboid_paths: 0,
             receiver_radius_m: 0.5,
             diffraction: false,
+            merge_coplanar: true,
             allow_leaks: false,
         }
     }
@@ -125,7 +127,7 @@ impl PathTracer {
     /// # Errors
     /// [`Error::NoSurface`] if all triangles have zero area.
     pub fn prepare(&self, scene: &Scene) -> Result<PreparedScene, Error> {
-        PreparedScene::new(scene, PATCH_SIDE * self.config.receiver_radius_m, self.config.diffraction)
+        PreparedScene::new(scene, &self.config)
     }
 
     /// As [`Propagator::trace`], in a scene that was prepared with the same settings but for rays, duration and seed. Holes are

@@ -5,9 +5,12 @@ use crate::edge_diffraction::DiffractingEdges;
 use crate::event_mixture::EventProbabilities;
 use crate::mesh_scene::MeshScene;
 use crate::patches::Patches;
-use crate::{Error, MeshReport};
+use crate::{Error, MeshReport, TracerConfig};
 use sabine_scene::{NamedMaterial, Scene};
 use std::fmt;
+
+/// Side of the patches on which rays meet, as a share of the radius of the spheres: about as blurred.
+const PATCH_SIDE: f64 = 0.7;
 
 /// What a tracer needs to know of a scene, whatever the places of source and receiver: made once by
 /// [`PathTracer::prepare`](crate::PathTracer::prepare), used by
@@ -28,8 +31,9 @@ pub struct PreparedScene {
 }
 
 impl PreparedScene {
-    pub(crate) fn new(scene: &Scene, patch_side_m: f64, diffraction: bool) -> Result<Self, Error> {
-        let mesh = MeshScene::new(scene)?;
+    pub(crate) fn new(scene: &Scene, config: &TracerConfig) -> Result<Self, Error> {
+        let mesh = if config.merge_coplanar { MeshScene::merged(scene)? } else { MeshScene::new(scene)? };
+        let patch_side_m = PATCH_SIDE * config.receiver_radius_m;
         let probabilities = EventProbabilities::new(scene.materials().iter().map(|m| &m.material));
         let (mut surface_m2, mut scattering_m2) = (0.0, 0.0);
         for surface in &mesh.surfaces.triangles {
@@ -38,7 +42,7 @@ impl PreparedScene {
         }
         Ok(Self {
             patches: Patches::new(&mesh.surfaces, patch_side_m),
-            edges: diffraction.then(|| DiffractingEdges::find(scene, &mesh)),
+            edges: config.diffraction.then(|| DiffractingEdges::find(scene, &mesh)),
             cuboid: Cuboid::find(&mesh.surfaces),
             probabilities,
             materials: scene.materials().len(),

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::vector::{Vec3, cross, dot, norm, scale, sub};
-use sabine_scene::Scene;
+use sabine_scene::{Scene, Triangle};
 use std::collections::HashMap;
 
 /// Triangles smaller than this have no usable normal (m2).
@@ -31,11 +31,23 @@ pub(crate) struct Surface {
     pub material: u32,
     /// Index of the plane that it shares with its coplanar neighbours.
     pub plane: u32,
+    /// Index of the scene's triangle that a hit reports: this one, or the largest of those that were merged into this one.
+    pub triangle: u32,
     /// [`AGREEMENT`] in metres.
     pub agreement_m: f64,
 }
 
 impl Surface {
+    /// The triangle between three points, as yet without plane, number and scene.
+    pub fn new([a, b, c]: [Vec3; 3], material: u32) -> Self {
+        let (edge1, edge2) = (sub(b, a), sub(c, a));
+        let normal = cross(edge1, edge2);
+        let length = norm(normal);
+        let area_m2 = 0.5 * length;
+        let normal = if area_m2 < LEAST_AREA_M2 { [0.0; 3] } else { scale(normal, 1.0 / length) };
+        Self { corner: a, edge1, edge2, normal, area_m2, material, plane: 0, triangle: 0, agreement_m: 0.0 }
+    }
+
     pub fn is_degenerate(&self) -> bool {
         self.area_m2 < LEAST_AREA_M2
     }
@@ -104,18 +116,11 @@ pub(crate) struct Surfaces {
 
 impl Surfaces {
     pub fn new(scene: &Scene) -> Result<Self, Error> {
-        let mut triangles: Vec<Surface> = (0..scene.triangles().len())
-            .map(|i| {
-                let [a, b, c] = scene.corners_m(i);
-                let (edge1, edge2) = (sub(b, a), sub(c, a));
-                let normal = cross(edge1, edge2);
-                let length = norm(normal);
-                let area_m2 = 0.5 * length;
-                let normal = if area_m2 < LEAST_AREA_M2 { [0.0; 3] } else { scale(normal, 1.0 / length) };
-                let material = scene.triangles()[i].material;
-                Surface { corner: a, edge1, edge2, normal, area_m2, material, plane: 0, agreement_m: 0.0 }
-            })
-            .collect();
+        let surface = |(i, triangle): (usize, &Triangle)| Surface {
+            triangle: i as u32,
+            ..Surface::new(scene.corners_m(i), triangle.material)
+        };
+        let mut triangles: Vec<Surface> = scene.triangles().iter().enumerate().map(surface).collect();
         if triangles.iter().all(Surface::is_degenerate) {
             return Err(Error::NoSurface { triangles: triangles.len() });
         }
