@@ -74,6 +74,7 @@
 //! | same seed, other number of threads | the same paths and samples, bit for bit | `tests/it/agreement.rs` |
 //! | diffraction by one edge, 63 Hz to 8 kHz | 0.05 dB from Macdonald's half plane, 0.02 dB from the uniform theory at a right angle | `tests/it/diffraction.rs` |
 //! | edges and corners | no ray lost | `walk.rs` |
+//! | flat walls merged before rays meet them | the same points to 1e-10 m (1e-6 m where coordinates are rounded to single precision), materials and planes; no ray lost | `tests/it/merging.rs` |
 //! | waves: frequencies of a rigid box up to 200 Hz | within 0.3 % | `tests/it/waves.rs` |
 //! | waves: decay of modes | within 1 % of theory | `tests/it/waves.rs` |
 //! | waves: narrow-band spectrum of a box, 20 to 300 Hz | 1.0 to 1.7 dB rms from the exact sum of its modes | `tests/it/waves.rs` |
