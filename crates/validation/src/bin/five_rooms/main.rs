@@ -82,8 +82,8 @@ fn compare(arguments: &Arguments, scratch: &std::path::Path) -> Result<(Vec<Room
     let speech = Speech::read(&arguments.data)?;
     let (all, test) = speech.speakers;
     println!(
-        "{all} speakers were dealt out, the {test} utterances of the test are used; the noise of {SNR_DB} dB was dealt to: {}",
-        speech.noise_partition
+        "{all} speakers were dealt out, {test} of them to the test; {} utterances make the recordings, another one is the dry voice; noise at {SNR_DB} dB, dealt to: {}",
+        speech.utterance_count, speech.noise_partition
     );
     let mut page = Page::new("Real rooms, heard and rendered");
     page.paragraph("Of each room the first response. All sounds have the same peak.");

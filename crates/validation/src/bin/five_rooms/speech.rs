@@ -29,6 +29,8 @@ pub struct Speech {
     noise: Signal,
     /// How many speakers were dealt out in all, and to the test.
     pub speakers: (usize, usize),
+    /// How many utterances the recordings are made of.
+    pub utterance_count: usize,
     /// Part of the training data set that the noise was dealt to.
     pub noise_partition: Partition,
     /// A voice without reverberation, for the examples.
@@ -66,13 +68,15 @@ impl Speech {
                 }
             }
         }
+        let test = dealt.speaker_partitions().values().filter(|part| **part == Partition::Test).count();
         let dry = utterances.pop().ok_or(Error::Nothing { what: "speech for the test".into() })?;
         let kept = dry.samples().len().min((DRY_S * f64::from(RATE_HZ)) as usize);
         let dry = resample(&Signal::new(dry.samples()[..kept].to_vec(), RATE_HZ)?, 48_000)?;
         let noise_partition =
             *dealt.noise_partitions().get(NOISE).ok_or(Error::Nothing { what: NOISE.into() })?;
         Ok(Self {
-            speakers: (dealt.speaker_partitions().len(), utterances.len() + 1),
+            speakers: (dealt.speaker_partitions().len(), test),
+            utterance_count: utterances.len(),
             utterances,
             noise: resample(&read_audio(noise.join(NOISE), Channel::Index(0))?, RATE_HZ)?,
             noise_partition,
