@@ -26,6 +26,19 @@ impl Estimate {
     pub fn interval(&self, quantile: f64) -> (f64, f64) {
         (self.value - quantile * self.standard_error, self.value + quantile * self.standard_error)
     }
+
+    /// Central interval at a normal quantile of a positive quantity whose logarithm is normally distributed, as a reverberation time heard
+    /// in speech: the standard error is that of the logarithm times the value, and the interval lies further above the value than below.
+    ///
+    /// ```
+    /// use sabine_acoustics::Estimate;
+    /// let (low, high) = Estimate::new(1.0, 0.5).log_normal_interval(1.645);
+    /// assert!((low - 0.439).abs() < 1e-3 && (high - 2.276).abs() < 1e-3);
+    /// ```
+    pub fn log_normal_interval(&self, quantile: f64) -> (f64, f64) {
+        let factor = (quantile * self.standard_error / self.value).exp();
+        (self.value / factor, self.value * factor)
+    }
 }
 
 /// Rounded down, so that what is just too little is not printed as enough.

@@ -171,6 +171,11 @@ impl DatasetBuilder {
         &self.plan.speakers
     }
 
+    /// Partition of each noise track.
+    pub fn noise_partitions(&self) -> &BTreeMap<String, Partition> {
+        &self.plan.noise
+    }
+
     /// Shards of the whole set: file name, partition, index of the first clip within it, number of clips.
     fn shards(&self) -> Vec<(String, Partition, usize, usize)> {
         let size = self.config.shard_clips;

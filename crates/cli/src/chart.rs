@@ -59,8 +59,8 @@ pub struct Series {
     pub name: String,
     /// Points in data units; NaN breaks the line.
     pub points: Vec<(f64, f64)>,
-    /// Half-width of an interval about each point, or nothing.
-    pub half_widths: Vec<f64>,
+    /// How far an interval about each point reaches below and above it, or nothing.
+    pub half_widths: Vec<(f64, f64)>,
     /// How it is drawn.
     pub look: Look,
     /// Which of the six colours.
@@ -162,10 +162,10 @@ impl Chart {
         let (mut low, mut high) = (0.0f64, 0.0f64);
         for series in &self.series {
             for (i, &(_, y)) in series.points.iter().enumerate() {
-                let half = series.half_widths.get(i).copied().unwrap_or(0.0);
-                if (y + half).is_finite() {
-                    low = low.min(y - half);
-                    high = high.max(y + half);
+                let (below, above) = series.half_widths.get(i).copied().unwrap_or_default();
+                if (y - below).is_finite() && (y + above).is_finite() {
+                    low = low.min(y - below);
+                    high = high.max(y + above);
                 }
             }
         }
@@ -271,8 +271,9 @@ impl Chart {
                 }
                 let x = self.position(x);
                 chart.draw_series([Circle::new((x, y.clamp(y0, y1)), 4, colour.filled())])?;
-                if let Some(&half) = series.half_widths.get(i).filter(|h| h.is_finite() && **h > 0.0) {
-                    let ends = [(y - half).clamp(y0, y1), (y + half).clamp(y0, y1)];
+                let drawn = |h: &&(f64, f64)| (h.0 + h.1).is_finite() && h.0 + h.1 > 0.0;
+                if let Some(&(below, above)) = series.half_widths.get(i).filter(drawn) {
+                    let ends = [(y - below).clamp(y0, y1), (y + above).clamp(y0, y1)];
                     chart.draw_series([PathElement::new(
                         ends.map(|e| (x, e)).to_vec(),
                         colour.stroke_width(1),

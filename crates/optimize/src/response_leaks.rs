@@ -6,7 +6,7 @@
 
 use crate::expansion::Bins;
 use crate::fit::Unconverged;
-use crate::response_band::{BandResponse, ResponseBand};
+use crate::response_band::{BandResponse, ResponseBand, Window};
 use crate::response_expansion::exact_energies;
 use crate::response_solver::{Solved, solve, solve_where_explained};
 use crate::{Error, FitConfig};
@@ -23,6 +23,9 @@ const DECIDING: usize = 4;
 /// Least and greatest step towards new leaks, 1 being the whole way.
 const LEAST_STEP: f64 = 0.3;
 const GREATEST_STEP: f64 = 8.0;
+/// A gain by which a band's paths have more than this many times the energy that was measured in it is that of paths which do not explain it:
+/// it is a mean of ratios, and late bins without energy make it as large as they like.
+const MOST_OVER_MEASURED: f64 = 4.0;
 /// Change of any material in the last fit, in standard deviations of its prior, that is accepted where leaks have not converged.
 const TOLERANCE: f64 = 0.01;
 
@@ -94,11 +97,27 @@ struct Energies {
 impl Energies {
     fn of(response: &BandResponse<'_>, absorption: &[f64], gains_db: &[(usize, f64)]) -> Self {
         let gain_db = gains_db.iter().find(|(index, _)| *index == response.index);
-        Self {
+        let mut energies = Self {
             sampled: Bins::of(&response.traces, absorption).energy,
             exact: exact_energies(response, absorption).iter().map(|(energy, _)| *energy).collect(),
-            gain: gain_db.map(|(_, db)| 10f64.powf(db / 10.0)),
-        }
+            gain: None,
+        };
+        let fitted = &response.windows[..response.fitted];
+        let measured: f64 = fitted.iter().map(|window| window.energy).sum();
+        let expected: f64 = fitted.iter().map(|window| energies.within(window)).sum();
+        // What is not in a band does not leak out of it.
+        energies.gain = gain_db.map(|(_, db)| {
+            let (gain, by_energy) = (10f64.powf(db / 10.0), measured / expected);
+            if gain > MOST_OVER_MEASURED * by_energy { by_energy } else { gain }
+        });
+        energies
+    }
+
+    /// What falls into a bin.
+    fn within(&self, window: &Window) -> f64 {
+        let sampled = self.sampled[window.from..].iter().zip(&window.shares);
+        let exact = window.exact.iter().map(|a| a.share * self.exact[a.place]);
+        sampled.map(|(e, share)| e * share).sum::<f64>() + exact.sum::<f64>()
     }
 }
 
@@ -131,12 +150,7 @@ fn set_leaks(
                 })
                 .collect();
             for window in &response.windows {
-                let of = |energies: &Energies| -> f64 {
-                    let sampled = energies.sampled[window.from..].iter().zip(&window.shares);
-                    let exact = window.exact.iter().map(|a| a.share * energies.exact[a.place]);
-                    sampled.map(|(e, share)| e * share).sum::<f64>() + exact.sum::<f64>()
-                };
-                found.push(neighbours.iter().map(|(share, energies)| share * of(energies)).sum());
+                found.push(neighbours.iter().map(|(share, energies)| share * energies.within(window)).sum());
             }
         }
         let windows = band.responses.iter_mut().flat_map(|response| &mut response.windows);

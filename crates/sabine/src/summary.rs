@@ -5,6 +5,9 @@ use sabine_acoustics::{Estimate, PerBand};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
+/// Quantile of a normal distribution that leaves 5 % on either side.
+const NORMAL_90: f64 = 1.645;
+
 /// The numbers of a [`RoomMatch`]; its JSON is what the example `match_room` writes as `match.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MatchSummary {
@@ -14,6 +17,10 @@ pub struct MatchSummary {
     pub t60_target_s: Vec<f64>,
     /// Their standard errors, in seconds.
     pub t60_target_sd_s: Vec<f64>,
+    /// Lower ends of their 90 % intervals, in seconds: log-normal, for a reverberation time is known to a factor.
+    pub t60_target_low_s: Vec<f64>,
+    /// Upper ends of their 90 % intervals, in seconds.
+    pub t60_target_high_s: Vec<f64>,
     /// T30 of the rendered response, in seconds; `None` where it cannot be read (a warning says why).
     pub t60_reached_s: Vec<Option<f64>>,
     /// Targets that no absorption reaches.
@@ -90,6 +97,8 @@ impl MatchSummary {
             bands_hz: t60.bands().iter_hz().collect(),
             t60_target_s: t60.values().iter().map(|t| t.value).collect(),
             t60_target_sd_s: t60.values().iter().map(|t| t.standard_error).collect(),
+            t60_target_low_s: t60.values().iter().map(|t| t.log_normal_interval(NORMAL_90).0).collect(),
+            t60_target_high_s: t60.values().iter().map(|t| t.log_normal_interval(NORMAL_90).1).collect(),
             t60_reached_s: matched
                 .t60_reached_s
                 .values()

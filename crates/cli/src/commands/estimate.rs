@@ -28,12 +28,18 @@ pub struct Arguments {
     weights: Option<PathBuf>,
 }
 
+/// Quantile of a normal distribution that leaves 5 % on either side.
+const NORMAL_90: f64 = 1.645;
+
 /// One recording in the JSON file; octaves rise from 125 Hz (T60) and from 62.5 Hz (EQ, without 1 kHz).
 #[derive(Serialize)]
 struct Entry {
     file: PathBuf,
     t60_s: Vec<f64>,
     t60_sd_s: Vec<f64>,
+    /// Ends of the 90 % intervals, log-normal.
+    t60_low_s: Vec<f64>,
+    t60_high_s: Vec<f64>,
     eq_db: Vec<f64>,
     eq_sd_db: Vec<f64>,
     warnings: Vec<String>,
@@ -75,6 +81,8 @@ fn entry(file: PathBuf, estimate: &DetailedEstimate) -> Entry {
         file,
         t60_s: t60.values().iter().map(|e| e.value).collect(),
         t60_sd_s: t60.values().iter().map(|e| e.standard_error).collect(),
+        t60_low_s: t60.values().iter().map(|e| e.log_normal_interval(NORMAL_90).0).collect(),
+        t60_high_s: t60.values().iter().map(|e| e.log_normal_interval(NORMAL_90).1).collect(),
         eq_db: levels().map(|(_, e)| e.value).collect(),
         eq_sd_db: levels().map(|(_, e)| e.standard_error).collect(),
         warnings: estimate.warnings.iter().map(ToString::to_string).collect(),
@@ -85,10 +93,11 @@ fn print(entry: &Entry) {
     println!("{}", entry.file.display());
     for label in 0..T60_COUNT {
         println!(
-            "  {:>6} Hz  T60 {:.2} s, standard error {:.2}",
+            "  {:>6} Hz  T60 {:.2} s, 90 % within {:.2} to {:.2} s",
             label_hz(label),
             entry.t60_s[label],
-            entry.t60_sd_s[label]
+            entry.t60_low_s[label],
+            entry.t60_high_s[label]
         );
     }
     for label in T60_COUNT..LABEL_COUNT {

@@ -63,6 +63,12 @@ fn the_fixture_is_matched_within_ten_percent_of_every_target() {
     for key in ["t60_target_s", "t60_target_sd_s", "t60_reached_s"] {
         assert_eq!(numbers(key).len(), 7, "{key}");
     }
+    let ends = numbers("t60_target_low_s").into_iter().zip(numbers("t60_target_high_s"));
+    for (target, (low, high)) in numbers("t60_target_s").into_iter().zip(ends) {
+        let (target, low, high) = (target.unwrap(), low.unwrap(), high.unwrap());
+        assert!(low > 0.0 && low < target && target < high, "{low} {target} {high}");
+        assert!((low * high / (target * target) - 1.0).abs() < 1e-9, "an interval of the logarithm");
+    }
     for key in ["eq_db", "eq_sd_db"] {
         assert!(numbers(key).iter().all(Option::is_some), "{key}");
         assert_eq!(numbers(key).len(), 6, "{key}");

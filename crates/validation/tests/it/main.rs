@@ -2,5 +2,6 @@
 
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
+mod five_rooms;
 #[cfg(target_os = "linux")] // memory is read from /proc
 mod soak;

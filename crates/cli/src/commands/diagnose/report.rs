@@ -385,7 +385,7 @@ fn materials(page: &mut Page, findings: &Findings) -> Result<()> {
 fn absorption_chart(bands_hz: &[f64], material: &FittedMaterial, top: f64) -> Chart {
     let pairs = |values: &[f64]| bands_hz.iter().copied().zip(values.iter().copied()).collect();
     let mut after = Series::new("after", Look::Dots, 1, pairs(&material.absorption));
-    after.half_widths = material.absorption_sd.iter().map(|sd| NORMAL_90 * sd).collect();
+    after.half_widths = material.absorption_sd.iter().map(|sd| [NORMAL_90 * sd; 2].into()).collect();
     Chart {
         x_label: String::new(),
         y_label: String::new(),

@@ -203,7 +203,9 @@ fn in_room_before(input: &MatchInput<'_>, matched: &RoomMatch) -> Result<Signal>
 fn t60_chart(matched: &RoomMatch, summary: &MatchSummary) -> Chart {
     let bands = &summary.bands_hz;
     let mut heard = Series::new("heard (90 %)", Look::Dots, 0, pairs(bands, &summary.t60_target_s));
-    heard.half_widths = summary.t60_target_sd_s.iter().map(|sd| NORMAL_90 * sd).collect();
+    let ends = summary.t60_target_low_s.iter().zip(&summary.t60_target_high_s);
+    heard.half_widths =
+        summary.t60_target_s.iter().zip(ends).map(|(t, (low, high))| (t - low, high - t)).collect();
     let reached: Vec<f64> = summary.t60_reached_s.iter().map(|t| t.unwrap_or(f64::NAN)).collect();
     let limit: Vec<f64> = bands.iter().map(|&hz| matched.air.t60_limit_s(hz)).collect();
     let mut series = vec![heard, Series::new("reached", Look::Dots, 1, pairs(bands, &reached))];
@@ -211,7 +213,7 @@ fn t60_chart(matched: &RoomMatch, summary: &MatchSummary) -> Chart {
         * series
             .iter()
             .flat_map(|s| {
-                s.points.iter().enumerate().map(|(i, p)| p.1 + s.half_widths.get(i).copied().unwrap_or(0.0))
+                s.points.iter().enumerate().map(|(i, p)| p.1 + s.half_widths.get(i).map_or(0.0, |h| h.1))
             })
             .filter(|y| y.is_finite())
             .fold(0.1, f64::max);
@@ -238,7 +240,7 @@ fn eq_chart(matched: &RoomMatch) -> Chart {
         matched.targets.eq_db().iter().map(|(hz, e)| (hz, e.value)).collect(),
     );
     heard.half_widths =
-        matched.targets.eq_db().values().iter().map(|e| NORMAL_90 * e.standard_error).collect();
+        matched.targets.eq_db().values().iter().map(|e| [NORMAL_90 * e.standard_error; 2].into()).collect();
     let simulated = Series::new(
         "simulation",
         Look::Dots,
@@ -315,7 +317,8 @@ fn t60_table(summary: &MatchSummary) -> Vec<Vec<String>> {
     vec![
         head("Reverberation time (s)", &summary.bands_hz),
         named("heard", summary.t60_target_s.iter().map(number)),
-        named("standard error", summary.t60_target_sd_s.iter().map(number)),
+        named("90 %, from", summary.t60_target_low_s.iter().map(number)),
+        named("90 %, to", summary.t60_target_high_s.iter().map(number)),
         named(
             "reached (T30)",
             summary.t60_reached_s.iter().map(|t| t.map_or("-".into(), |t| format!("{t:.2}"))),

@@ -68,7 +68,7 @@ fn chart(bands_hz: &[f64], row: &Row) -> Chart {
     let series = |name: &str, colour, values: &[Option<f64>], errors: &[Option<f64>]| {
         let points = bands_hz.iter().zip(values).map(|(&hz, v)| (hz, v.unwrap_or(f64::NAN))).collect();
         let mut series = Series::new(name, Look::Dots, colour, points);
-        series.half_widths = errors.iter().map(|e| NORMAL_90 * e.unwrap_or(0.0)).collect();
+        series.half_widths = errors.iter().map(|e| [NORMAL_90 * e.unwrap_or(0.0); 2].into()).collect();
         series
     };
     Chart {
