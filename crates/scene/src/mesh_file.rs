@@ -93,27 +93,23 @@ impl Mesh {
     pub fn read_with(path: impl AsRef<Path>, options: &MeshOptions) -> Result<Self, Error> {
         let path = path.as_ref();
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
-        let mut draft = MeshDraft::new(path, placement(options, &ending));
-        #[cfg(feature = "gltf")]
-        let folder = match (&options.folder, options.allow_outside) {
-            (_, true) => None,
-            (Some(folder), false) => Some(folder.as_path()),
-            (None, false) => Some(path.parent().unwrap_or(Path::new(""))),
-        };
         match ending.to_str() {
-            Some("obj") => {
-                let bytes = read_at_most(path, u64::MAX)?;
-                return Self::obj_of_bytes(path, &bytes, options);
-            }
+            Some("obj") => Self::obj_of_bytes(path, &read_at_most(path, u64::MAX)?, options),
             #[cfg(feature = "gltf")]
             Some("gltf" | "glb") => {
+                let folder = match (&options.folder, options.allow_outside) {
+                    (_, true) => None,
+                    (Some(folder), false) => Some(folder.as_path()),
+                    (None, false) => Some(path.parent().unwrap_or(Path::new(""))),
+                };
+                let mut draft = MeshDraft::new(path, placement(options, &ending));
                 gltf::parse_gltf(path, &read_at_most(path, u64::MAX)?, folder, &mut draft)?;
+                Ok(draft.mesh)
             }
             #[cfg(not(feature = "gltf"))]
-            Some("gltf" | "glb") => return Err(Error::GltfFeature { path: path.to_owned() }),
-            _ => return Err(Error::UnknownMeshFormat { path: path.to_owned() }),
+            Some("gltf" | "glb") => Err(Error::GltfFeature { path: path.to_owned() }),
+            _ => Err(Error::UnknownMeshFormat { path: path.to_owned() }),
         }
-        Ok(draft.mesh)
     }
 
     /// As [`Mesh::read_with`], from the bytes of an OBJ file; `name` stands in messages.
