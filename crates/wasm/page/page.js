@@ -360,6 +360,7 @@ function takeMesh(file) {
       await showSurfaces();
     } catch (error) {
       meshText = before;
+      at("obj").value = "";
       throw error;
     }
     at("no-obj").hidden = false;

@@ -47,6 +47,12 @@ pub enum Error {
         /// The limit in seconds.
         limit_s: f64,
     },
+    /// A sound of zeros.
+    #[error("{name}: all samples are zero")]
+    Silent {
+        /// The file.
+        name: String,
+    },
     /// A sound that is no response.
     #[error("{name}: {source}")]
     NotAResponse {

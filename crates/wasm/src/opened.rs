@@ -38,7 +38,7 @@ impl Opened {
     /// Of several channels the first is taken, which a note says.
     ///
     /// # Errors
-    /// [`Error::EmptyFile`], [`Error::TooManyBytes`], [`Error::TooLong`]; what [`AudioReader::of_bytes`],
+    /// [`Error::EmptyFile`], [`Error::TooManyBytes`], [`Error::TooLong`], [`Error::Silent`]; what [`AudioReader::of_bytes`],
     /// [`Measurements::single_of_bytes`], [`Measurements::sofa_of_bytes`] and [`check_one_onset`] say.
     pub fn read(name: &str, bytes: Vec<u8>) -> Result<Self, Error> {
         if bytes.is_empty() {
@@ -65,6 +65,9 @@ impl Opened {
         let reader = AudioReader::of_bytes(name, bytes, Channel::Index(0))?;
         let (channels, rate_hz) = (reader.channels(), reader.sample_rate_hz());
         let samples = short(name, reader)?;
+        if samples.iter().all(|&sample| sample == 0.0) {
+            return Err(Error::Silent { name: name.to_owned() });
+        }
         check_one_onset(&samples, rate_hz)
             .map_err(|source| Error::NotAResponse { name: name.to_owned(), source })?;
         let samples = ImpulseResponse::new(samples, rate_hz)?;
@@ -98,7 +101,9 @@ impl Opened {
             let places_m = source.zip(receiver).map(<[_; 2]>::from);
             responses.push(OpenedResponse { name: found.name, samples: found.samples, places_m });
         }
-        Ok(Self { responses, notes: set.notes, shoebox_m: set.shoebox_m })
+        // The page has fields where the command has options.
+        let notes = set.notes.iter().map(|note| note.replace(" (--time-zero, --levels)", "")).collect();
+        Ok(Self { responses, notes, shoebox_m: set.shoebox_m })
     }
 
     /// The responses.
