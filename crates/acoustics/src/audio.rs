@@ -1,5 +1,6 @@
 //! Reading and writing sound.
 
+mod byte_source;
 mod encode;
 pub(crate) mod kind;
 mod mix;
@@ -66,14 +67,5 @@ pub struct AudioInfo {
 /// [`Error::Index`] for a channel that is not there, or [`Error::OutOfRange`] for the sample rate or a sample more than 200 dB
 /// beyond full scale.
 pub fn read_audio(path: impl AsRef<Path>, channel: Channel) -> Result<Signal, Error> {
-    let path = path.as_ref();
-    let mut reader = AudioReader::open(path, channel)?;
-    let sample_rate_hz = reader.sample_rate_hz();
-    // The header of a WAV file was held against the length of the file; others grow with what is decoded.
-    let known = reader.frames().filter(|_| reader.is_whole()).unwrap_or(0);
-    let (mut samples, mut block) = (Vec::with_capacity(known as usize), Vec::new());
-    while reader.read_block(&mut block, 1 << 16)? > 0 {
-        samples.extend_from_slice(&block);
-    }
-    Signal::new(samples, sample_rate_hz).map_err(|error| error.in_file(path, "samples"))
+    AudioReader::open(path, channel)?.read_to_end()
 }

@@ -19,7 +19,7 @@ use sabine_acoustics::Observer;
 use sabine_paths::laws::Law;
 use sabine_scene::MeasuredRoom;
 use std::sync::Arc;
-use std::time::Instant;
+use web_time::Instant;
 
 /// Says what is wrong with a simulated room, given what was measured in it.
 ///

@@ -91,7 +91,7 @@ impl<'a> Trainer<'a> {
         let mut graph = Graph::new(&state.parameters)?;
         while state.history.len() < self.config.epochs && !self.is_over(&state) {
             let epoch = state.history.len() + 1;
-            let started = std::time::Instant::now();
+            let started = web_time::Instant::now();
             let train_loss = self.epoch(epoch, &mut graph, &mut state.adam, observer)?;
             let clips = self.dataset.partition(Partition::Train).len();
             let clips_per_s = clips as f64 / started.elapsed().as_secs_f64();

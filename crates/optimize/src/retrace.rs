@@ -6,7 +6,7 @@ use crate::prediction::t60_of_traces;
 use crate::{Error, MaterialFit, MaterialFitter, Unreachable, UnreachableReason};
 use sabine_acoustics::{Bands, Estimate, Material, Observer, OutOfRange, PerBand, Reading, report};
 use sabine_paths::PathSet;
-use std::time::Instant;
+use web_time::Instant;
 
 /// What traces a room again, with other random numbers and as many rays as are asked for.
 ///

@@ -1,6 +1,6 @@
 //! Seconds that each stage of a match takes.
 
-use std::time::Instant;
+use web_time::Instant;
 
 /// Adds up what each stage takes.
 pub(crate) struct Clock {

@@ -8,6 +8,7 @@ mod model;
 mod notes;
 mod other_model;
 mod position_sd;
+mod prior;
 pub(crate) mod response_check;
 mod tables;
 mod turned;
@@ -17,6 +18,7 @@ pub use drawn_room::DrawnRoom;
 pub use model::RoomModel;
 pub use notes::RoomNote;
 pub use position_sd::PositionSd;
+pub use prior::MaterialPrior;
 pub use write::{NewResponse, NewRoom};
 
 use crate::error::Error;
@@ -32,6 +34,7 @@ use sabine_acoustics::{
 };
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use tables::{bands, materials, places};
 
 /// Largest number that may stand for a time of recording: milliseconds of 30,000 years, and exact in steps of one.
@@ -104,25 +107,6 @@ pub struct Measurement {
     pub levels: Levels,
 }
 
-/// How much is known of a material's absorption before anything is fitted.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MaterialPrior {
-    /// The room file's table, or `None` where the absorption is unknown and to be fitted; the scene then holds
-    /// [`MaterialPrior::UNKNOWN_ABSORPTION`] in its place.
-    pub absorption: Option<PerBand<f64>>,
-    /// How far the table is trusted: one standard deviation, 0.0001 to 1.
-    pub absorption_sd: PerBand<f64>,
-}
-
-impl MaterialPrior {
-    /// Stands in for an unknown absorption: about the mean of the surfaces in [`sabine_acoustics::material_library`].
-    pub const UNKNOWN_ABSORPTION: f64 = 0.2;
-    /// Standard deviation of an unknown absorption: about that of the surfaces in [`sabine_acoustics::material_library`].
-    pub const UNKNOWN_ABSORPTION_SD: f64 = 0.25;
-    /// Standard deviation of a table that does not state one (the format's default).
-    pub const TABLE_SD: f64 = 0.1;
-}
-
 /// A measured response: where it lies and between which places it was taken. Its samples are read by
 /// [`MeasuredRoom::load_response`].
 #[derive(Clone, Debug, PartialEq)]
@@ -143,6 +127,8 @@ pub struct ResponseEntry {
     pub sample_rate_hz: u32,
     /// Its length in seconds.
     pub duration_s: f64,
+    /// Its samples, where they came from memory and not from the file.
+    samples: Option<Arc<ImpulseResponse>>,
 }
 
 /// How [`MeasuredRoom::read_with`] reads a room.
@@ -240,10 +226,10 @@ impl MeasuredRoom {
             allow_outside: options.allow_outside,
         };
         let mesh_path = named("room.mesh".into(), &file.room.mesh)?;
-        let mut room = Self::assemble(&path, &file, &mesh_path, &mesh_options)?;
+        let mut room = Self::assemble(&path, &file, || Mesh::read_with(mesh_path, &mesh_options))?;
         for (i, table) in file.responses.iter().enumerate() {
             let wav = named(format!("responses[{i}].file"), &table.file)?;
-            let entry = room.entry(&file, i, table, wav)?;
+            let entry = room.entry(&file, i, table, wav, None)?;
             room.responses.push(entry);
         }
         Ok(room)
@@ -253,13 +239,12 @@ impl MeasuredRoom {
     fn assemble(
         path: &Path,
         file: &RoomFile,
-        mesh_path: &Path,
-        mesh_options: &MeshOptions,
+        mesh: impl FnOnce() -> Result<Mesh, Error>,
     ) -> Result<Self, Error> {
         let bands = bands(&file.bands.centres_hz).map_err(|e| e.in_file(path, "bands.centres_hz"))?;
-        let mesh = Mesh::read_with(mesh_path, mesh_options)?;
+        let mesh = mesh()?;
         if let Some(name) = file.materials.keys().find(|name| !mesh.material_names().contains(name)) {
-            let error = Error::TableWithoutMaterial { mesh: mesh_path.to_owned() };
+            let error = Error::TableWithoutMaterial { mesh: mesh.path().to_owned() };
             return Err(error.in_file(path, format!("materials.{name}")));
         }
         let mut tables = file.materials.clone();
@@ -334,6 +319,7 @@ impl MeasuredRoom {
         index: usize,
         table: &ResponseTable,
         path: PathBuf,
+        samples: Option<&ImpulseResponse>,
     ) -> Result<ResponseEntry, Error> {
         let field = |name: &str| format!("responses[{index}].{name}");
         let in_file = |name: &'static str| move |error: Error| error.in_file(&self.file, field(name));
@@ -346,7 +332,7 @@ impl MeasuredRoom {
             let id = table.file.display().to_string();
             return Err(in_file("file")(Error::DuplicateId { id }));
         }
-        let info = probe_audio(&path)?;
+        let info = samples.map_or_else(|| probe_audio(&path), |samples| Ok(write::info(samples)))?;
         if info.channels != 1 {
             return Err(ValueError::ManyChannels { path, channels: info.channels }.into());
         }
@@ -360,6 +346,7 @@ impl MeasuredRoom {
             recorded_at: table.recorded_at,
             sample_rate_hz: info.sample_rate_hz,
             duration_s,
+            samples: samples.cloned().map(Arc::new),
         };
         self.check_length(&entry)?;
         Ok(entry)
@@ -466,7 +453,7 @@ impl MeasuredRoom {
         Ok(&self.receivers[index])
     }
 
-    /// Reads the samples of a response, as they stand in its file.
+    /// Reads the samples of a response, as they stand in its file, or those that it was made with ([`NewRoom::in_memory`]).
     ///
     /// # Errors
     /// [`sabine_acoustics::Error::Index`] if there is no such response; [`Error::InFile`] with the cause [`Error::Silent`],
@@ -474,10 +461,13 @@ impl MeasuredRoom {
     pub fn load_response(&self, index: usize) -> Result<ImpulseResponse, Error> {
         let count = self.responses.len();
         let entry = self.responses.get(index).ok_or(ValueError::Index { what: "response", index, count })?;
-        let signal = read_audio(&entry.path, Channel::Mono)?;
-        response_check::check(signal.samples(), signal.sample_rate_hz())
+        let response = match &entry.samples {
+            Some(samples) => ImpulseResponse::clone(samples),
+            None => read_audio(&entry.path, Channel::Mono)?.into(),
+        };
+        response_check::check(response.samples(), response.sample_rate_hz())
             .map_err(|error| error.in_file(&entry.path, format!("responses[{index}].file")))?;
-        Ok(signal.into())
+        Ok(response)
     }
 
     fn source_index(&self, id: &str) -> Result<usize, Error> {

@@ -18,7 +18,7 @@ use crate::measured_room::{
     Levels, MeasuredRoom, Measurement, NewResponse, NewRoom, PositionSd, RoomModel, TimeZero,
 };
 use crate::scene::{Receiver, Source};
-use sabine_acoustics::{Air, Channel, ImpulseResponse, read_audio};
+use sabine_acoustics::{Air, AudioReader, Channel, ImpulseResponse, Signal, read_audio};
 use std::path::Path;
 
 /// Measured responses without a room around them: what SOFA files and tables of positions hold.
@@ -110,6 +110,19 @@ impl Measurements {
         sofa::read(path.as_ref(), options)
     }
 
+    /// As [`Measurements::read_sofa`], from the bytes of a file; `name` stands in messages.
+    ///
+    /// # Errors
+    /// As [`Measurements::read_sofa`], without those of opening a file.
+    #[cfg(feature = "sofa")]
+    pub fn sofa_of_bytes(
+        name: impl AsRef<Path>,
+        bytes: Vec<u8>,
+        options: &ImportOptions,
+    ) -> Result<Self, Error> {
+        sofa::of_bytes(name.as_ref(), bytes, options)
+    }
+
     /// Reads a table of measurements: a line for each response, with its file and its places.
     ///
     /// Columns stand in any order under their names: `file` (sound, or text of REW; below the table's folder), `source_x_m`,
@@ -142,7 +155,42 @@ impl Measurements {
         receiver: Receiver,
         options: &ImportOptions,
     ) -> Result<Self, Error> {
-        let (samples, mut notes) = read_response(path.as_ref(), options)?;
+        let path = path.as_ref();
+        Self::single(path, Sound::read(path)?, source, receiver, options)
+    }
+
+    /// As [`Measurements::read_single`], from the bytes of a file; `name` is its name, whose ending counts.
+    ///
+    /// ```
+    /// use sabine_scene::{ImportOptions, Measurements, Receiver, Source};
+    /// let text = "1.25E-4 // Sample interval (seconds)\n* Data start\n0.0\n1.0\n0.5\n";
+    /// let (source, receiver) = (Source::omni("s", [0.0; 3])?, Receiver::omni("r", [1.0, 0.0, 0.0])?);
+    /// let set = Measurements::single_of_bytes("dropped.txt", text.into(), source, receiver, &ImportOptions::default())?;
+    /// assert_eq!((set.responses[0].samples.samples(), set.responses[0].samples.sample_rate_hz()), (&[0.0, 1.0, 0.5][..], 8000));
+    /// # Ok::<(), sabine_scene::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Measurements::read_single`], without those of opening a file.
+    pub fn single_of_bytes(
+        name: impl AsRef<Path>,
+        bytes: Vec<u8>,
+        source: Source,
+        receiver: Receiver,
+        options: &ImportOptions,
+    ) -> Result<Self, Error> {
+        let path = name.as_ref();
+        Self::single(path, Sound::of_bytes(path, bytes)?, source, receiver, options)
+    }
+
+    fn single(
+        path: &Path,
+        sound: Sound,
+        source: Source,
+        receiver: Receiver,
+        options: &ImportOptions,
+    ) -> Result<Self, Error> {
+        let (samples, mut notes) = sound.response(path, options)?;
         let (measurement, note) = meaning(options.time_zero, options.levels, "The file");
         notes.extend(note);
         let name = file_names::Names::default().unique(&format!("{}_{}", source.id, receiver.id));
@@ -244,20 +292,46 @@ impl Measurements {
     }
 }
 
-/// A response and what should be known of it.
-fn read_response(path: &Path, options: &ImportOptions) -> Result<(ImpulseResponse, Vec<String>), Error> {
-    let text = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("txt"));
-    let (samples, notes) = if text {
-        let mut read = rew::read(path)?;
-        let notes = std::mem::take(&mut read.notes);
-        let emission = options.time_zero == Some(TimeZero::Emission);
-        (if emission { read.starting_at_zero()? } else { read.samples }, notes)
-    } else {
-        (read_audio(path, Channel::Mono)?.into(), Vec::new())
-    };
-    response_check::check(samples.samples(), samples.sample_rate_hz())
-        .map_err(|error| error.in_file(path, "samples"))?;
-    Ok((samples, notes))
+/// What a file with one response holds.
+enum Sound {
+    Text(rew::RewResponse),
+    Audio(Signal),
+}
+
+impl Sound {
+    fn read(path: &Path) -> Result<Self, Error> {
+        if is_text(path) {
+            return Ok(Self::Text(rew::read(path)?));
+        }
+        Ok(Self::Audio(read_audio(path, Channel::Mono)?))
+    }
+
+    fn of_bytes(name: &Path, bytes: Vec<u8>) -> Result<Self, Error> {
+        if is_text(name) {
+            return Ok(Self::Text(rew::of_bytes(name, &bytes)?));
+        }
+        Ok(Self::Audio(AudioReader::of_bytes(name, bytes, Channel::Mono)?.read_to_end()?))
+    }
+
+    /// A response and what should be known of it.
+    fn response(self, path: &Path, options: &ImportOptions) -> Result<(ImpulseResponse, Vec<String>), Error> {
+        let (samples, notes) = match self {
+            Self::Text(mut read) => {
+                let notes = std::mem::take(&mut read.notes);
+                let emission = options.time_zero == Some(TimeZero::Emission);
+                (if emission { read.starting_at_zero()? } else { read.samples }, notes)
+            }
+            Self::Audio(signal) => (signal.into(), Vec::new()),
+        };
+        response_check::check(samples.samples(), samples.sample_rate_hz())
+            .map_err(|error| error.in_file(path, "samples"))?;
+        Ok((samples, notes))
+    }
+}
+
+/// Whether a file is text by its ending.
+fn is_text(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("txt"))
 }
 
 /// What times and levels mean where `what` may not say it: the weakest that one set-up allows, with a note.

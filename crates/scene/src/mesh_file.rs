@@ -16,6 +16,7 @@ use crate::scene::{NamedMaterial, Scene, Triangle};
 use mesh_options::Placement;
 use sabine_acoustics::{Material, read_at_most};
 use std::collections::{BTreeMap, HashMap};
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// The triangles of a file and the names of their materials, before anything is known about these materials.
@@ -92,29 +93,41 @@ impl Mesh {
     pub fn read_with(path: impl AsRef<Path>, options: &MeshOptions) -> Result<Self, Error> {
         let path = path.as_ref();
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
-        let usual = if ending == "obj" { UpAxis::Z } else { UpAxis::Y };
-        let placement = Placement { unit: options.unit, up_axis: options.up_axis.unwrap_or(usual) };
-        let mut draft = MeshDraft::new(path, placement);
-        #[cfg(feature = "gltf")]
-        let folder = match (&options.folder, options.allow_outside) {
-            (_, true) => None,
-            (Some(folder), false) => Some(folder.as_path()),
-            (None, false) => Some(path.parent().unwrap_or(Path::new(""))),
-        };
         match ending.to_str() {
-            Some("obj") => {
-                let bytes = read_at_most(path, u64::MAX)?;
-                // Names may be in any old encoding; numbers and keywords are ASCII.
-                obj::parse_obj(path, &String::from_utf8_lossy(&bytes), &mut draft)?;
-            }
+            Some("obj") => Self::obj_of_bytes(path, &read_at_most(path, u64::MAX)?, options),
             #[cfg(feature = "gltf")]
             Some("gltf" | "glb") => {
+                let folder = match (&options.folder, options.allow_outside) {
+                    (_, true) => None,
+                    (Some(folder), false) => Some(folder.as_path()),
+                    (None, false) => Some(path.parent().unwrap_or(Path::new(""))),
+                };
+                let mut draft = MeshDraft::new(path, placement(options, &ending));
                 gltf::parse_gltf(path, &read_at_most(path, u64::MAX)?, folder, &mut draft)?;
+                Ok(draft.mesh)
             }
             #[cfg(not(feature = "gltf"))]
-            Some("gltf" | "glb") => return Err(Error::GltfFeature { path: path.to_owned() }),
-            _ => return Err(Error::UnknownMeshFormat { path: path.to_owned() }),
+            Some("gltf" | "glb") => Err(Error::GltfFeature { path: path.to_owned() }),
+            _ => Err(Error::UnknownMeshFormat { path: path.to_owned() }),
         }
+    }
+
+    /// As [`Mesh::read_with`], from the bytes of an OBJ file; `name` stands in messages.
+    ///
+    /// ```
+    /// use sabine_scene::{Mesh, MeshOptions};
+    /// let mesh = Mesh::obj_of_bytes("dropped.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", &MeshOptions::default())?;
+    /// assert_eq!(mesh.triangles().len(), 1);
+    /// # Ok::<(), sabine_scene::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Mesh::read_with`] for what such a file may hold.
+    pub fn obj_of_bytes(name: impl AsRef<Path>, bytes: &[u8], options: &MeshOptions) -> Result<Self, Error> {
+        let path = name.as_ref();
+        let mut draft = MeshDraft::new(path, placement(options, "obj".as_ref()));
+        // Names may be in any old encoding; numbers and keywords are ASCII.
+        obj::parse_obj(path, &String::from_utf8_lossy(bytes), &mut draft)?;
         Ok(draft.mesh)
     }
 
@@ -184,6 +197,12 @@ impl Mesh {
         Ok(Scene::new(self.vertices_m, self.triangles, materials)
             .map_err(|error| error.in_file(&self.path, "mesh"))?)
     }
+}
+
+/// How a file of this ending lies, where the options leave it open.
+fn placement(options: &MeshOptions, ending: &OsStr) -> Placement {
+    let usual = if ending == "obj" { UpAxis::Z } else { UpAxis::Y };
+    Placement { unit: options.unit, up_axis: options.up_axis.unwrap_or(usual) }
 }
 
 /// A mesh that is being read.

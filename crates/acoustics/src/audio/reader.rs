@@ -1,5 +1,6 @@
 //! Sound from a file, block by block.
 
+use super::byte_source::ByteSource;
 use super::kind::{FileKind, LOOK};
 use super::mix::Mixer;
 use super::wav::WavDecoder;
@@ -7,9 +8,11 @@ use super::{AudioInfo, Channel};
 use crate::error::Error;
 use crate::out_of_range::OutOfRange;
 use crate::regular_file::open_file;
+use crate::signal::Signal;
 use std::fmt;
-use std::io::{BufReader, Read, Seek};
+use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Largest magnitude that is read, 200 dB above full scale: beyond the integers of 32 bits that some programs store as floats
 /// lies no sound.
@@ -80,7 +83,34 @@ impl AudioReader {
     /// As [`read_audio`](crate::read_audio), except for what only the samples can show.
     pub fn open(path: impl AsRef<Path>, channel: Channel) -> Result<Self, Error> {
         let path = path.as_ref();
-        let decoder = Decoder::open(path)?;
+        Self::of_source(path, ByteSource::File(open_file(path)?), channel)
+    }
+
+    /// Reads the header of a file that is in memory already, as a browser hands it over; `name` stands in messages where a path would.
+    ///
+    /// ```
+    /// use sabine_acoustics::{AudioReader, Channel, SampleFormat, Signal, encode_wav};
+    /// let bytes = encode_wav(&Signal::new(vec![0.25; 1000], 8000)?, SampleFormat::Int16)?;
+    /// let mut reader = AudioReader::of_bytes("dropped.wav", bytes, Channel::Mono)?;
+    /// let mut block = Vec::new();
+    /// assert_eq!((reader.read_block(&mut block, 2000)?, block[999]), (1000, 0.25));
+    /// let message = AudioReader::of_bytes("photo.wav", *b"\x89PNG\r\n", Channel::Mono).unwrap_err().to_string();
+    /// assert!(message.starts_with("photo.wav: this is PNG"), "{message}");
+    /// # Ok::<(), sabine_acoustics::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`AudioReader::open`], without those of opening a file.
+    pub fn of_bytes(
+        name: impl AsRef<Path>,
+        bytes: impl Into<Arc<[u8]>>,
+        channel: Channel,
+    ) -> Result<Self, Error> {
+        Self::of_source(name.as_ref(), ByteSource::Memory(Cursor::new(bytes.into())), channel)
+    }
+
+    fn of_source(path: &Path, source: ByteSource, channel: Channel) -> Result<Self, Error> {
+        let decoder = Decoder::open(path, source)?;
         let (sample_rate_hz, channels, frames) = match &decoder {
             Decoder::Wav(wav) => {
                 let header = wav.header();
@@ -132,7 +162,7 @@ impl AudioReader {
     }
 
     /// Whether all samples that the header promises are known to be there.
-    pub(super) fn is_whole(&self) -> bool {
+    fn is_whole(&self) -> bool {
         matches!(self.decoder, Decoder::Wav(_))
     }
 
@@ -187,6 +217,20 @@ impl AudioReader {
         Ok(())
     }
 
+    /// All that is left of the channel. Memory grows with it: where a file may be of any length, look at [`AudioReader::frames`] first.
+    ///
+    /// # Errors
+    /// As [`AudioReader::read_block`]; [`Error::InFile`] with the cause [`Error::Empty`] where nothing is left.
+    pub fn read_to_end(mut self) -> Result<Signal, Error> {
+        // The header of a WAV file was held against the length of the file; others grow with what is decoded.
+        let known = self.frames().filter(|_| self.is_whole()).unwrap_or(0).saturating_sub(self.position);
+        let (mut samples, mut block) = (Vec::with_capacity(known as usize), Vec::new());
+        while self.read_block(&mut block, 1 << 16)? > 0 {
+            samples.extend_from_slice(&block);
+        }
+        Signal::new(samples, self.sample_rate_hz).map_err(|error| error.in_file(&self.path, "samples"))
+    }
+
     /// That what was just decoded is sound.
     fn check(&self) -> Result<(), Error> {
         let Some(at) = self.mixed.iter().position(|s| s.is_nan() || s.abs() > GREATEST) else {
@@ -204,9 +248,9 @@ impl AudioReader {
 }
 
 impl Decoder {
-    fn open(path: &Path) -> Result<Self, Error> {
+    fn open(path: &Path, source: ByteSource) -> Result<Self, Error> {
         let failed = |source| Error::Io { path: path.to_owned(), source };
-        let mut file = BufReader::new(open_file(path)?);
+        let mut file = BufReader::new(source);
         let mut start = Vec::with_capacity(LOOK);
         file.by_ref()
             .take(LOOK as u64)

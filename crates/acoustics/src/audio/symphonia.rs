@@ -1,7 +1,7 @@
 //! Sound in formats other than WAV, by symphonia.
 
+use super::byte_source::ByteSource;
 use crate::error::Error;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use symphonia::core::codecs::audio::{AudioDecoder, AudioDecoderOptions};
 use symphonia::core::formats::probe::Hint;
@@ -24,7 +24,7 @@ pub(super) struct PacketDecoder {
 }
 
 impl PacketDecoder {
-    pub(super) fn open(path: &Path, file: File) -> Result<Self, Error> {
+    pub(super) fn open(path: &Path, file: ByteSource) -> Result<Self, Error> {
         let stream = MediaSourceStream::new(Box::new(file), Default::default());
         let format = symphonia::default::get_probe()
             .probe(&Hint::new(), stream, FormatOptions::default(), MetadataOptions::default())

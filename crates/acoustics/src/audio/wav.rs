@@ -1,8 +1,8 @@
 //! Samples of a WAV file.
 
+use super::byte_source::ByteSource;
 use super::wav_header::{Encoding, WavHeader, failed};
 use crate::error::Error;
-use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ const BLOCK_BYTES: usize = 1 << 16;
 /// Decodes a WAV file block by block.
 pub(super) struct WavDecoder {
     path: PathBuf,
-    file: BufReader<File>,
+    file: BufReader<ByteSource>,
     header: WavHeader,
     frames_left: u64,
     bytes: Vec<u8>,
@@ -20,7 +20,7 @@ pub(super) struct WavDecoder {
 
 impl WavDecoder {
     /// Reads the header and holds it against the length of the file.
-    pub(super) fn open(path: &Path, mut file: BufReader<File>) -> Result<Self, Error> {
+    pub(super) fn open(path: &Path, mut file: BufReader<ByteSource>) -> Result<Self, Error> {
         let header = WavHeader::read(path, &mut file)?;
         file.seek(SeekFrom::Start(header.data_start)).map_err(|error| failed(path, error))?;
         Ok(Self { path: path.to_owned(), file, header, frames_left: header.frames, bytes: Vec::new() })

@@ -1,10 +1,10 @@
 //! The chunks of a WAV file: RIFF, and RF64 and BW64 beyond 4 GiB (EBU Tech 3306, ITU-R BS.2088).
 
+use super::byte_source::ByteSource;
 use super::kind::FileKind;
 use crate::error::Error;
 use crate::out_of_range::OutOfRange;
 use std::fmt;
-use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -89,8 +89,8 @@ impl WavHeader {
     }
 
     /// Walks the chunks up to the samples.
-    pub(super) fn read(path: &Path, file: &mut BufReader<File>) -> Result<Self, Error> {
-        let file_bytes = file.get_ref().metadata().map_err(|error| failed(path, error))?.len();
+    pub(super) fn read(path: &Path, file: &mut BufReader<ByteSource>) -> Result<Self, Error> {
+        let file_bytes = file.get_ref().length().map_err(|error| failed(path, error))?;
         Walk { path, file, file_bytes, at: 0 }.header()
     }
 }
@@ -98,7 +98,7 @@ impl WavHeader {
 /// A place in the file, and what goes wrong there.
 struct Walk<'a> {
     path: &'a Path,
-    file: &'a mut BufReader<File>,
+    file: &'a mut BufReader<ByteSource>,
     file_bytes: u64,
     at: u64,
 }

@@ -24,7 +24,7 @@ use sabine_scene::{MaterialPrior, MeasuredRoom};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::LN_10;
 use std::sync::Arc;
-use std::time::Instant;
+use web_time::Instant;
 
 /// Rounds of expansion and fit of the baseline.
 const ROUNDS: usize = 4;

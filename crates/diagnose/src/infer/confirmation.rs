@@ -12,7 +12,7 @@ use crate::infer::selection::Selection;
 use crate::likelihood::decay::WarmStart;
 use crate::report::diagnosis::Verdict;
 use sabine_acoustics::{Observer, report};
-use std::time::Instant;
+use web_time::Instant;
 
 /// Evidence by which the unnamed discrepancy must beat all named causes to unseat them, in nats.
 const UNNAMED_MARGIN_NATS: f64 = 5.0;

@@ -11,7 +11,7 @@ use crate::infer::candidates::CatalogueCase;
 use crate::infer::search::{Search, State};
 use crate::simulate::scene_tracer::SceneTracer;
 use sabine_acoustics::Observer;
-use std::time::Instant;
+use web_time::Instant;
 
 /// Evidence of decays that half of the rays give a chosen cause beyond what all of them give, in nats.
 pub(crate) type MoreWithHalf = (usize, f64);

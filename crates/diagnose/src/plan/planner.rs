@@ -21,7 +21,7 @@ use sabine_acoustics::Observer;
 use sabine_propagate::MeshScene;
 use sabine_scene::{MeasuredRoom, Receiver};
 use std::sync::Arc;
-use std::time::Instant;
+use web_time::Instant;
 
 /// Sample rate of responses that nobody has recorded yet, in Hz.
 const RATE_HZ: u32 = 48_000;

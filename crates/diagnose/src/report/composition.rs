@@ -21,7 +21,7 @@ use crate::report::notes::{Circumstances, notes};
 use crate::report::recording_order;
 use crate::report::residual_map::residual_map;
 use sabine_acoustics::Observer;
-use std::time::Instant;
+use web_time::Instant;
 
 /// Dispersion from which an unexplained misfit looks like another room.
 const WARN_DISPERSION: f64 = 3.0;

@@ -44,7 +44,14 @@ impl RoomModel {
         options: &MeshOptions,
         tables: Option<&Materials>,
     ) -> Result<Self, Error> {
-        let mesh = Mesh::read_with(path, options)?;
+        Self::new(Mesh::read_with(path, options)?, tables)
+    }
+
+    /// The room of a mesh.
+    ///
+    /// # Errors
+    /// [`sabine_acoustics::Error::UnknownId`] for a table whose material no face has; else as [`Mesh::into_scene`].
+    pub fn new(mesh: Mesh, tables: Option<&Materials>) -> Result<Self, Error> {
         let found = found(mesh.material_names(), mesh.surfaces(), tables)?;
         let mut materials = BTreeMap::new();
         for table in &found {

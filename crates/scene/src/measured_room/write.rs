@@ -5,10 +5,12 @@ use super::file::{
 };
 use super::{MaterialPrior, MeasuredRoom, Measurement, PositionSd};
 use crate::error::Error;
+use crate::mesh_file::Mesh;
+use crate::mesh_file::mesh_options::MeshOptions;
 use crate::scene::{Receiver, Scene, Source};
 use sabine_acoustics::{
-    Air, Error as ValueError, ImpulseResponse, SampleFormat, create_folder_beside, write_atomically,
-    write_wav,
+    Air, AudioInfo, Error as ValueError, ImpulseResponse, SampleFormat, create_folder_beside,
+    write_atomically, write_wav,
 };
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -45,6 +47,7 @@ use std::path::{Path, PathBuf};
 /// # std::fs::remove_dir_all(&folder).ok();
 /// let read = room.write(&folder)?; // room.toml, room.obj, ir/s1_r1.wav
 /// assert_eq!(read.load_response(0)?.samples()[420], 0.33);
+/// assert_eq!(room.in_memory()?.load_response(0)?, read.load_response(0)?);
 /// # std::fs::remove_dir_all(&folder).ok();
 /// # Ok::<(), sabine_scene::Error>(())
 /// ```
@@ -96,15 +99,34 @@ impl NewRoom {
     /// [`sabine_acoustics::Error::UnknownId`] for a name in [`NewRoom::position_sd`] that no place has; [`sabine_acoustics::Error::Io`] if
     /// something cannot be written.
     pub fn write(&self, folder: impl AsRef<Path>) -> Result<MeasuredRoom, Error> {
-        let folder = folder.as_ref();
+        self.check()?;
+        write_folder(folder.as_ref(), &self.tables(), &self.scene.to_obj(), &self.responses)
+    }
+
+    /// The room as [`NewRoom::write`] would read it back, without a folder: where there is no disk, as in a browser.
+    ///
+    /// # Errors
+    /// As [`NewRoom::write`], but for files that cannot be written.
+    pub fn in_memory(&self) -> Result<MeasuredRoom, Error> {
+        self.check()?;
+        let (file, obj) = (self.tables(), self.scene.to_obj());
+        let mesh = || Mesh::obj_of_bytes("room.obj", obj.as_bytes(), &MeshOptions::default());
+        let mut room = MeasuredRoom::assemble(Path::new("room.toml"), &file, mesh)?;
+        for (i, (table, response)) in file.responses.iter().zip(&self.responses).enumerate() {
+            let entry = room.entry(&file, i, table, table.file.clone(), Some(&response.samples))?;
+            room.responses.push(entry);
+        }
+        Ok(room)
+    }
+
+    fn check(&self) -> Result<(), Error> {
         if self.priors.len() != self.scene.materials().len() {
             let (expected, found) = (self.scene.materials().len(), self.priors.len());
             return Err(ValueError::MaterialCount { expected, found }.into());
         }
         let names =
             (self.sources.iter().map(|s| s.id.as_str()), self.receivers.iter().map(|r| r.id.as_str()));
-        self.position_sd.check_names(names.0, names.1)?;
-        write_folder(folder, &self.tables(), &self.scene.to_obj(), &self.responses)
+        self.position_sd.check_names(names.0, names.1)
     }
 
     fn tables(&self) -> RoomFile {
@@ -154,6 +176,12 @@ impl NewRoom {
             responses: self.responses.iter().map(response).collect(),
         }
     }
+}
+
+/// What the header of a file with these samples would say.
+pub(super) fn info(samples: &ImpulseResponse) -> AudioInfo {
+    let (sample_rate_hz, frames) = (samples.sample_rate_hz(), samples.samples().len() as u64);
+    AudioInfo { sample_rate_hz, channels: 1, frames }
 }
 
 /// Writes a room as a new folder, and reads it back.

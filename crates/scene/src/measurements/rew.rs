@@ -38,12 +38,16 @@ struct Head {
 
 /// Reads a file.
 pub(super) fn read(path: &Path) -> Result<RewResponse, Error> {
-    let bytes = read_at_most(path, MAX_FILE_BYTES + 1)?;
+    of_bytes(path, &read_at_most(path, MAX_FILE_BYTES + 1)?)
+}
+
+/// Reads the bytes of a file; `path` is its name in messages.
+pub(super) fn of_bytes(path: &Path, bytes: &[u8]) -> Result<RewResponse, Error> {
     if bytes.len() as u64 > MAX_FILE_BYTES {
         let error = Error::TooManyValues { found: bytes.len() as u64, limit: MAX_FILE_BYTES };
         return Err(error.in_file(path, "bytes"));
     }
-    parse(&String::from_utf8_lossy(&bytes), path)
+    parse(&String::from_utf8_lossy(bytes), path)
 }
 
 fn parse(text: &str, path: &Path) -> Result<RewResponse, Error> {

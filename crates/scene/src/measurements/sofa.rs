@@ -30,24 +30,33 @@ const LEVELS: &str = "Levels";
 
 /// Reads a file.
 pub(super) fn read(path: &Path, options: &ImportOptions) -> Result<Measurements, Error> {
-    let file = SofaFile::open(path)?;
-    let mimo = convention(&file)? == "SingleRoomMIMOSRIR";
-    let responses = Responses::read(&file, mimo)?;
+    measurements(&SofaFile::open(path)?, options)
+}
+
+/// Reads a file that is in memory.
+pub(super) fn of_bytes(name: &Path, bytes: Vec<u8>, options: &ImportOptions) -> Result<Measurements, Error> {
+    measurements(&SofaFile::of_bytes(name, bytes)?, options)
+}
+
+fn measurements(file: &SofaFile, options: &ImportOptions) -> Result<Measurements, Error> {
+    let path = file.path();
+    let mimo = convention(file)? == "SingleRoomMIMOSRIR";
+    let responses = Responses::read(file, mimo)?;
     let (m, r, e) = (responses.measurements, responses.receivers, responses.emitters);
     let listener = Object::read(
-        &file,
+        file,
         ["ListenerPosition", "ListenerView", "ListenerUp", "ReceiverPosition", "ReceiverView"],
         r,
         m,
     )?;
     let source = Object::read(
-        &file,
+        file,
         ["SourcePosition", "SourceView", "SourceUp", "EmitterPosition", "EmitterView"],
         e,
         m,
     )?;
     let (mut sources, mut receivers) = (Places::new("s"), Places::new("r"));
-    let airs = airs(&file, m, options)?;
+    let airs = airs(file, m, options)?;
     let mut found = Vec::new();
     let mut rounded = 0;
     for measurement in 0..m {
@@ -61,8 +70,8 @@ pub(super) fn read(path: &Path, options: &ImportOptions) -> Result<Measurements,
                     .map_err(|error| Error::from(error).in_file(path, &field))?;
                 response_check::check(samples.samples(), samples.sample_rate_hz())
                     .map_err(|error| error.in_file(path, &field))?;
-                let from = source.place(&file, emitter, measurement)?;
-                let to = listener.place(&file, receiver, measurement)?;
+                let from = source.place(file, emitter, measurement)?;
+                let to = listener.place(file, receiver, measurement)?;
                 found.push((sources.index(from), receivers.index(to), measurement, samples));
             }
         }
@@ -92,7 +101,7 @@ pub(super) fn read(path: &Path, options: &ImportOptions) -> Result<Measurements,
         receivers,
         air: airs.first().copied(),
         measurement,
-        shoebox_m: shoebox(&file)?,
+        shoebox_m: shoebox(file)?,
         responses,
         notes,
     })

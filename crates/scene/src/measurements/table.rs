@@ -2,7 +2,7 @@
 
 use super::file_names::Names;
 use super::places::{Place, Places};
-use super::{ImportOptions, Measurements, meaning, number, read_response};
+use super::{ImportOptions, Measurements, Sound, meaning, number};
 use crate::error::Error;
 use crate::inside_folder::check_inside;
 use crate::measured_room::NewResponse;
@@ -144,8 +144,9 @@ pub(super) fn read(path: &Path, options: &ImportOptions) -> Result<Measurements,
     let (mut names, mut notes) = (Names::default(), Vec::new());
     let mut responses = Vec::new();
     for (s, r, row) in rows {
-        let (samples, more) =
-            read_response(&row.file, options).map_err(|error| error.in_file(path, row.field))?;
+        let (samples, more) = Sound::read(&row.file)
+            .and_then(|sound| sound.response(&row.file, options))
+            .map_err(|error| error.in_file(path, row.field))?;
         notes.extend(more.into_iter().map(|note| format!("{}: {note}", row.file.display())));
         let (source, receiver) = (sources[s].id.clone(), receivers[r].id.clone());
         let name = names.unique(&format!("{source}_{receiver}"));

@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 
 /// Largest file that is read (bytes): it is held in memory.
 const MAX_FILE_BYTES: u64 = 4 << 30;
-/// Largest number of values of one array.
-const MAX_VALUES: u64 = 1 << 28;
+/// Largest number of values of one array. Where addresses have 32 bits, as in a browser, an eighth of it: an allocation that fails
+/// there ends everything.
+const MAX_VALUES: u64 = if cfg!(target_pointer_width = "32") { 1 << 25 } else { 1 << 28 };
 /// Deflate makes at most so many bytes of one (RFC 1951: 258 bytes of 2 bits); what claims more was never written.
 const MAX_DEFLATE: u64 = 1040;
 /// Largest number of dimensions of an array; SOFA has four.
@@ -32,7 +33,11 @@ pub(super) struct Array {
 
 impl SofaFile {
     pub(super) fn open(path: &Path) -> Result<Self, Error> {
-        let content = read_at_most(path, MAX_FILE_BYTES + 1)?;
+        Self::of_bytes(path, read_at_most(path, MAX_FILE_BYTES + 1)?)
+    }
+
+    /// From the bytes of a file; `path` is its name in messages.
+    pub(super) fn of_bytes(path: &Path, content: Vec<u8>) -> Result<Self, Error> {
         let bytes = content.len() as u64;
         if bytes > MAX_FILE_BYTES {
             let error = Error::TooManyValues { found: bytes, limit: MAX_FILE_BYTES };
