@@ -95,6 +95,11 @@ impl SpeechCorpus {
         self.utterances.iter().map(|u| u.speaker.clone()).collect::<BTreeSet<_>>().into_iter().collect()
     }
 
+    /// Speaker and samples of each utterance, in the order in which they were added.
+    pub fn utterances(&self) -> impl ExactSizeIterator<Item = (&str, &[f32])> {
+        self.utterances.iter().map(|u| (u.speaker.as_str(), u.speech.samples.as_slice()))
+    }
+
     /// What was left out, and why.
     pub fn left_out(&self) -> &[LeftOut] {
         &self.left_out

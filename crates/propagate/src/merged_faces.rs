@@ -21,8 +21,8 @@ const SAME_AREA: f64 = 1e-9;
 /// No patch gets a triangle narrower than this (height over longest side) that had none so narrow: where a ray meets a sliver
 /// is uncertain.
 const SLIVER: f64 = 1e-5;
-/// A patch that cannot be cut anew keeps its triangles, and with them the vertices of its outline, which its neighbours then
-/// keep too: so often all outlines are drawn anew, at most.
+/// A patch that cannot be triangulated again keeps its triangles, and with them the vertices of its outline, which its neighbours then
+/// keep too: outlines are drawn so many times at most.
 const MAX_ROUNDS: usize = 8;
 
 /// What becomes of a patch.
@@ -69,7 +69,7 @@ pub(crate) fn merged(scene: &Scene, surfaces: &Surfaces) -> Option<Vec<Surface>>
     None
 }
 
-/// Cuts a patch anew; `None` if that cannot be done without loss.
+/// Triangulates a patch again; `None` if that cannot be done without loss.
 fn cut(
     patch: usize,
     edges: &HalfEdges,

@@ -6,13 +6,19 @@ use crate::placement::check_placement;
 use crate::prepared_scene::PreparedScene;
 use crate::tracing::Tracing;
 use rayon::prelude::*;
-use sabine_acoustics::{Air, Observer, OutOfRange, report};
-use sabine_paths::{PathSet, Propagator};
-use sabine_scene::{Receiver, Scene, Source};
+use sabine_acoustics::{Air, NoReading, Observer, OutOfRange, Reading, report};
+use sabine_paths::{Conditions, PathParameters, PathSet, Propagator};
+use sabine_scene::{DiffuseRoom, Receiver, Scene, Source};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Parts of the rays between which their paths are gathered.
 const PARTS_AT_ONCE: usize = 64;
+
+/// The first trace of [`PathTracer::trace_until_t30`] lasts this many times the longest reverberation time by Eyring's formula; rooms that
+/// are not diffuse ring longer.
+const DURATION_FACTOR: f64 = 1.2;
+/// It lasts so long at least, in seconds.
+const LEAST_DURATION_S: f64 = 0.3;
 
 /// Settings of [`PathTracer`].
 #[derive(Clone, Debug, PartialEq)]
@@ -128,6 +134,36 @@ impl PathTracer {
     /// [`Error::NoSurface`] if all triangles have zero area.
     pub fn prepare(&self, scene: &Scene) -> Result<PreparedScene, Error> {
         PreparedScene::new(scene, &self.config)
+    }
+
+    /// Traces until T30 can be read in every band under these conditions, but not beyond [`TracerConfig::duration_s`]: the first trace is
+    /// as long as a diffuse room would need, and each further one twice as long. The materials of the scene say what is expected.
+    ///
+    /// # Errors
+    /// As [`Propagator::trace`], [`DiffuseRoom::of_scene`] and [`PathParameters::read`].
+    pub fn trace_until_t30(
+        &self,
+        scene: &Scene,
+        source: &Source,
+        receiver: &Receiver,
+        conditions: &Conditions,
+        observer: &dyn Observer,
+    ) -> Result<(PathSet, PathParameters), Error> {
+        let bands = conditions.materials[0].bands();
+        let expected = DiffuseRoom::of_scene(scene, conditions.air, bands)?;
+        let longest_s = expected.values().iter().map(DiffuseRoom::eyring_t60_s).fold(0.0, f64::max);
+        let most_s = self.config.duration_s;
+        let mut duration_s = (DURATION_FACTOR * longest_s).max(LEAST_DURATION_S).min(most_s);
+        loop {
+            let tracer = Self::new(TracerConfig { duration_s, ..self.config.clone() })?;
+            let paths = tracer.trace(scene, source, receiver, conditions.air, observer)?;
+            let parameters = PathParameters::read(&paths, conditions)?;
+            let is_cut = |t30: &Reading| matches!(t30, Err(NoReading::DynamicRange { .. }));
+            if !parameters.t30_s.values().iter().any(is_cut) || duration_s >= most_s {
+                return Ok((paths, parameters));
+            }
+            duration_s = (2.0 * duration_s).min(most_s);
+        }
     }
 
     /// As [`Propagator::trace`], in a scene that was prepared with the same settings but for rays, duration and seed. Holes are

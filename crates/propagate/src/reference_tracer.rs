@@ -16,7 +16,7 @@ use std::f64::consts::PI;
 /// Unidirectional tracing with a spherical receiver, to be read and to be compared with: every triangle is tested, every
 /// reflected path is counted by the sphere, and each reflection is scattered with the coefficient's mean over the octaves.
 ///
-/// It is right in the mean wherever it answers, and slow. [`TracerConfig::image_order`],
+/// It is unbiased wherever it answers, and slow. [`TracerConfig::image_order`],
 /// [`TracerConfig::merge_coplanar`] and [`TracerConfig::allow_leaks`] mean nothing to it.
 #[derive(Clone, Debug)]
 pub struct ReferenceTracer {

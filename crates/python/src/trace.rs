@@ -9,15 +9,13 @@ use crate::room::Room;
 use crate::samples::rate_hz;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use sabine::acoustics::{Material, NoReading, Observer};
+use sabine::acoustics::{Material, Observer};
 use sabine::paths::{Conditions, PathParameters, PathSet, Propagator};
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
-use sabine::scene::{DiffuseRoom, Receiver, Source};
+use sabine::scene::{Receiver, Source};
 
-/// The first try lasts this many times the longest reverberation time that Eyring's formula expects ...
-const DURATION_FACTOR: f64 = 1.2;
-/// ... within these bounds (s). Rooms that are not diffuse ring longer: where T30 cannot be read, twice as long is tried.
-const DURATION_S: (f64, f64) = (0.3, 20.0);
+/// Longest time that is traced unless another is asked for, in seconds.
+const LONGEST_S: f64 = 20.0;
 /// Step of the decay curves in seconds.
 const DECAY_STEP_S: f64 = 0.005;
 
@@ -114,27 +112,20 @@ fn long_enough(
     settings: &Settings,
     observer: &dyn Observer,
 ) -> Result<(PathSet, PathParameters), Failure> {
-    let expected = DiffuseRoom::of_scene(&room.scene, &room.air, room.bands())?;
-    let longest_s = expected.values().iter().map(DiffuseRoom::eyring_t60_s).fold(0.0, f64::max);
-    let first_s = (DURATION_FACTOR * longest_s).clamp(DURATION_S.0, DURATION_S.1);
-    let mut duration_s = settings.duration_s.unwrap_or(first_s);
-    loop {
-        let tracer = PathTracer::new(TracerConfig {
-            rays: settings.rays,
-            seed: settings.seed,
-            duration_s,
-            image_order: settings.image_order,
-            diffraction: settings.diffraction,
-            allow_leaks: settings.allow_leaks,
-            ..TracerConfig::default()
-        })?;
-        let paths = tracer.trace(&room.scene, source, receiver, &room.air, observer)?;
-        let parameters = PathParameters::read(&paths, &Conditions::new(materials, &room.air))?;
-        let cut =
-            parameters.t30_s.values().iter().any(|t30| matches!(t30, Err(NoReading::DynamicRange { .. })));
-        if !cut || settings.duration_s.is_some() || duration_s >= DURATION_S.1 {
-            return Ok((paths, parameters));
-        }
-        duration_s = (2.0 * duration_s).min(DURATION_S.1);
+    let tracer = PathTracer::new(TracerConfig {
+        rays: settings.rays,
+        seed: settings.seed,
+        duration_s: settings.duration_s.unwrap_or(LONGEST_S),
+        image_order: settings.image_order,
+        diffraction: settings.diffraction,
+        allow_leaks: settings.allow_leaks,
+        ..TracerConfig::default()
+    })?;
+    let conditions = Conditions::new(materials, &room.air);
+    if settings.duration_s.is_none() {
+        return Ok(tracer.trace_until_t30(&room.scene, source, receiver, &conditions, observer)?);
     }
+    let paths = tracer.trace(&room.scene, source, receiver, &room.air, observer)?;
+    let parameters = PathParameters::read(&paths, &conditions)?;
+    Ok((paths, parameters))
 }

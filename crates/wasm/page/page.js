@@ -297,19 +297,19 @@ function diagnose() {
 const VERDICTS = {
   adequate: "The simulation explains the measurement within its expected spread.",
   explained: "A cause is named.",
-  ambiguous: "Several causes explain the misfit alike.",
+  ambiguous: "Several causes explain the misfit equally well.",
   unexplained: "Something is wrong that no listed cause explains.",
 };
 
 function showDiagnosis(found) {
   const line = (tag, text) => Object.assign(document.createElement(tag), { textContent: text });
-  const parts = [line("p", `${VERDICTS[found.verdict] ?? found.verdict} (Probability of such a misfit by chance: ${found.p_value.toPrecision(2)}.)`)];
+  const parts = [line("p", `${VERDICTS[found.verdict] ?? found.verdict} (Probability of such a misfit by chance: ${found.lack_of_fit.p_value.toPrecision(2)}.)`)];
   for (const cause of found.causes) parts.push(line("p", `• ${cause.explanation} (probability ${cause.probability.toFixed(2)})`));
   for (const note of [...found.would_decide, ...found.notes]) parts.push(Object.assign(line("p", note), { className: "note" }));
   const table = document.createElement("table");
   table.createTHead().insertRow().append(line("th", "Absorption, fitted"), ...found.bands_hz.map((hz) => line("th", hz >= 1000 ? `${hz / 1000} kHz` : `${hz} Hz`)));
   const body = table.createTBody();
-  for (const { name, absorption, absorption_sd } of found.materials) {
+  for (const [name, { absorption, absorption_sd }] of Object.entries(found.materials)) {
     const row = body.insertRow();
     row.append(line("th", name), ...absorption.map((a, i) => line("td", `${a.toFixed(2)} ± ${absorption_sd[i].toFixed(2)}`)));
   }

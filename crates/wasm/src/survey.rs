@@ -8,7 +8,7 @@ use sabine_scene::{
     Levels, MeasuredRoom, Measurement, Measurements, NewResponse, Receiver, Source, TimeZero,
 };
 use serde::Deserialize;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 /// Most rays of a diagnosis in a page.
 const MAX_RAYS: f64 = 2e4;
@@ -86,7 +86,7 @@ impl Survey {
         Ok(set.into_room(spec.room.model()?, None).in_memory()?)
     }
 
-    /// Says what the model gets wrong. The wave equation is left out: it takes minutes on one core.
+    /// Says what the model gets wrong, in the form of `diagnosis.json`. The wave equation is left out: it takes minutes on one core.
     ///
     /// # Errors
     /// [`Error::OutOfRange`]; as [`Survey::room`] and [`Diagnoser::diagnose`].
@@ -96,25 +96,6 @@ impl Survey {
         let (rays, seed) = (spec.rays, spec.seed);
         let config = DiagnoseConfig { rays, seed, wave_solutions: false, ..DiagnoseConfig::default() };
         let found = Diagnoser::new(config)?.diagnose(&room, &[], observer)?;
-        let material = |(name, fitted): &(String, sabine_diagnose::FittedMaterial)| {
-            json!({
-                "name": name,
-                "stated": fitted.stated,
-                "absorption": fitted.absorption,
-                "absorption_sd": fitted.absorption_sd,
-            })
-        };
-        let materials: Vec<Value> = found.materials.iter().map(material).collect();
-        Ok(json!({
-            "verdict": found.verdict,
-            "p_value": found.lack_of_fit.p_value,
-            "causes": found.causes,
-            "alternatives": found.alternatives,
-            "would_decide": found.would_decide,
-            "candidates": found.candidates,
-            "bands_hz": found.bands.iter_hz().collect::<Vec<f64>>(),
-            "materials": materials,
-            "notes": found.notes,
-        }))
+        Ok(serde_json::to_value(&found)?)
     }
 }

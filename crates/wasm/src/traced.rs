@@ -4,16 +4,14 @@ use crate::error::Error;
 use crate::measured::STEP_S;
 use crate::readings::Row;
 use crate::room::RoomSpec;
-use sabine_acoustics::{Air, ImpulseResponse, NoReading, Observer, OutOfRange};
-use sabine_paths::{Conditions, PathParameters, Propagator};
+use sabine_acoustics::{Air, ImpulseResponse, Observer, OutOfRange};
+use sabine_paths::Conditions;
 use sabine_propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
-use sabine_scene::{DiffuseRoom, Receiver, Source};
+use sabine_scene::{Receiver, Source};
 use serde::{Deserialize, Serialize};
 
-/// The first try lasts this many times the longest reverberation time that Eyring's formula expects, within these bounds (s). Rooms that are
-/// not diffuse ring longer: where T30 cannot be read, twice as long is tried.
-const DURATION_FACTOR: f64 = 1.2;
-const DURATION_S: (f64, f64) = (0.3, 10.0);
+/// Longest time that is traced, in seconds: half of what the command traces, for the memory of a page.
+const LONGEST_S: f64 = 10.0;
 /// Most rays that a page may ask for: ten times the usual number, some seconds on one core.
 const MAX_RAYS: f64 = 2e5;
 
@@ -65,20 +63,15 @@ impl Traced {
         let receiver = Receiver::omni("receiver", spec.receiver_m)?;
         let materials: Vec<_> = scene.materials().iter().map(|named| named.material.clone()).collect();
         let conditions = Conditions::new(&materials, &air);
-        let expected = DiffuseRoom::of_scene(&scene, &air, materials[0].bands())?;
-        let longest_s = expected.values().iter().map(DiffuseRoom::eyring_t60_s).fold(0.0, f64::max);
-        let mut duration_s = (DURATION_FACTOR * longest_s).clamp(DURATION_S.0, DURATION_S.1);
-        let (paths, parameters) = loop {
-            let config =
-                TracerConfig { rays: spec.rays, seed: spec.seed, duration_s, ..TracerConfig::default() };
-            let paths = PathTracer::new(config)?.trace(&scene, &source, &receiver, &air, observer)?;
-            let parameters = PathParameters::read(&paths, &conditions)?;
-            let is_cut = |t30: &sabine_acoustics::Reading| matches!(t30, Err(NoReading::DynamicRange { .. }));
-            if !parameters.t30_s.values().iter().any(is_cut) || duration_s >= DURATION_S.1 {
-                break (paths, parameters);
-            }
-            duration_s = (2.0 * duration_s).min(DURATION_S.1);
+        let config = TracerConfig {
+            rays: spec.rays,
+            seed: spec.seed,
+            duration_s: LONGEST_S,
+            ..TracerConfig::default()
         };
+        let tracer = PathTracer::new(config)?;
+        let (paths, parameters) =
+            tracer.trace_until_t30(&scene, &source, &receiver, &conditions, observer)?;
         let energy = paths.energy_response(&conditions, STEP_S)?;
         let finite = |levels: Vec<f64>| levels.into_iter().take_while(|level| level.is_finite()).collect();
         let renderer = PressureRenderer::new(RenderConfig { seed: spec.seed, ..RenderConfig::default() })?;

@@ -147,7 +147,7 @@ fn a_survey_is_the_room_that_a_folder_would_hold() {
         ["adequate", "explained", "ambiguous", "unexplained"].iter().any(|v| found["verdict"] == *v),
         "{found}"
     );
-    assert_eq!(found["materials"].as_array().unwrap().len(), room.scene().materials().len());
+    assert_eq!(found["materials"].as_object().unwrap().len(), room.scene().materials().len());
     let none = Survey::default().diagnose(&spec, &()).unwrap_err().to_string();
     assert!(none.contains("response"), "{none}");
     let rays = survey.diagnose(&DiagnoseSpec { rays: 1_000_000, ..spec }, &()).unwrap_err().to_string();

@@ -121,12 +121,12 @@ impl FlatPatches {
 /// it stands.
 fn partner<'a>(edges: &HalfEdges, half_edge: u32, surface: impl Fn(u32) -> &'a Surface) -> u32 {
     let own = surface(half_edge / 3);
-    let alike = |other: &u32| {
+    let same_wall = |other: &u32| {
         let other = surface(other / 3);
         other.plane == own.plane && other.material == own.material
     };
     let only = |ends: [u32; 2]| {
-        let mut found = edges.between(ends).filter(alike);
+        let mut found = edges.between(ends).filter(same_wall);
         found.next().filter(|_| found.next().is_none())
     };
     let [from, to] = edges.ends(half_edge);

@@ -11,7 +11,7 @@ const NONE: u32 = u32::MAX;
 /// have a vertex at this place, and a gap must not open.
 const STRAIGHT: f64 = 1e-12;
 
-/// The edges at which patches end. A vertex that only two of these meet in, in a straight line, is left out, by all patches alike.
+/// The edges at which patches end. A vertex that only two of these meet in, in a straight line, is left out by all patches that have it.
 pub(super) struct Outlines<'a> {
     edges: &'a HalfEdges,
     patches: &'a FlatPatches,

@@ -212,7 +212,7 @@ fn nothing_slips_through_edges_that_only_one_side_divides() {
     assert!((12..200).contains(&left), "{left} of {}", scene.triangles().len());
 }
 
-/// Vertices moved so far that some cells fold over: what is there twice cannot be cut anew.
+/// Vertices moved so far that some cells fold over: what is covered twice cannot be triangulated again.
 #[test]
 fn a_wall_that_folds_over_itself_is_left_alone() {
     let model = fine_box(13, 0.6, |_, _, _| Some(0));
@@ -275,9 +275,9 @@ fn a_room_without_anything_to_merge_is_traced_to_the_bit() {
     assert_eq!(trace(&scene, true), trace(&scene, false));
 }
 
-/// Mirror paths and ways around edges are the same; what is drawn at random agrees in the mean.
+/// Mirror paths and ways around edges are the same; what is drawn at random agrees within its chance.
 #[test]
-fn a_furnished_room_is_traced_alike() {
+fn a_furnished_room_has_the_same_exact_paths_and_energy() {
     let scene = furnished().scene();
     let (merged, plain) = (trace(&scene, true), trace(&scene, false));
     let exact = |paths: &PathSet| {

@@ -16,7 +16,7 @@ use crate::room::{PlaceArguments, RoomArguments};
 use clap::{Args, ValueEnum};
 use draws::{Drawing, Draws};
 use sabine::acoustics::{
-    Directivity, NoReading, Orientation, PerBand, Reading, SampleFormat, Signal, encode_wav, write_atomically,
+    Directivity, Orientation, PerBand, Reading, SampleFormat, Signal, encode_wav, write_atomically,
 };
 use sabine::diagnose::{ExtendedModel, read_laws};
 use sabine::paths::laws::{BoundLaws, LawSite};
@@ -24,7 +24,7 @@ use sabine::paths::{Conditions, PathParameters, PathSet, Propagator};
 use sabine::propagate::{
     AmbisonicRenderer, MeshReport, PathTracer, PressureRenderer, RenderConfig, TracerConfig,
 };
-use sabine::scene::{DiffuseRoom, MeasuredRoom, Receiver, RoomNote, Source};
+use sabine::scene::{MeasuredRoom, Receiver, RoomNote, Source};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -32,10 +32,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 use waves::{WaveRoomBelow, Waves};
 
-/// The first try lasts this many times the longest reverberation time that Eyring's formula expects ...
-const DURATION_FACTOR: f64 = 1.2;
-/// ... within these bounds (s). Rooms that are not diffuse ring longer: where T30 cannot be read, twice as long is tried.
-const DURATION_S: (f64, f64) = (0.3, 20.0);
+/// Longest time that is traced unless another is asked for, in seconds.
+const LONGEST_S: f64 = 20.0;
 
 /// Trace the paths of sound between a source and a receiver of a room.
 #[derive(Args)]
@@ -307,20 +305,14 @@ fn trace(
     conditions: &Conditions,
     bar: &Bar,
 ) -> Result<(PathSet, PathParameters), Failure> {
-    let expected = DiffuseRoom::of_scene(room.scene(), &room.air(), room.bands())?;
-    let longest_s = expected.values().iter().map(DiffuseRoom::eyring_t60_s).fold(0.0, f64::max);
-    let mut duration_s = asked_s.unwrap_or((DURATION_FACTOR * longest_s).clamp(DURATION_S.0, DURATION_S.1));
-    loop {
-        let config = TracerConfig { duration_s, ..tracer.clone() };
-        let paths = PathTracer::new(config)?.trace(room.scene(), source, receiver, &room.air(), bar)?;
-        let parameters = PathParameters::read(&paths, conditions)?;
-        let cut =
-            parameters.t30_s.values().iter().any(|t30| matches!(t30, Err(NoReading::DynamicRange { .. })));
-        if !cut || asked_s.is_some() || duration_s >= DURATION_S.1 {
-            return Ok((paths, parameters));
-        }
-        duration_s = (2.0 * duration_s).min(DURATION_S.1);
-    }
+    let (scene, air) = (room.scene(), room.air());
+    let with = |duration_s| PathTracer::new(TracerConfig { duration_s, ..tracer.clone() });
+    let Some(asked_s) = asked_s else {
+        return Ok(with(LONGEST_S)?.trace_until_t30(scene, source, receiver, conditions, bar)?);
+    };
+    let paths = with(asked_s)?.trace(scene, source, receiver, &air, bar)?;
+    let parameters = PathParameters::read(&paths, conditions)?;
+    Ok((paths, parameters))
 }
 
 /// The quantities that are read per band: name, unit, values.

@@ -60,12 +60,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), Error> {
     let mut out = OutputFolder::create(&arguments.out)?;
-    let scratch = std::env::temp_dir().join(format!("sabine_five_rooms_{}", std::process::id()));
-    let failed = |source| Error::Io { path: scratch.clone(), source };
-    std::fs::create_dir_all(&scratch).map_err(failed)?;
-    let found = compare(arguments, &scratch);
-    std::fs::remove_dir_all(&scratch).map_err(failed)?;
-    let (results, page) = found?;
+    let (results, page) = compare(arguments)?;
     let tables = tables::markdown(&results);
     println!("\n{tables}");
     out.write("tables.md", tables.as_bytes())?;
@@ -77,12 +72,12 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
 }
 
 /// All rooms, one after another.
-fn compare(arguments: &Arguments, scratch: &std::path::Path) -> Result<(Vec<RoomResult>, Page), Error> {
-    let rooms = rooms::rooms(&arguments.data, scratch, &arguments.room, arguments.pairs)?;
+fn compare(arguments: &Arguments) -> Result<(Vec<RoomResult>, Page), Error> {
+    let rooms = rooms::rooms(&arguments.data, &arguments.room, arguments.pairs)?;
     let speech = Speech::read(&arguments.data)?;
     let (all, test) = speech.speakers;
     println!(
-        "{all} speakers were dealt out, {test} of them to the test; {} utterances make the recordings, another one is the dry voice; noise at {SNR_DB} dB, dealt to: {}",
+        "{all} speakers, {test} of them in the test; {} utterances make the recordings, another one is the dry voice; noise at {SNR_DB} dB, its partition: {}",
         speech.utterance_count, speech.noise_partition
     );
     let mut page = Page::new("Real rooms, heard and rendered");

@@ -129,11 +129,11 @@ const DECHORATE_MICROPHONES: [&str; 4] = ["m01", "m02", "m03", "m04"];
 /// Ears are this far from the middle of the head, in metres.
 const EAR_M: f64 = 0.09;
 
-/// All rooms whose name contains `wanted`, with at most `most_pairs` responses each. `scratch` is a folder for room files.
+/// All rooms whose name contains `wanted`, with at most `most_pairs` responses each.
 ///
 /// # Errors
 /// [`Error::Missing`] for data that are not there; what cannot be read of them.
-pub fn rooms(data: &Path, scratch: &Path, wanted: &str, most_pairs: usize) -> Result<Vec<Room>, Error> {
+pub fn rooms(data: &Path, wanted: &str, most_pairs: usize) -> Result<Vec<Room>, Error> {
     let is_wanted = |name: &str| name.to_lowercase().contains(&wanted.to_lowercase());
     let mut rooms = Vec::new();
     if is_wanted("BRAS CR2") {
@@ -143,7 +143,7 @@ pub fn rooms(data: &Path, scratch: &Path, wanted: &str, most_pairs: usize) -> Re
         rooms.push(dechorate(data)?);
     }
     for (i, room) in HEAD_ROOMS.iter().enumerate().filter(|(_, room)| is_wanted(room.name)) {
-        rooms.push(room.read(data, &scratch.join(format!("room_{i}")), 4 * (i + 2))?);
+        rooms.push(room.read(data, 4 * (i + 2))?);
     }
     for room in &mut rooms {
         room.pairs.truncate(most_pairs);
@@ -184,7 +184,7 @@ fn dechorate(data: &Path) -> Result<Room, Error> {
 }
 
 impl HeadRoom {
-    fn read(&self, data: &Path, folder: &Path, first_recording: usize) -> Result<Room, Error> {
+    fn read(&self, data: &Path, first_recording: usize) -> Result<Room, Error> {
         let [x, y, z] = self.head_m;
         let receivers =
             vec![Receiver::omni("left", [x - EAR_M, y, z])?, Receiver::omni("right", [x + EAR_M, y, z])?];
@@ -211,7 +211,7 @@ impl HeadRoom {
             receivers,
             responses: Vec::new(),
         };
-        let model = new.write(folder)?;
+        let model = new.in_memory()?;
         Ok(Room { name: self.name, first_recording, history: self.history, model, pairs })
     }
 }

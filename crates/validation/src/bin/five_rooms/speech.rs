@@ -4,16 +4,16 @@ use crate::error::Error;
 use sabine::acoustics::{Channel, ImpulseResponse, Signal, read_audio, resample, resample_response};
 use sabine::augment::{DatasetBuilder, DatasetConfig, DatasetSources, NoiseCorpus, Partition, SpeechCorpus};
 use sabine::eqfilter::convolve;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// Seed of the data set that the released weights were trained on (`docs/model_card.md`): it deals out speakers and noise.
+/// Seed of the data set that the released weights were trained on (`docs/model_card.md`): it divides speakers and noise.
 const TRAINING_SEED: u64 = 20_261_121;
 /// Rate of the recordings, in Hz: what the estimator hears.
 const RATE_HZ: u32 = 16_000;
 /// Length of a recording, in seconds.
 const RECORDING_S: f64 = 30.0;
-/// Shortest utterance that is used, in seconds.
-const SHORTEST_S: f64 = 4.0;
+/// Shortest utterance that is used, in samples: 4 s.
+const SHORTEST: usize = 4 * RATE_HZ as usize;
 /// Length of the dry voice in the sound examples, in seconds.
 const DRY_S: f64 = 6.0;
 /// Power of the speech over that of the noise, in dB.
@@ -27,7 +27,7 @@ const NOISE_STEP_S: f64 = 7.3;
 pub struct Speech {
     utterances: Vec<Signal>,
     noise: Signal,
-    /// How many speakers were dealt out in all, and to the test.
+    /// How many speakers there are in all, and in the test.
     pub speakers: (usize, usize),
     /// How many utterances the recordings are made of.
     pub utterance_count: usize,
@@ -51,23 +51,19 @@ impl Speech {
         }
         let config =
             DatasetConfig { seed: TRAINING_SEED, measured_fraction: [0.0; 3], ..DatasetConfig::default() };
-        let sources = DatasetSources {
-            speech: SpeechCorpus::read(&speech, RATE_HZ, config.clip.duration_s, &())?,
-            noise: NoiseCorpus::read(&noise, RATE_HZ, &())?,
-            ..DatasetSources::default()
-        };
+        let speech = SpeechCorpus::read(&speech, RATE_HZ, config.clip.duration_s, &())?;
+        let long_enough = speech.utterances().filter(|(_, samples)| samples.len() >= SHORTEST);
+        let spoken: Vec<(String, Vec<f32>)> =
+            long_enough.map(|(speaker, samples)| (speaker.to_owned(), samples.to_vec())).collect();
+        let noise_corpus = NoiseCorpus::read(&noise, RATE_HZ, &())?;
+        let sources = DatasetSources { speech, noise: noise_corpus, ..DatasetSources::default() };
         let dealt = DatasetBuilder::new(config, sources)?;
         let is_test = |name: &str| dealt.speaker_partitions().get(name) == Some(&Partition::Test);
-        let mut utterances = Vec::new();
-        for path in sound_files(&speech)? {
-            let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-            if is_test(stem.split(['-', '_']).next().unwrap_or_default()) {
-                let utterance = resample(&read_audio(&path, Channel::Mono)?, RATE_HZ)?;
-                if utterance.duration_s() >= SHORTEST_S {
-                    utterances.push(utterance);
-                }
-            }
-        }
+        let mut utterances: Vec<Signal> = spoken
+            .into_iter()
+            .filter(|(speaker, _)| is_test(speaker))
+            .map(|(_, samples)| Signal::new(samples, RATE_HZ))
+            .collect::<Result<_, _>>()?;
         let test = dealt.speaker_partitions().values().filter(|part| **part == Partition::Test).count();
         let dry = utterances.pop().ok_or(Error::Nothing { what: "speech for the test".into() })?;
         let kept = dry.samples().len().min((DRY_S * f64::from(RATE_HZ)) as usize);
@@ -123,22 +119,4 @@ impl Speech {
         wet.iter_mut().for_each(|s| *s *= 0.5 / peak);
         Ok(Signal::new(wet, RATE_HZ)?)
     }
-}
-
-/// Sound files below a folder, sorted.
-fn sound_files(folder: &Path) -> Result<Vec<PathBuf>, Error> {
-    let (mut found, mut folders) = (Vec::new(), vec![folder.to_owned()]);
-    while let Some(next) = folders.pop() {
-        let failed = |source| Error::Io { path: next.clone(), source };
-        for entry in std::fs::read_dir(&next).map_err(failed)? {
-            let path = entry.map_err(failed)?.path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|e| e == "wav" || e == "flac") {
-                found.push(path);
-            }
-        }
-    }
-    found.sort();
-    Ok(found)
 }
