@@ -42,50 +42,6 @@ enum Outcome {
     Mended,
 }
 
-fn check_settings(config: &DatasetConfig) -> Result<(), Error> {
-    check("shard_clips", config.shard_clips as f64, 1.0, 65_536.0, "between 1 and 65536")?;
-    check("clips_per_response", config.clips_per_response as f64, 1.0, 64.0, "between 1 and 64")?;
-    for fraction in config.measured_fraction {
-        check("measured_fraction", fraction, 0.0, 1.0, "between 0 and 1")?;
-    }
-    for fraction in config.traced_fraction {
-        check("traced_fraction", fraction, 0.0, 1.0, "between 0 and 1")?;
-    }
-    for clips in config.clips {
-        check("clips", clips as f64, 0.0, 1e9, "at most a thousand million")?;
-    }
-    Ok(())
-}
-
-fn deal_speakers(
-    config: &DatasetConfig,
-    speech: &SpeechCorpus,
-) -> Result<BTreeMap<String, Partition>, Error> {
-    config.speakers.deal("speaker", "three partitions", &speech.speakers(), derive(config.seed, 11))
-}
-
-fn deal_rooms(
-    config: &DatasetConfig,
-    responses: &ResponseCorpus,
-) -> Result<BTreeMap<String, Partition>, Error> {
-    if config.measured_fraction.iter().all(|&f| f == 0.0) {
-        return Ok(BTreeMap::new());
-    }
-    config.rooms.deal("room", "three partitions", &responses.rooms(), derive(config.seed, 12))
-}
-
-impl DatasetConfig {
-    /// Checks the settings, and that speakers and measured rooms can be dealt out: before rooms are traced, which takes long.
-    ///
-    /// # Errors
-    /// Those that [`DatasetBuilder::new`] would have for the same speech and responses.
-    pub fn check(&self, speech: &SpeechCorpus, responses: &ResponseCorpus) -> Result<(), Error> {
-        check_settings(self)?;
-        deal_speakers(self, speech)?;
-        deal_rooms(self, responses).map(|_| ())
-    }
-}
-
 impl DatasetBuilder {
     /// Deals out rooms, speakers and noise, and plans the set. Nothing is written.
     ///
@@ -94,7 +50,7 @@ impl DatasetBuilder {
     /// of the responses other than that of the features.
     pub fn new(config: DatasetConfig, sources: DatasetSources) -> Result<Self, Error> {
         let DatasetSources { speech, responses, traced, noise } = &sources;
-        check_settings(&config)?;
+        config.check_settings()?;
         let maker = ClipMaker::new(config.clip.clone(), config.synthetic.longest_s.max(2.5))?;
         let synthetic = SyntheticRooms::new(config.synthetic.clone())?;
         for response in responses.responses.iter().chain(&traced.responses) {
@@ -105,8 +61,8 @@ impl DatasetBuilder {
                 });
             }
         }
-        let speakers = deal_speakers(&config, speech)?;
-        let rooms = deal_rooms(&config, responses)?;
+        let speakers = config.speakers_of(speech)?;
+        let rooms = config.rooms_of(responses)?;
         let traced_rooms = if traced.responses.is_empty() {
             BTreeMap::new()
         } else {

@@ -2,9 +2,12 @@
 
 use crate::clip::ClipConfig;
 use crate::corpus::{NoiseCorpus, ResponseCorpus, SpeechCorpus};
+use crate::error::{Error, check};
 use crate::manifest::Manifest;
-use crate::partition::PartitionConfig;
+use crate::partition::{Partition, PartitionConfig};
+use crate::seed::derive;
 use crate::synthetic::SyntheticRoomConfig;
+use std::collections::BTreeMap;
 
 /// What to build.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,6 +50,46 @@ impl Default for DatasetConfig {
             rooms: PartitionConfig::default(),
             speakers: PartitionConfig::default(),
         }
+    }
+}
+
+impl DatasetConfig {
+    /// Checks the settings, and that speakers and measured rooms can be dealt out: before rooms are traced, which takes long.
+    ///
+    /// # Errors
+    /// Those that [`DatasetBuilder::new`](crate::DatasetBuilder::new) would have for the same speech and responses.
+    pub fn check(&self, speech: &SpeechCorpus, responses: &ResponseCorpus) -> Result<(), Error> {
+        self.check_settings()?;
+        self.speakers_of(speech)?;
+        self.rooms_of(responses).map(|_| ())
+    }
+
+    pub(crate) fn check_settings(&self) -> Result<(), Error> {
+        check("shard_clips", self.shard_clips as f64, 1.0, 65_536.0, "between 1 and 65536")?;
+        check("clips_per_response", self.clips_per_response as f64, 1.0, 64.0, "between 1 and 64")?;
+        for fraction in self.measured_fraction {
+            check("measured_fraction", fraction, 0.0, 1.0, "between 0 and 1")?;
+        }
+        for fraction in self.traced_fraction {
+            check("traced_fraction", fraction, 0.0, 1.0, "between 0 and 1")?;
+        }
+        for clips in self.clips {
+            check("clips", clips as f64, 0.0, 1e9, "at most a thousand million")?;
+        }
+        Ok(())
+    }
+
+    /// Partition of each speaker.
+    pub(crate) fn speakers_of(&self, speech: &SpeechCorpus) -> Result<BTreeMap<String, Partition>, Error> {
+        self.speakers.deal("speaker", "three partitions", &speech.speakers(), derive(self.seed, 11))
+    }
+
+    /// Partition of each measured room; none where no response is to be measured.
+    pub(crate) fn rooms_of(&self, responses: &ResponseCorpus) -> Result<BTreeMap<String, Partition>, Error> {
+        if self.measured_fraction.iter().all(|&f| f == 0.0) {
+            return Ok(BTreeMap::new());
+        }
+        self.rooms.deal("room", "three partitions", &responses.rooms(), derive(self.seed, 12))
     }
 }
 

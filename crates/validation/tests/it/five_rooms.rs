@@ -23,8 +23,8 @@ fn a_real_room_is_rendered_from_speech_and_from_its_response() {
     let output = five_rooms(&["--data", DATA, "--room", "bras", "--pairs", "1", "--rays", "1000"], &out);
     let printed = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{printed}{}", String::from_utf8_lossy(&output.stderr));
-    // As many as the model card counts: training, validation and test are dealt out as they were.
-    assert!(printed.contains("154 speakers") && printed.contains("23 of them to the test"), "{printed}");
+    // As many as the model card counts: training, validation and test are divided as they were.
+    assert!(printed.contains("154 speakers") && printed.contains("23 of them in the test"), "{printed}");
     let mean = |error: &str| -> Vec<f64> {
         let table = printed.split(&format!("| {error} |")).nth(1).unwrap();
         let line = table.lines().find(|line| line.starts_with("| **mean of all rooms")).unwrap();
