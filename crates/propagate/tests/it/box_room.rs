@@ -254,3 +254,31 @@ fn source_and_receiver_may_be_exchanged() {
         assert!(spread < 0.08 * a.value, "{range:?}: {a:?} {b:?}");
     }
 }
+
+/// Against image sources in air that absorbs.
+#[test]
+fn traces_last_until_t30_can_be_read_or_as_long_as_they_may() {
+    let scene = uniform_box(SIZE_M, one_band(), 0.1, 0.0);
+    let (air, materials) = (Air::default(), materials_of(&scene));
+    let conditions = Conditions::new(&materials, &air);
+    let at_most = |duration_s: f64| {
+        let config = TracerConfig { rays: 10_000, duration_s, ..TracerConfig::default() };
+        let tracer = PathTracer::new(config).unwrap();
+        let (from, to) = (source(SOURCE_M), receiver(RECEIVER_M));
+        let (paths, parameters) = tracer.trace_until_t30(&scene, &from, &to, &conditions, &()).unwrap();
+        (paths.max_length_m() / speed_m_s(), parameters.t30_s.values()[0].clone())
+    };
+    let per_m = air.energy_exponent_per_m(one_band()).values()[0];
+    let all = images(SIZE_M, SOURCE_M, RECEIVER_M, 2.5 * speed_m_s());
+    let mut energy = image_energy(&all, [0.9; 6], speed_m_s(), BIN_S, 2500);
+    for (bin, e) in energy.iter_mut().enumerate() {
+        *e *= (-per_m * (bin as f64 + 0.5) * BIN_S * speed_m_s()).exp();
+    }
+    let wanted_s = t30_s(&energy, BIN_S);
+    let (traced_s, t30) = at_most(20.0);
+    let t30 = t30.unwrap();
+    assert!(traced_s < 20.0 && (t30.value - wanted_s).abs() < 4.0 * t30.standard_error, "{traced_s} {t30:?}");
+    let (traced_s, t30) = at_most(0.5);
+    assert!((traced_s - 0.5).abs() < 1e-9, "{traced_s}");
+    assert!(matches!(t30, Err(NoReading::DynamicRange { .. })), "{t30:?}");
+}
