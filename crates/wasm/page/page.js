@@ -303,7 +303,11 @@ const VERDICTS = {
 
 function showDiagnosis(found) {
   const line = (tag, text) => Object.assign(document.createElement(tag), { textContent: text });
-  const parts = [line("p", `${VERDICTS[found.verdict] ?? found.verdict} (Probability of such a misfit by chance: ${found.lack_of_fit.p_value.toPrecision(2)}.)`)];
+  const p = found.lack_of_fit.p_value;
+  const chance = p < 0.001
+    ? "Chance still leaves less than 1 in 1000 for the misfit: something else is wrong, and what is named may stand in for it."
+    : `Probability of such a misfit by chance: ${p.toPrecision(2)}.`;
+  const parts = [line("p", `${VERDICTS[found.verdict] ?? found.verdict} ${chance}`)];
   for (const cause of found.causes) parts.push(line("p", `• ${cause.explanation} (probability ${cause.probability.toFixed(2)})`));
   for (const note of [...found.would_decide, ...found.notes]) parts.push(Object.assign(line("p", note), { className: "note" }));
   const table = document.createElement("table");
