@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use sabine::acoustics::{Material, Observer};
 use sabine::paths::{Conditions, PathParameters, PathSet, Propagator};
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
-use sabine::scene::{Receiver, Source};
+use sabine::scene::{DiffuseRoom, Receiver, Source};
 
 /// Longest time that is traced unless another is asked for, in seconds.
 const LONGEST_S: f64 = 20.0;
@@ -125,6 +125,8 @@ fn long_enough(
     if settings.duration_s.is_none() {
         return Ok(tracer.trace_until_t30(&room.scene, source, receiver, &conditions, observer)?);
     }
+    // Refuses volumes that no room has, as a mesh in another unit.
+    DiffuseRoom::of_scene(&room.scene, &room.air, room.bands())?;
     let paths = tracer.trace(&room.scene, source, receiver, &room.air, observer)?;
     let parameters = PathParameters::read(&paths, &conditions)?;
     Ok((paths, parameters))

@@ -24,7 +24,7 @@ use sabine::paths::{Conditions, PathParameters, PathSet, Propagator};
 use sabine::propagate::{
     AmbisonicRenderer, MeshReport, PathTracer, PressureRenderer, RenderConfig, TracerConfig,
 };
-use sabine::scene::{MeasuredRoom, Receiver, RoomNote, Source};
+use sabine::scene::{DiffuseRoom, MeasuredRoom, Receiver, RoomNote, Source};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -310,6 +310,8 @@ fn trace(
     let Some(asked_s) = asked_s else {
         return Ok(with(LONGEST_S)?.trace_until_t30(scene, source, receiver, conditions, bar)?);
     };
+    // Refuses volumes that no room has, as a mesh in another unit.
+    DiffuseRoom::of_scene(scene, &air, room.bands())?;
     let paths = with(asked_s)?.trace(scene, source, receiver, &air, bar)?;
     let parameters = PathParameters::read(&paths, conditions)?;
     Ok((paths, parameters))
