@@ -40,12 +40,16 @@ impl Part {
     }
 }
 
+/// Indices of the triangles that are tested at once.
+type Pack = [u32; TrianglePack::LANES];
+
 /// Gathers nodes and packs, each child behind its parent.
 pub(crate) struct Builder<'a> {
     triangles: &'a [(u32, [Vec3; 3])],
     items: Vec<Item>,
     nodes: Vec<WideNode>,
-    packs: Vec<TrianglePack>,
+    /// Indices of the triangles in each; `u32::MAX` for a lane without one.
+    packs: Vec<Pack>,
 }
 
 impl<'a> Builder<'a> {
@@ -64,7 +68,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Nodes, packs, and the number of nodes on the longest way down.
-    pub fn build(mut self) -> (Vec<WideNode>, Vec<TrianglePack>, usize) {
+    pub fn build(mut self) -> (Vec<WideNode>, Vec<Pack>, usize) {
         let bounds = self.items.iter().fold(Bounds::EMPTY, |b, item| b.joined(item.bounds));
         let levels = self.node(Part { first: 0, end: self.items.len(), bounds, splits: 0 });
         (self.nodes, self.packs, levels)
@@ -93,9 +97,11 @@ impl<'a> Builder<'a> {
             .map(|part| {
                 if part.len() <= TrianglePack::LANES {
                     let items = &self.items[part.first..part.end];
-                    let triangles: Vec<_> =
-                        items.iter().map(|item| self.triangles[item.position as usize]).collect();
-                    self.packs.push(TrianglePack::new(&triangles));
+                    let mut pack = [u32::MAX; TrianglePack::LANES];
+                    for (lane, item) in pack.iter_mut().zip(items) {
+                        *lane = self.triangles[item.position as usize].0;
+                    }
+                    self.packs.push(pack);
                     return (part.bounds, Child::Pack(self.packs.len() as u32 - 1));
                 }
                 let child = self.nodes.len() as u32;
@@ -212,7 +218,7 @@ mod tests {
     /// Every triangle is in one pack, and no way down is longer than the stack of a ray allows.
     fn check(triangles: &[Listed]) -> (usize, usize) {
         let (nodes, packs, levels) = Builder::new(triangles, 1e-5).build();
-        let mut found: Vec<u32> = packs.iter().flat_map(TrianglePack::triangles).collect();
+        let mut found: Vec<u32> = packs.as_flattened().iter().copied().filter(|&i| i != u32::MAX).collect();
         found.sort_unstable();
         assert_eq!(found, triangles.iter().map(|t| t.0).collect::<Vec<_>>());
         assert!(levels <= MAX_SPLITS as usize + 1, "{levels} levels");

@@ -1,14 +1,15 @@
 //! A triangle mesh behind a bounding volume hierarchy.
 
 use crate::Error;
-use crate::hierarchy::Hierarchy;
+use crate::hierarchy::{Hierarchy, Query};
+use crate::instructions::Instructions;
 use crate::merged_faces::merged;
 use crate::surfaces::{Surface, Surfaces, distance_to};
-use crate::vector::{Vec3, along, norm, sub};
+use crate::triangle_pack::ExactRay;
+use crate::vector::{Vec3, along, dot, sub};
 use crate::wide_node::LocalRay;
 use sabine_paths::{RayHit, RayScene};
 use sabine_scene::Scene;
-use std::ops::ControlFlow;
 
 /// The mesh of a [`Scene`], ready for rays: a bounding volume hierarchy chooses the candidates in single precision, a test
 /// in double precision decides.
@@ -82,14 +83,13 @@ impl MeshScene {
     }
 
     fn over(surfaces: Surfaces, merged: Option<Vec<Surface>>) -> Self {
+        Self::by(surfaces, merged, Instructions::best())
+    }
+
+    fn by(surfaces: Surfaces, merged: Option<Vec<Surface>>, instructions: Instructions) -> Self {
         let centre_m = surfaces.centre_m;
         let faces = merged.as_ref().unwrap_or(&surfaces.triangles);
-        let triangles: Vec<(u32, [Vec3; 3])> = (0..)
-            .zip(faces)
-            .filter(|(_, face)| !face.is_degenerate())
-            .map(|(i, face)| (i, [sub(face.corner, centre_m), face.edge1, face.edge2]))
-            .collect();
-        let hierarchy = Hierarchy::new(&triangles, surfaces.size_m);
+        let hierarchy = Hierarchy::new(faces, centre_m, surfaces.size_m, instructions);
         let flat = |i: &u32| surfaces.triangles[*i as usize].is_degenerate();
         let degenerate = (0..surfaces.triangles.len() as u32).filter(flat).collect();
         Self { surfaces, merged, hierarchy, degenerate, centre_m }
@@ -118,63 +118,29 @@ impl MeshScene {
         (triangle as usize, distance_m)
     }
 
-    /// The ray as the hierarchy sees it, and the distance along it at which that one begins: an origin far outside is
-    /// moved up to the mesh, so that single precision suffices.
+    /// An origin far outside is moved up to the mesh for the boxes, so that single precision suffices.
     #[inline]
-    fn local(&self, origin: Vec3, direction: Vec3) -> (LocalRay, f64) {
+    fn query(&self, origin: Vec3, direction: Vec3, max_distance: f64) -> Query {
         let from_centre = sub(origin, self.centre_m);
-        let away = norm(from_centre);
         let size_m = self.surfaces.size_m;
-        let skipped = if away > 2.0 * size_m { away - size_m } else { 0.0 };
-        (LocalRay::new(single(along(from_centre, direction, skipped)), single(direction)), skipped)
-    }
-
-    /// Calls `test` with the candidates up to `max_distance`, and goes on up to the distance that it returns.
-    #[inline]
-    fn candidates(
-        &self,
-        origin: Vec3,
-        direction: Vec3,
-        max_distance: f64,
-        mut test: impl FnMut(u32) -> ControlFlow<(), f64>,
-    ) {
-        let (ray, skipped) = self.local(origin, direction);
+        let away2 = dot(from_centre, from_centre);
+        let skipped_m = if away2 > 4.0 * size_m * size_m { away2.sqrt() - size_m } else { 0.0 };
+        let local = LocalRay::new(single(along(from_centre, direction, skipped_m)), single(direction));
+        let exact = ExactRay { origin, direction, agreement_m: self.surfaces.agreement_m };
         // No surface is further from the start of the local ray than three sizes of the mesh.
-        let furthest = 4.0 * self.surfaces.size_m;
-        let limit = |distance: f64| (distance - skipped).min(furthest) as f32;
-        self.hierarchy.visit(&ray, limit(max_distance), |i| test(i).map_continue(limit));
+        Query { exact, local, skipped_m, furthest_m: 4.0 * size_m, max_distance }
     }
 }
 
 impl RayScene for MeshScene {
+    #[inline]
     fn closest_hit(&self, origin: Vec3, direction: Vec3, max_distance: f64) -> Option<RayHit> {
-        let mut nearest: Option<RayHit> = None;
-        let mut limit = max_distance;
-        let faces = self.faces();
-        self.candidates(origin, direction, max_distance, |face| {
-            let face = &faces[face as usize];
-            if let Some(distance) = face.intersect(origin, direction)
-                && distance <= limit
-                && nearest.is_none_or(|hit| distance < hit.distance || face.triangle < hit.triangle)
-            {
-                nearest = Some(RayHit { distance, triangle: face.triangle });
-                limit = distance;
-            }
-            ControlFlow::Continue(limit)
-        });
-        nearest
+        self.hierarchy.closest(&self.query(origin, direction, max_distance))
     }
 
+    #[inline]
     fn any_hit(&self, origin: Vec3, direction: Vec3, max_distance: f64) -> bool {
-        let mut hit = false;
-        let faces = self.faces();
-        self.candidates(origin, direction, max_distance, |face| {
-            hit = faces[face as usize]
-                .intersect(origin, direction)
-                .is_some_and(|distance| distance <= max_distance);
-            if hit { ControlFlow::Break(()) } else { ControlFlow::Continue(max_distance) }
-        });
-        hit
+        self.hierarchy.any(&self.query(origin, direction, max_distance))
     }
 }
 
@@ -186,6 +152,7 @@ fn single(v: Vec3) -> [f32; 3] {
 mod tests {
     use super::*;
     use crate::random::{direction, generator};
+    use crate::vector::scale;
     use rand::Rng;
     use sabine_acoustics::{Bands, Material};
     use sabine_scene::{NamedMaterial, Triangle};
@@ -193,8 +160,7 @@ mod tests {
     #[test]
     fn the_nearest_triangle_is_that_of_a_plain_search() {
         let mut random = generator(11, 0);
-        let mut point =
-            |half: f64| crate::vector::scale(direction(&mut random), half * random.random::<f64>());
+        let mut point = |half: f64| scale(direction(&mut random), half * random.random::<f64>());
         let mut vertices = Vec::new();
         for i in 0..400 {
             let at = point(5.0);
@@ -219,5 +185,134 @@ mod tests {
             flat += usize::from(expected.0 % 10 == 0);
         }
         assert!(flat > 20, "{flat}");
+    }
+
+    /// Closed meshes around the origin of which every edge is shared: a finely meshed box whose vertices are moved in their planes, a ball, and
+    /// a turned ring of thin walls.
+    fn closed_meshes() -> [Scene; 3] {
+        let material = Material::uniform(Bands::T60, 0.1, 0.1).unwrap();
+        let scene = |vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>| {
+            let triangles = triangles.into_iter().map(|vertices| Triangle { vertices, material: 0 });
+            let materials = vec![NamedMaterial { name: "any".into(), material: material.clone() }];
+            Scene::new(vertices, triangles.collect(), materials).unwrap()
+        };
+        // Rows from pole to pole; the last row and the last column of a ring close on the first.
+        let grid = |rows: u32, columns: u32, at: &dyn Fn(f64, f64) -> Vec3| {
+            let vertices = (0..=rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
+            let vertices =
+                vertices.map(|(i, j)| at(f64::from(i) / f64::from(rows), f64::from(j) / f64::from(columns)));
+            let index = |i: u32, j: u32| i * columns + j % columns;
+            let cells = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
+            let triangles = cells.flat_map(|(i, j)| {
+                let [a, b, c, d] = [index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1)];
+                [[a, b, c], [a, c, d]]
+            });
+            scene(vertices.collect(), triangles.collect())
+        };
+        let ball = grid(9, 14, &|polar, azimuth| {
+            let (p, a) = (std::f64::consts::PI * polar, std::f64::consts::TAU * azimuth);
+            [3.0 * p.sin() * a.cos(), 2.0 * p.sin() * a.sin(), p.cos()]
+        });
+        // A cylinder whose ends are closed in rows of almost no height.
+        let ring = grid(9, 14, &|along, azimuth| {
+            let radius = [0.0, 0.7, 1.3, 2.0, 2.0, 2.0, 2.0, 1.1, 0.4, 0.0][(9.0 * along).round() as usize];
+            let height =
+                [-1.0, -1.0, -1.001, -1.0, -0.3, -0.29, 1.0, 1.0, 1.0, 1.0][(9.0 * along).round() as usize];
+            let a = std::f64::consts::TAU * azimuth + 0.1;
+            let [x, y, z] = [radius * a.cos(), radius * a.sin(), height];
+            [0.6 * x + 0.8 * z, y, 0.6 * z - 0.8 * x]
+        });
+        [cube(5, &scene), ball, ring]
+    }
+
+    /// A cube of 12 x `cells`^2 triangles with welded vertices.
+    fn cube(cells: u32, scene: &dyn Fn(Vec<Vec3>, Vec<[u32; 3]>) -> Scene) -> Scene {
+        let mut random = generator(12, 0);
+        let mut vertices: Vec<Vec3> = Vec::new();
+        let mut known = std::collections::HashMap::new();
+        let mut triangles = Vec::new();
+        for face in 0..6 {
+            let (axis, side) = (face % 3, if face < 3 { 0 } else { cells });
+            let mut corner = |i: u32, j: u32| {
+                let mut at = [side; 3];
+                (at[(axis + 1) % 3], at[(axis + 2) % 3]) = (i, j);
+                *known.entry(at).or_insert_with(|| {
+                    // Inner vertices move in their plane, by less than half a cell.
+                    let moved = at.map(|c| match c {
+                        0 => -1.5,
+                        c if c == cells => 1.5,
+                        c => 3.0 / f64::from(cells) * (f64::from(c) + random.random_range(-0.3..0.3)) - 1.5,
+                    });
+                    vertices.push(moved);
+                    vertices.len() as u32 - 1
+                })
+            };
+            for (i, j) in (0..cells).flat_map(|i| (0..cells).map(move |j| (i, j))) {
+                let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+                triangles.extend([[a, b, c], [a, c, d]]);
+            }
+        }
+        scene(vertices, triangles)
+    }
+
+    /// Rays from inside closed meshes into all directions, at edges, at vertices and along axes: all instructions and a plain search find the
+    /// same triangle at the same distance, to the bit, and none is lost. Returns the number of rays that were lost.
+    fn rays_lost(rays_for_each: u64) -> u64 {
+        let mut lost = 0;
+        for scene in closed_meshes() {
+            let plain = crate::BruteForceScene::new(&scene).unwrap();
+            let meshes: Vec<MeshScene> = Instructions::all()
+                .into_iter()
+                .map(|by| MeshScene::by(Surfaces::new(&scene).unwrap(), None, by))
+                .collect();
+            for ray in 0..rays_for_each {
+                let mut random = generator(13, ray);
+                let origin = scale(direction(&mut random), 0.2 * random.random::<f64>());
+                let [a, b, c] = scene.corners_m(random.random_range(0..scene.triangles().len()));
+                let (u, v) = match ray % 8 {
+                    0 | 1 => (random.random::<f64>(), 0.0),
+                    2 => (1.0, 0.0),
+                    3 => (0.5, 0.5),
+                    _ => (0.3, 0.3 * random.random::<f64>()),
+                };
+                let at = along(along(scale(a, 1.0 - u - v), b, u), c, v);
+                let heading = match ray % 8 {
+                    0..=3 => crate::vector::unit(sub(at, origin)),
+                    4 => [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]][(ray / 8 % 3) as usize],
+                    _ => direction(&mut random),
+                };
+                let expected = plain.closest_hit(origin, heading, f64::INFINITY);
+                lost += u64::from(expected.is_none());
+                let reach = expected.map_or(1.0, |hit| hit.distance);
+                for mesh in &meshes {
+                    assert_eq!(
+                        mesh.closest_hit(origin, heading, f64::INFINITY),
+                        expected,
+                        "{origin:?} {heading:?}"
+                    );
+                    assert_eq!(
+                        mesh.any_hit(origin, heading, reach),
+                        expected.is_some(),
+                        "{origin:?} {heading:?}"
+                    );
+                    assert!(!mesh.any_hit(origin, heading, reach.next_down()), "{origin:?} {heading:?}");
+                }
+            }
+        }
+        lost
+    }
+
+    #[test]
+    fn no_instructions_lose_a_ray_at_shared_edges() {
+        assert_eq!(rays_lost(400_000), 0); // in each of three meshes
+    }
+
+    #[test]
+    #[ignore = "nightly: 10^8 rays against a plain search take minutes"]
+    fn no_instructions_lose_one_of_many_rays() {
+        let rays = 33_400_000;
+        let lost = rays_lost(rays);
+        println!("{lost} of {} rays lost", 3 * rays);
+        assert_eq!(lost, 0);
     }
 }

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 /// Triangles smaller than this have no usable normal (m2).
 const LEAST_AREA_M2: f64 = 1e-12;
 /// Overlap of neighbouring triangles, as a share of their sides: closes the gap that rounding opens along shared edges.
-const OVERLAP: f64 = 1e-8;
+pub(crate) const OVERLAP: f64 = 1e-8;
 /// The two ways to compute where a ray meets a triangle, along the ray and across the triangle, agree to this share of the
 /// size of the scene. They always do, but for rays so nearly in the plane of a sliver that the distance is noise; a point
 /// far from its triangle would be found or not, depending on who looks for it.
@@ -35,6 +35,8 @@ pub(crate) struct Surface {
     pub triangle: u32,
     /// [`AGREEMENT`] in metres.
     pub agreement_m: f64,
+    /// Twice the area times the least cosine of incidence: rays in the plane miss.
+    pub least_determinant: f32,
 }
 
 impl Surface {
@@ -45,7 +47,18 @@ impl Surface {
         let length = norm(normal);
         let area_m2 = 0.5 * length;
         let normal = if area_m2 < LEAST_AREA_M2 { [0.0; 3] } else { scale(normal, 1.0 / length) };
-        Self { corner: a, edge1, edge2, normal, area_m2, material, plane: 0, triangle: 0, agreement_m: 0.0 }
+        Self {
+            corner: a,
+            edge1,
+            edge2,
+            normal,
+            area_m2,
+            material,
+            plane: 0,
+            triangle: 0,
+            agreement_m: 0.0,
+            least_determinant: (2e-12 * area_m2) as f32,
+        }
     }
 
     pub fn is_degenerate(&self) -> bool {
@@ -56,8 +69,7 @@ impl Surface {
     pub fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<f64> {
         let p = cross(direction, self.edge2);
         let determinant = dot(self.edge1, p);
-        // Twice the area times the cosine of incidence: rays in the plane miss.
-        if determinant.abs() <= 2e-12 * self.area_m2 || self.is_degenerate() {
+        if determinant.abs() <= f64::from(self.least_determinant) || self.is_degenerate() {
             return None;
         }
         let inverse = 1.0 / determinant;
@@ -112,6 +124,8 @@ pub(crate) struct Surfaces {
     pub centre_m: Vec3,
     /// Diagonal of that box.
     pub size_m: f64,
+    /// [`AGREEMENT`] in metres, as in each triangle.
+    pub agreement_m: f64,
 }
 
 impl Surfaces {
@@ -130,12 +144,13 @@ impl Surfaces {
             high = std::array::from_fn(|axis| high[axis].max(corner[axis]));
         }
         let size_m = norm(sub(high, low));
+        let agreement_m = AGREEMENT * size_m;
         for triangle in &mut triangles {
-            triangle.agreement_m = AGREEMENT * size_m;
+            triangle.agreement_m = agreement_m;
         }
         let planes = merge_coplanar(&mut triangles);
         let centre_m = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
-        Ok(Self { triangles, planes, centre_m, size_m })
+        Ok(Self { triangles, planes, centre_m, size_m, agreement_m })
     }
 }
 

@@ -1,113 +1,171 @@
-//! Four triangles that a ray is tested against at once, roughly.
+//! Four triangles that a ray is tested against at once.
 
+use crate::lanes::Lanes;
+use crate::surfaces::{OVERLAP, Surface};
 use crate::vector::Vec3;
-use crate::wide_node::LocalRay;
-use wide::f32x4;
 
-/// Four triangles in single precision, one to a lane: 176 bytes in three cache lines.
-///
-/// The test tells which of them deserve the exact one. It errs on one side only: it never drops a triangle that the exact
-/// test accepts.
+/// Four triangles, one to a lane: all that a hit needs, in five cache lines, and nothing else to wait for.
 #[derive(Clone, Copy, Debug)]
-#[repr(align(64))]
+#[repr(C, align(64))]
 pub(crate) struct TrianglePack {
-    corner: [f32x4; 3],
-    edge1: [f32x4; 3],
-    edge2: [f32x4; 3],
-    /// Longer of the two edges; negative for a lane without a triangle, which makes its tolerance negative too.
-    reach: f32x4,
-    triangles: [u32; 4],
+    corner: [[f64; 4]; 3],
+    edge1: [[f64; 4]; 3],
+    edge2: [[f64; 4]; 3],
+    /// As of [`Surface`]; infinite for a lane without a triangle, which nothing hits.
+    least_determinant: [f32; 4],
+    /// Numbers that hits report.
+    reported: [u32; 4],
+}
+
+/// A ray as packs see it.
+#[derive(Clone, Copy)]
+pub(crate) struct ExactRay {
+    pub origin: Vec3,
+    pub direction: Vec3,
+    /// As of [`Surface`], which is the same for all of a mesh.
+    pub agreement_m: f64,
 }
 
 impl TrianglePack {
     /// Size of a pack.
     pub const LANES: usize = 4;
 
-    /// Takes at most four triangles: index, first corner and the two edges from it.
-    pub fn new(triangles: &[(u32, [Vec3; 3])]) -> Self {
-        let mut rows = [[0.0f32; 4]; 9];
-        let mut reach = [-1.0f32; 4];
-        let mut indices = [0u32; 4];
-        for (lane, (index, vectors)) in triangles.iter().take(Self::LANES).enumerate() {
-            for (row, &value) in rows.iter_mut().zip(vectors.as_flattened()) {
-                row[lane] = value as f32;
+    /// Takes at most four triangles.
+    pub fn new<'a>(faces: impl IntoIterator<Item = &'a Surface>) -> Self {
+        let mut pack = Self {
+            corner: [[0.0; 4]; 3],
+            edge1: [[0.0; 4]; 3],
+            edge2: [[0.0; 4]; 3],
+            least_determinant: [f32::INFINITY; 4],
+            reported: [u32::MAX; 4],
+        };
+        for (lane, face) in faces.into_iter().take(Self::LANES).enumerate() {
+            for axis in 0..3 {
+                pack.corner[axis][lane] = face.corner[axis];
+                pack.edge1[axis][lane] = face.edge1[axis];
+                pack.edge2[axis][lane] = face.edge2[axis];
             }
-            let length = |v: Vec3| crate::vector::norm(v) as f32;
-            reach[lane] = length(vectors[1]).max(length(vectors[2]));
-            indices[lane] = *index;
+            pack.least_determinant[lane] = face.least_determinant;
+            pack.reported[lane] = face.triangle;
         }
-        let vector = |first: usize| std::array::from_fn(|i| f32x4::new(rows[first + i]));
-        Self {
-            corner: vector(0),
-            edge1: vector(3),
-            edge2: vector(6),
-            reach: f32x4::new(reach),
-            triangles: indices,
-        }
+        pack
     }
 
-    /// Index of the triangle in a lane.
-    #[inline]
-    pub fn triangle(&self, lane: u32) -> u32 {
-        self.triangles[lane as usize & 3]
+    /// The number that a hit of a lane reports.
+    #[inline(always)]
+    pub fn reported(&self, lane: usize) -> u32 {
+        self.reported[lane % Self::LANES]
     }
 
-    /// Indices of all triangles.
-    pub fn triangles(&self) -> impl Iterator<Item = u32> {
-        let reach = self.reach.to_array();
-        (0..Self::LANES).filter(move |&lane| reach[lane] >= 0.0).map(|lane| self.triangles[lane])
-    }
-
-    /// Lanes whose triangles the ray may meet no further than `limit`, as bits.
+    /// Lanes whose triangles the ray hits no further than `limit`, as bits, and at what distance.
     ///
-    /// This is the test of Moeller and Trumbore (1997) without its division: u, v and the distance stay multiplied by the
-    /// determinant. Rounding moves the first two by a few units in the last place of the size of the scene times the edge,
-    /// the third by as much times the edge once more, and `tolerance_m` is the size of the scene times what is more than
-    /// these few units. A determinant so small that its sign is wrong is smaller than the tolerance as well.
-    #[inline]
-    pub fn candidates(&self, ray: &LocalRay, limit: f32, tolerance_m: f32) -> u32 {
-        let p = cross(ray.direction, self.edge2);
-        let determinant = dot(self.edge1, p);
-        let sign = determinant & f32x4::splat(-0.0);
-        let size = determinant ^ sign;
-        let s = std::array::from_fn(|i| ray.origin[i] - self.corner[i]);
-        let u = dot(s, p) ^ sign;
-        let q = cross(s, self.edge1);
-        let v = dot(ray.direction, q) ^ sign;
-        let distance = dot(self.edge2, q) ^ sign;
-        let tolerance = self.reach * f32x4::splat(tolerance_m);
-        let inside = u.fast_min(v).fast_min(size - u - v).simd_ge(-tolerance);
-        let on_the_way = distance.fast_min(f32x4::splat(limit) * size - distance);
-        (inside & on_the_way.simd_ge(-tolerance * self.reach)).to_bitmask()
+    /// The same operations in the same order as [`Surface::intersect`], hence the same bits.
+    #[inline(always)]
+    pub fn hits<L: Lanes>(&self, lanes: L, ray: &ExactRay, limit: f64) -> (u32, [f64; 4]) {
+        let l = lanes;
+        // No `map` over arrays of vectors: the compiler may leave it outside, where the machine has no wide instructions.
+        let splat = |v: &Vec3| [l.doubles(v[0]), l.doubles(v[1]), l.doubles(v[2])];
+        let minus = |a: [L::Doubles; 3], b: [L::Doubles; 3]| {
+            [l.sub(a[0], b[0]), l.sub(a[1], b[1]), l.sub(a[2], b[2])]
+        };
+        let direction = splat(&ray.direction);
+        let row = |rows: &[[f64; 4]; 3]| [l.load(&rows[0]), l.load(&rows[1]), l.load(&rows[2])];
+        let (corner, edge1, edge2) = (row(&self.corner), row(&self.edge1), row(&self.edge2));
+        let p = cross(l, direction, edge2);
+        let determinant = dot(l, edge1, p);
+        let inverse = l.div(l.doubles(1.0), determinant);
+        let s = minus(splat(&ray.origin), corner);
+        let u = l.mul(dot(l, s, p), inverse);
+        let q = cross(l, s, edge1);
+        let v = l.mul(dot(l, direction, q), inverse);
+        let (low, high) = (l.doubles(-OVERLAP), l.doubles(1.0 + OVERLAP));
+        let inside = l.both(
+            l.both(l.at_most(low, u), l.at_most(u, high)),
+            l.both(l.at_most(low, v), l.at_most(l.add(u, v), high)),
+        );
+        let inside = l.both(inside, l.below(l.widened(&self.least_determinant), l.abs(determinant)));
+        let distance = l.mul(dot(l, edge2, q), inverse);
+        let on_the_way = l.both(l.below(l.doubles(0.0), distance), l.at_most(distance, l.doubles(limit)));
+        let mut hit = l.both(inside, on_the_way);
+        if l.bits(hit) == 0 {
+            return (0, [0.0; 4]);
+        }
+        let agreement = l.doubles(ray.agreement_m);
+        for k in 0..3 {
+            let along = l.add(s[k], l.mul(distance, direction[k]));
+            let apart = l.sub(l.sub(along, l.mul(u, edge1[k])), l.mul(v, edge2[k]));
+            hit = l.both(hit, l.at_most(l.abs(apart), agreement));
+        }
+        (l.bits(hit), l.store(distance))
     }
 }
 
-#[inline]
-fn cross(a: [f32x4; 3], b: [f32x4; 3]) -> [f32x4; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+#[inline(always)]
+fn cross<L: Lanes>(l: L, a: [L::Doubles; 3], b: [L::Doubles; 3]) -> [L::Doubles; 3] {
+    let minor = |i: usize, j: usize| l.sub(l.mul(a[i], b[j]), l.mul(a[j], b[i]));
+    [minor(1, 2), minor(2, 0), minor(0, 1)]
 }
 
-#[inline]
-fn dot(a: [f32x4; 3], b: [f32x4; 3]) -> f32x4 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+#[inline(always)]
+fn dot<L: Lanes>(l: L, a: [L::Doubles; 3], b: [L::Doubles; 3]) -> L::Doubles {
+    l.add(l.add(l.mul(a[0], b[0]), l.mul(a[1], b[1])), l.mul(a[2], b[2]))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::instructions::{Instructions, Work};
+    use crate::random::{direction, generator};
+    use crate::vector::{along, norm, scale, sub, unit};
+    use rand::Rng;
 
+    struct Hits<'a>(&'a TrianglePack, &'a ExactRay, f64);
+
+    impl Work for Hits<'_> {
+        type Output = (u32, [f64; TrianglePack::LANES]);
+
+        #[inline(always)]
+        fn run<L: Lanes>(self, lanes: L) -> Self::Output {
+            self.0.hits(lanes, self.1, self.2)
+        }
+    }
+
+    /// Each lane, of any instructions, answers as the triangle by itself does, to the bit: at edges, at vertices and in its plane, too.
     #[test]
-    fn candidates_are_what_the_ray_may_meet() {
-        let at = |x: f64| [[x, -1.0, -1.0], [0.0, 3.0, 0.0], [0.0, 0.0, 3.0]];
-        let pack = TrianglePack::new(&[(7, at(1.0)), (3, at(4.0)), (5, at(-2.0))]);
-        let mask = |direction: [f32; 3], limit: f32| {
-            pack.candidates(&LocalRay::new([0.0; 3], direction), limit, 1e-4)
-        };
-        assert_eq!(mask([1.0, 0.0, 0.0], 10.0), 0b011); // the empty lane never
-        assert_eq!(mask([1.0, 0.0, 0.0], 2.0), 0b001);
-        assert_eq!(mask([-1.0, 0.0, 0.0], 10.0), 0b100);
-        assert_eq!(mask([0.0, 1.0, 0.0], 10.0), 0);
-        assert_eq!((pack.triangle(0), pack.triangle(1), pack.triangle(2)), (7, 3, 5));
-        assert_eq!(pack.triangles().collect::<Vec<_>>(), [7, 3, 5]);
+    fn lanes_answer_as_single_triangles_do() {
+        let mut random = generator(5, 0);
+        let agreement_m = 1e-5;
+        let mut hits = 0;
+        for round in 0..20_000 {
+            let count = 1 + round % TrianglePack::LANES;
+            let faces: Vec<Surface> = (0..count as u32)
+                .map(|triangle| {
+                    let at = scale(direction(&mut random), 2.0);
+                    let corners =
+                        [at, along(at, direction(&mut random), 1.0), along(at, direction(&mut random), 1.0)];
+                    Surface { triangle: 7 + triangle, agreement_m, ..Surface::new(corners, 0) }
+                })
+                .collect();
+            let origin = scale(direction(&mut random), 3.0);
+            let aimed_at = &faces[round % count];
+            let (u, v) = [(0.0, 0.0), (0.3, 0.0), (0.5, 0.5), (0.2, 0.3), (1.0, 0.0)][round % 5];
+            let target = along(along(aimed_at.corner, aimed_at.edge1, u), aimed_at.edge2, v);
+            let origin = if round % 7 == 0 { along(target, aimed_at.edge1, 2.0) } else { origin };
+            let ray = ExactRay { origin, direction: unit(sub(target, origin)), agreement_m };
+            let limit = norm(sub(target, origin)) * random.random_range(0.9..1.5);
+            let pack = TrianglePack::new(&faces);
+            for by in Instructions::all() {
+                let (met, distances) = by.run(Hits(&pack, &ray, limit));
+                for lane in 0..TrianglePack::LANES {
+                    let alone = faces.get(lane).and_then(|face| face.intersect(origin, ray.direction));
+                    let expected = alone.filter(|&distance| distance <= limit);
+                    let found = (met >> lane & 1 == 1).then_some(distances[lane]);
+                    assert_eq!(found, expected, "round {round}, lane {lane}, {by:?}");
+                    hits += usize::from(found.is_some());
+                }
+            }
+            assert_eq!(pack.reported(count - 1), 6 + count as u32);
+        }
+        assert!(hits > 20_000, "{hits}");
     }
 }
