@@ -156,10 +156,10 @@ mod tests {
             let pack = TrianglePack::new(&faces);
             for by in Instructions::all() {
                 let (met, distances) = by.run(Hits(&pack, &ray, limit));
-                for lane in 0..TrianglePack::LANES {
+                for (lane, &distance) in distances.iter().enumerate() {
                     let alone = faces.get(lane).and_then(|face| face.intersect(origin, ray.direction));
-                    let expected = alone.filter(|&distance| distance <= limit);
-                    let found = (met >> lane & 1 == 1).then_some(distances[lane]);
+                    let expected = alone.filter(|&d| d <= limit);
+                    let found = (met >> lane & 1 == 1).then_some(distance);
                     assert_eq!(found, expected, "round {round}, lane {lane}, {by:?}");
                     hits += usize::from(found.is_some());
                 }
