@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 ///
 /// Read are SOFA files (.sofa) of the conventions SingleRoomSRIR and SingleRoomMIMOSRIR, tables of sound files and positions (.csv),
 /// and single responses: text exported by REW (.txt), sound (.wav and others), or a measurement of REW while it runs
-/// (http://127.0.0.1:4735/measurements/1).
+/// (`http://127.0.0.1:4735/measurements/1`).
 #[derive(Args)]
 pub struct Arguments {
     /// The measurements
