@@ -80,6 +80,7 @@
 //!
 //! # Features
 //! - `symphonia`: FLAC, Ogg Vorbis and AIFF wherever sound is read.
+//! - `rew-http`: responses from the Room EQ Wizard while it runs.
 //! - `sofa`: head-related responses from AES69 (SOFA) files.
 //!
 //! # Reference

@@ -205,6 +205,26 @@ pub enum Error {
         /// Convention and version that were found.
         found: String,
     },
+    /// A program that does not answer at this address.
+    #[cfg(feature = "rew-http")]
+    #[error("{address}: no answer: {source}")]
+    Http {
+        /// The address.
+        address: String,
+        /// Why.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// An answer that is a refusal.
+    #[cfg(feature = "rew-http")]
+    #[error("{address}: answers with status {status}: {text}")]
+    HttpStatus {
+        /// The address.
+        address: String,
+        /// The status: 404 where there is no such measurement.
+        status: u16,
+        /// The beginning of the answer.
+        text: String,
+    },
     /// Something that a file must have.
     #[error("is missing")]
     Missing,

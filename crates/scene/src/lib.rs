@@ -61,11 +61,13 @@
 //! | OBJ files | as `tobj` reads them | `tests/it/obj_against_tobj.rs` |
 //! | rooms from and to disk | every fault of the format has its error; a written room reads as it was | `tests/it/measured_rooms.rs`, `tests/it/room_reading.rs` |
 //! | SOFA files | those of Python's `sofar` to the bit; written ones read by `sofar`, `netCDF4`, `h5py` | `tests/it/sofa_files.rs`, `docs/validation/peers/sofa_peers.py` |
+//! | answers of REW's local interface | to the bit; refusals, silence, damage each have their error (a mock server; no REW was at hand) | `tests/it/rew_server.rs` |
 //! | hostile sizes | refused before memory is taken | `tests/it/hostile_sizes.rs` |
 //!
 //! # Features
 //! - `rooms` (default): room folders and tables of materials.
 //! - `gltf`: [`Mesh::read`] reads glTF and GLB besides OBJ.
+//! - `rew-http`: responses from the Room EQ Wizard while it runs ([`Measurements::read_rew`]).
 //! - `sofa`: room responses from and to SOFA files (AES69).
 //! - `tables`: tables of sound files and positions (CSV).
 //!

@@ -4,6 +4,8 @@ mod file_names;
 #[cfg(any(feature = "sofa", feature = "tables"))]
 mod places;
 mod rew;
+#[cfg(feature = "rew-http")]
+mod rew_http;
 #[cfg(feature = "sofa")]
 mod sofa;
 #[cfg(feature = "tables")]
@@ -157,6 +159,30 @@ impl Measurements {
     ) -> Result<Self, Error> {
         let path = path.as_ref();
         Self::single(path, Sound::read(path)?, source, receiver, options)
+    }
+
+    /// Fetches one response from the Room EQ Wizard (REW) while it runs, through its local interface.
+    ///
+    /// `address` is `http://127.0.0.1:4735/measurements/ID` with the index of the measurement in the list, from 1, or its identifier
+    /// (UUID). Without `/ID` the error lists what is loaded. Samples are in full scale, as REW's text has them; time zero is as in
+    /// [`Measurements::read_single`]. Nothing in REW is changed. At most 128 MiB are taken and a minute is waited; redirections are
+    /// not followed, and no proxy is asked.
+    ///
+    /// # Errors
+    /// [`Error::Http`] where nobody answers, [`Error::HttpStatus`] for an answer that is a refusal; [`Error::InFile`] naming the address
+    /// and the field, with the cause [`Error::Unit`] for an address of something else, an answer that is no JSON, another unit than
+    /// percent or data that are not base64, [`Error::Missing`], [`Error::Shape`] for data that are cut short, [`Error::TooManyValues`],
+    /// [`sabine_acoustics::Error::NotFinite`], [`sabine_acoustics::Error::OutOfRange`]; what [`MeasuredRoom::load_response`] says of sound
+    /// that is no response.
+    #[cfg(feature = "rew-http")]
+    pub fn read_rew(
+        address: &str,
+        source: Source,
+        receiver: Receiver,
+        options: &ImportOptions,
+    ) -> Result<Self, Error> {
+        let fetched = Sound::Text(rew_http::fetch(address)?);
+        Self::single(Path::new(address), fetched, source, receiver, options)
     }
 
     /// As [`Measurements::read_single`], from the bytes of a file; `name` is its name, whose ending counts.

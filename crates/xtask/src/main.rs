@@ -5,6 +5,7 @@ mod error;
 mod job;
 mod new_effect;
 mod nightly;
+mod packages;
 mod quick;
 mod validation;
 mod workspace;
@@ -29,6 +30,8 @@ enum Chore {
     Gate,
     /// What the gate has no time for: long tests, features one by one, the least Rust version, packages
     Nightly(nightly::Arguments),
+    /// Pack, unpack, build and test every published crate without the repository
+    Packages(packages::Arguments),
     /// Write a new effect of the diagnosis and say what is left to do
     NewEffect(new_effect::Arguments),
     /// Run the benches and keep their medians, or compare them with kept ones
@@ -43,6 +46,7 @@ fn run(chore: &Chore) -> Result<(), Error> {
         Chore::Check => quick::run(&root),
         Chore::Gate => job::Job::new("the gate", "bash", &[".ci/run"]).run(&root).map(|_| ()),
         Chore::Nightly(arguments) => nightly::run(&root, arguments),
+        Chore::Packages(arguments) => packages::run(&root, arguments),
         Chore::NewEffect(arguments) => new_effect::run(&root, arguments),
         Chore::Bench(arguments) => bench::run(&root, arguments),
         Chore::Validation(arguments) => validation::run(&root, arguments),

@@ -27,6 +27,7 @@ pub struct Workspace {
 pub struct Package {
     /// Its name.
     pub name: String,
+    version: String,
     /// Least Rust version, `1.89`.
     pub rust_version: Option<String>,
     /// Features, and what each turns on.
@@ -52,6 +53,11 @@ impl Package {
     /// Whether users get it from a registry.
     pub fn is_published(&self) -> bool {
         self.publish.is_none()
+    }
+
+    /// `sabine-scene-0.1.0`: what its package is called.
+    pub fn name_and_version(&self) -> String {
+        format!("{}-{}", self.name, self.version)
     }
 }
 

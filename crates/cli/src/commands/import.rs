@@ -13,7 +13,8 @@ use std::path::{Path, PathBuf};
 /// Make a measured room of files of other programs.
 ///
 /// Read are SOFA files (.sofa) of the conventions SingleRoomSRIR and SingleRoomMIMOSRIR, tables of sound files and positions (.csv),
-/// and single responses: text exported by REW (.txt) or sound (.wav and others).
+/// and single responses: text exported by REW (.txt), sound (.wav and others), or a measurement of REW while it runs
+/// (`http://127.0.0.1:4735/measurements/1`).
 #[derive(Args)]
 pub struct Arguments {
     /// The measurements
@@ -140,6 +141,9 @@ fn read(arguments: &Arguments, options: &ImportOptions) -> Result<Measurements, 
             let receiver = one(receiver, "receiver")?;
             let source = Source { id: source.0, position_m: source.1, axis: None };
             let receiver = Receiver { id: receiver.0, position_m: receiver.1, axis: None };
+            if let Some(address) = file.to_str().filter(|name| name.contains("://")) {
+                return Ok(Measurements::read_rew(address, source, receiver, options)?);
+            }
             Ok(Measurements::read_single(file, source, receiver, options)?)
         }
         _ => {

@@ -1,7 +1,9 @@
 //! Measurements of other programs into a room, and out of it.
 
 use crate::sabine;
+use base64::Engine as _;
 use sabine::scene::{Levels, MeasuredRoom, TimeZero};
+use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::Output;
 use tempfile::TempDir;
@@ -165,6 +167,34 @@ fn rew_text_and_tables_go_in() {
     std::fs::write(folder.join("t.csv"), table.replace("3,5", "13,5")).unwrap();
     let text = refused(folder, &run(folder, "import", &["t.csv", "--size", "6x5x3", "--out", "other"]), 4);
     assert!(text.contains("receiver \"r1\" at [13.5, 2.0, 1.2] m is outside"), "{text}");
+}
+
+#[test]
+fn a_measurement_comes_from_rew_while_it_runs() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let samples: Vec<f32> =
+        (0..6000).map(|i| if i < 60 { 0.0 } else { 0.75 * 0.5f32.powi((i - 60) / 200) }).collect();
+    let bytes: Vec<u8> = samples.iter().flat_map(|sample| (100.0 * sample).to_be_bytes()).collect();
+    let data = base64::engine::general_purpose::STANDARD.encode(bytes);
+    let body = format!(r#"{{"unit": "percent", "startTime": 0.0, "sampleRate": 16000, "data": "{data}"}}"#);
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("http://{}/measurements/1", listener.local_addr().unwrap());
+    let server = std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        let mut head = BufReader::new(stream.try_clone().unwrap()).lines();
+        while head.next().is_some_and(|line| !line.unwrap().is_empty()) {}
+        let length = body.len();
+        write!(stream, "HTTP/1.1 200 OK\r\nContent-Length: {length}\r\n\r\n{body}").unwrap();
+    });
+    let places = ["--source", "stage=1,2,1.5", "--receiver", "seat=3.5,2,1.2"];
+    printed(&run(folder, "import", &[&[&address, "--size", "6x5x3", "--out", "room"][..], &places].concat()));
+    server.join().unwrap();
+    let room = MeasuredRoom::read(folder.join("room")).unwrap();
+    assert!(room.load_response(0).unwrap().samples() == samples);
+    let text =
+        refused(folder, &run(folder, "import", &[&[&address, "--out", "other"][..], &places].concat()), 1);
+    assert!(text.contains("no answer"), "{text}");
 }
 
 #[test]

@@ -16,6 +16,8 @@ mod position_tables;
 #[cfg(unix)]
 #[path = "../../../acoustics/tests/faults/process.rs"]
 mod process;
+#[cfg(feature = "rew-http")]
+mod rew_server;
 #[cfg(feature = "rooms")]
 mod room_reading;
 #[cfg(feature = "sofa")]

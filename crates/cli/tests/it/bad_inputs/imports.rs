@@ -76,6 +76,11 @@ pub fn cases() -> Vec<Case> {
         ("wav/nan.wav", places, Refused(&["nan.wav"])),
         ("wav/good.wav", "--size 6x5x3", Refused(&["--source X,Y,Z"])),
         ("none.sofa", "", Refused(&["none.sofa"])),
+        // Port 1 belongs to a service of 1988 that nobody runs.
+        ("http://127.0.0.1:1/measurements/1", places, Refused(&["127.0.0.1:1/measurements/1", "no answer"])),
+        ("http://127.0.0.1:1/measurements/1?x", places, Refused(&["address", "address of one measurement"])),
+        ("https://127.0.0.1:1/measurements/1", places, Refused(&["address", "address of one measurement"])),
+        ("http://127.0.0.1:1", "--size 6x5x3", Refused(&["--source X,Y,Z"])),
     ] {
         let size = if more == places { " --size 6x5x3" } else { "" };
         let named = format!("import {file} {more}");
