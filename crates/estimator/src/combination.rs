@@ -242,11 +242,10 @@ mod tests {
             let pivot = (k..n).max_by(|i, j| a[*i][k].abs().total_cmp(&a[*j][k].abs())).unwrap_or(k);
             a.swap(k, pivot);
             b.swap(k, pivot);
+            let upper = a[k].clone();
             for i in k + 1..n {
-                let factor = a[i][k] / a[k][k];
-                for j in k..n {
-                    a[i][j] -= factor * a[k][j];
-                }
+                let factor = a[i][k] / upper[k];
+                a[i].iter_mut().zip(&upper).skip(k).for_each(|(own, above)| *own -= factor * above);
                 b[i] -= factor * b[k];
             }
         }

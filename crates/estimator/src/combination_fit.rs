@@ -104,7 +104,7 @@ impl Combination {
                 self.eq_deviation[level] = quantile / QUANTILE_90;
             }
         }
-        for label in 0..T60_COUNT {
+        for (label, windows) in windows.iter().enumerate().take(T60_COUNT) {
             let coverage = |correlation: f64| {
                 let mut trial = self.clone();
                 trial.t60_correlation[label] = correlation;
@@ -113,7 +113,7 @@ impl Combination {
                     cases.iter().filter(|(k, r)| r.len() > 1 && !k.place.labels[label].is_nan())
                 {
                     let truth = scale.encode(label, k.place.labels[label]);
-                    let (mean, deviation) = trial.t60_joint(recordings, label, windows[label]);
+                    let (mean, deviation) = trial.t60_joint(recordings, label, *windows);
                     covered += if (mean - truth).abs() <= QUANTILE_90 * deviation { k.weight } else { 0.0 };
                     total += k.weight;
                 }
@@ -297,7 +297,7 @@ mod tests {
                 }
             }
             let labels = std::array::from_fn(|k| k.checked_sub(T60_COUNT).map_or(1.0, |l| levels[l]));
-            let measured = number % 2 == 0;
+            let measured = number.is_multiple_of(2);
             HeardPlace { room: format!("room {number}"), measured, is_judged: true, labels, recordings }
         };
         (0..rooms).map(place).collect()
