@@ -28,6 +28,14 @@ pub enum Error {
         /// Largest magnitude; full scale is 1.
         peak: f32,
     },
+    /// There is nothing to join.
+    #[error("there are no recordings to combine")]
+    NoRecordings,
+    /// The weights do not say how recordings of one room are joined, or what they say is no distribution.
+    #[error(
+        "the weights do not say how recordings of one room are combined: `combination` is missing or no distribution"
+    )]
+    NoCombination,
     /// The recording is beyond anything that is sound.
     #[error("the recording's peak is {peak:.1e} of full scale; at most 1e10 (200 dB) can be heard")]
     TooLoud {

@@ -1,6 +1,7 @@
 //! From a recording to the targets of a room.
 
 use crate::Error;
+use crate::cues::GroupLevels;
 use crate::labels::LABEL_COUNT;
 use crate::layout::Normalisation;
 use crate::model::Model;
@@ -197,7 +198,10 @@ impl Estimator {
     /// Hears one window of levels in dB, `[mel][frame]`, and overwrites it.
     pub(crate) fn hear(&self, first: usize, window_db: &mut [f32], scratch: &mut Scratch) -> HeardWindow {
         limit_range(window_db);
-        let loudness = Loudness::of(window_db, self.model.layout.frames);
+        let groups = GroupLevels::of(window_db, self.model.layout.frames);
+        let total_db = groups.total_db();
+        let cues = groups.cues(window_db, &total_db);
+        let loudness = Loudness::of(total_db);
         self.model.normalisation.apply(window_db);
         let mut statistics = Vec::new();
         spectrum(window_db, self.model.layout.frames, &mut statistics);
@@ -212,7 +216,7 @@ impl Estimator {
             }),
             novelty,
         };
-        HeardWindow { first, loudness, output }
+        HeardWindow { first, loudness, output, cues }
     }
 }
 

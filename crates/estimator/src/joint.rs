@@ -1,8 +1,9 @@
 //! One answer from many windows.
 
 use crate::estimator::Estimator;
+use crate::evidence::Evidence;
 use crate::labels::{LABEL_COUNT, T60_COUNT, label_hz, per_band};
-use crate::warning::Warning;
+use crate::warning::{Warning, of_sounds};
 use crate::window_estimate::{DetailedEstimate, HeardWindow, WindowEstimate};
 use crate::windows::Loudness;
 use crate::{Error, WeightsFault};
@@ -21,13 +22,19 @@ pub(crate) struct JointLabel {
 impl JointLabel {
     /// The mean weighted by precision and `weights`.
     pub fn new(heard: &[HeardWindow], weights: &[f64], label: usize) -> Self {
+        Self::of_readings(heard.iter().zip(weights).map(|(window, weight)| {
+            (window.output.mean[label], window.output.deviation[label].powi(2), *weight)
+        }))
+    }
+
+    /// The same of readings, each with its variance and its weight.
+    pub fn of_readings(readings: impl Iterator<Item = (f64, f64, f64)>) -> Self {
         let (mut total, mut squares, mut mean, mut variance) = (0.0, 0.0, 0.0, 0.0);
-        for (window, weight) in heard.iter().zip(weights) {
-            let own = window.output.deviation[label].powi(2);
+        for (value, own, weight) in readings {
             let precision = weight / own;
             total += precision;
             squares += precision * precision;
-            mean += precision * window.output.mean[label];
+            mean += precision * value;
             variance += precision * own;
         }
         Self { mean: mean / total, variance: variance / total, windows: total * total / squares }
@@ -45,6 +52,16 @@ pub(crate) fn weigh(heard: &[HeardWindow]) -> Vec<f64> {
     let loudest_db = heard.iter().map(|h| h.loudness.high_db).fold(f64::NEG_INFINITY, f64::max);
     let weight = |loudness: &Loudness| if loudness.is_active(loudest_db) { loudness.weight() } else { 0.0 };
     heard.iter().map(|h| weight(&h.loudness)).collect()
+}
+
+/// Means of the cues of the windows that count.
+fn mean_cues(heard: &[HeardWindow], weights: &[f64]) -> Vec<f64> {
+    let count = weights.iter().filter(|w| **w > 0.0).count().max(1) as f64;
+    let mut mean = vec![0.0; heard.first().map_or(0, |h| h.cues.len())];
+    for (window, _) in heard.iter().zip(weights).filter(|(_, w)| **w > 0.0) {
+        mean.iter_mut().zip(&window.cues).for_each(|(mean, cue)| *mean += cue / count);
+    }
+    mean
 }
 
 impl Estimator {
@@ -71,6 +88,13 @@ impl Estimator {
         }
         let joint: [JointLabel; LABEL_COUNT] =
             std::array::from_fn(|label| JointLabel::new(heard, &weights, label));
+        let evidence = Evidence::new(joint, mean_cues(heard, &weights));
+        if let Some(detectors) = &self.model.detectors {
+            // 1 kHz is the fourth octave from 125 Hz.
+            let high_s = calibration.t60_range_s[3][1];
+            let clipped = warnings.iter().any(|warning| matches!(warning, Warning::Clipped { .. }));
+            warnings.extend(of_sounds(&detectors.heard(&evidence), clipped, high_s));
+        }
         let targets = self.targets(|label| {
             (joint[label].mean, joint[label].deviation(calibration.window_correlation[label]))
         })?;
@@ -94,11 +118,11 @@ impl Estimator {
                 })
             })
             .collect::<Result<_, Error>>()?;
-        Ok(DetailedEstimate { targets, windows, warnings })
+        Ok(DetailedEstimate { targets, windows, warnings, evidence })
     }
 
     /// Targets from a mean and a deviation of each label on the network's scale.
-    fn targets(&self, label: impl Fn(usize) -> (f64, f64)) -> Result<RoomTargets, Error> {
+    pub(crate) fn targets(&self, label: impl Fn(usize) -> (f64, f64)) -> Result<RoomTargets, Error> {
         let labels: Vec<_> = (0..LABEL_COUNT)
             .map(|k| {
                 let (mean, deviation) = label(k);

@@ -38,6 +38,7 @@
 //! | an answer with its standard errors | [`Estimator::pretrained`], [`RoomEstimator::estimate`](sabine_acoustics::RoomEstimator::estimate) |
 //! | the windows it is made of, and reasons for doubt | [`Estimator::estimate_detailed`], [`Warning`] |
 //! | many recordings at once | [`Estimator::estimate_batch`] |
+//! | several recordings of one room, other talkers in each | [`Estimator::combine`] |
 //! | a live stream | [`LiveEstimator`] |
 //! | a guess to compare with | [`ConstantEstimator`] |
 //! | training | [`Dataset`], [`TrainConfig`], [`Trainer`] |
@@ -72,13 +73,19 @@ mod block;
 mod calibrate;
 mod checkpoint;
 mod checksum;
+mod combination;
+mod combination_fit;
+mod combine;
 mod config;
 mod constant;
 mod correlate;
+mod cues;
 mod dataset;
+mod detectors;
 mod error;
 mod estimator;
 mod evaluation;
+mod evidence;
 mod graph;
 mod joint;
 mod labels;
@@ -102,12 +109,16 @@ mod window_estimate;
 mod windows;
 
 pub use checksum::add_checksum;
+pub use combination::Combination;
+pub use combination_fit::HeardPlace;
 pub use config::{Block, NetworkConfig, Summary};
 pub use constant::ConstantEstimator;
 pub use dataset::{Clip, Dataset, Partition};
+pub use detectors::{Detectors, Sound};
 pub use error::{DatasetFault, Error, WeightsFault};
 pub use estimator::{Estimator, LEAST_DURATION_S};
 pub use evaluation::{Errors, Evaluation, RoomMean, Selection};
+pub use evidence::Evidence;
 pub use labels::{EQ_COUNT, LABEL_COUNT, LabelScale, T60_COUNT, T60Scale, label_hz, label_name};
 pub use layout::{FeatureLayout, Normalisation};
 pub use live::LiveEstimator;

@@ -1,7 +1,9 @@
 //! Everything that an estimator needs to know, in one file.
 
 use crate::checksum::{FIELD, seal, verify};
+use crate::combination::Combination;
 use crate::config::NetworkConfig;
+use crate::detectors::Detectors;
 use crate::labels::{LABEL_COUNT, LabelScale, T60_COUNT, T60Scale};
 use crate::layout::{FeatureLayout, Normalisation};
 use crate::parameters::Parameters;
@@ -46,6 +48,10 @@ pub struct Model {
     pub labels: LabelScale,
     /// Trust.
     pub calibration: Calibration,
+    /// How recordings of one room are joined; files without it are read, too.
+    pub combination: Option<Combination>,
+    /// What hears music, noise and the like; files without it are read, too.
+    pub detectors: Option<Detectors>,
     /// The network's numbers; it has 13 outputs, or 26 if it learned the logarithm of its own variance as well.
     pub parameters: Parameters,
 }
@@ -95,7 +101,10 @@ impl Model {
             };
             arrays.push((format!("network.{name}"), shape, dtype, bytes));
         }
-        for (name, values) in self.vectors() {
+        let mut vectors = self.vectors();
+        vectors.extend(self.combination.iter().flat_map(|c| c.parts().map(|(name, _, v)| (name, v.clone()))));
+        vectors.extend(self.detectors.iter().flat_map(|d| d.parts().map(|(name, v)| (name, v.clone()))));
+        for (name, values) in vectors {
             let bytes = values.iter().flat_map(|v| (*v as f32).to_le_bytes()).collect();
             arrays.push((name.into(), vec![values.len()], Dtype::F32, bytes));
         }
@@ -187,7 +196,13 @@ impl Model {
                 expected: "0 to 1".into(),
             }));
         }
+        // A file has all of a part or nothing of it.
+        let has = |beginning: &str| tensors.names().iter().any(|name| name.starts_with(beginning));
+        let combination = has("combination.").then(|| Combination::read(wide)).transpose()?;
+        let detectors = has("detectors.").then(|| Detectors::read(wide)).transpose()?;
         Ok(Self {
+            combination,
+            detectors,
             normalisation: Normalisation {
                 mean_db: vector("normalisation.mean_db", mels)?,
                 deviation_db: deviation_db.into_iter().map(|v| v as f32).collect(),

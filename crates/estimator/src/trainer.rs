@@ -147,6 +147,8 @@ impl<'a> Trainer<'a> {
             normalisation: self.normalisation.clone(),
             labels: self.labels.clone(),
             calibration: Calibration::uncalibrated(mels),
+            combination: None,
+            detectors: None,
             parameters: parameters.clone(),
         }
     }

@@ -1,5 +1,6 @@
 //! What a listener should know about an estimate.
 
+use crate::detectors::Sound;
 use std::fmt;
 
 /// A reason to trust an estimate less. `Display` says it in words.
@@ -48,6 +49,21 @@ pub enum Warning {
         /// Upper end of the range in seconds.
         high_s: f64,
     },
+    /// There is noise and no speech in it.
+    NoiseAlone,
+    /// It sounds like music.
+    Music,
+    /// A telephone, a codec or a low sample rate has left nothing of the treble.
+    BandLimited,
+    /// More than one person seems to speak at a time.
+    SeveralTalkers,
+    /// The room seems to be more reverberant than those that were trained on: estimates stay below what is true.
+    LongDecay {
+        /// Longest reverberation time at 1 kHz that was trained on, in seconds.
+        high_s: f64,
+    },
+    /// The speech seems to have no room around it.
+    Dry,
     /// The sound is unlike the speech that was trained on.
     Unfamiliar {
         /// How far from it: root-mean-square of the standardised long-term statistics.
@@ -78,6 +94,23 @@ impl fmt::Display for Warning {
                 f,
                 "{band_hz} Hz: T60 of {t60_s:.2} s is at the edge of the {low_s:.2} to {high_s:.2} s that were trained on"
             ),
+            Self::NoiseAlone => f.write_str(
+                "noise without speech: record somebody who speaks, nearer to the microphone than now",
+            ),
+            Self::Music => f.write_str("music rather than speech: the network knows speech alone; record somebody who speaks"),
+            Self::BandLimited => f.write_str(
+                "hardly anything above 4 to 5.5 kHz: a telephone, a codec or a low sample rate; octaves there are guessed, and the others suffer: record at 16 kHz or more without compression",
+            ),
+            Self::SeveralTalkers => f.write_str(
+                "several people seem to speak at once: record one after another, and combine the recordings",
+            ),
+            Self::LongDecay { high_s } => write!(
+                f,
+                "the room seems to be more reverberant than the {high_s:.1} s that were trained on: reverberation times are too short; measure an impulse response"
+            ),
+            Self::Dry => f.write_str(
+                "the speech seems to have no room around it: a booth, or a microphone close to the mouth; move it away",
+            ),
             Self::Unfamiliar { novelty, limit } => {
                 write!(
                     f,
@@ -85,5 +118,40 @@ impl fmt::Display for Warning {
                 )
             }
         }
+    }
+}
+
+/// Warnings of what was heard. Noise and music say all: what else seems to be there is not to be relied on; and a clipped voice sounds
+/// like several.
+pub(crate) fn of_sounds(heard: &[Sound], clipped: bool, high_s: f64) -> Vec<Warning> {
+    let warning = |sound: &Sound| match sound {
+        Sound::Noise => Warning::NoiseAlone,
+        Sound::Music => Warning::Music,
+        Sound::Telephone | Sound::BandLimited => Warning::BandLimited,
+        Sound::SeveralTalkers => Warning::SeveralTalkers,
+        Sound::LongDecay => Warning::LongDecay { high_s },
+        Sound::Dry => Warning::Dry,
+    };
+    if let Some(sound) = [Sound::Noise, Sound::Music].iter().find(|sound| heard.contains(sound)) {
+        return vec![warning(sound)];
+    }
+    let relied_on = heard.iter().filter(|sound| !(clipped && **sound == Sound::SeveralTalkers));
+    let mut warnings: Vec<Warning> = relied_on.map(warning).collect();
+    warnings.dedup();
+    warnings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_and_music_say_all_and_a_telephone_is_said_once() {
+        let said = |heard: &[Sound], clipped| of_sounds(heard, clipped, 2.5);
+        assert_eq!(said(&[Sound::Music, Sound::SeveralTalkers, Sound::LongDecay], false), [Warning::Music]);
+        assert_eq!(said(&[Sound::Telephone, Sound::BandLimited], false), [Warning::BandLimited]);
+        let both = [Sound::SeveralTalkers, Sound::LongDecay];
+        assert_eq!(said(&both, true), [Warning::LongDecay { high_s: 2.5 }]);
+        assert_eq!(said(&both, false).len(), 2);
     }
 }

@@ -1,5 +1,6 @@
 //! What the windows of a recording say, before and after they are joined.
 
+use crate::evidence::Evidence;
 use crate::labels::LABEL_COUNT;
 use crate::warning::Warning;
 use crate::windows::Loudness;
@@ -25,6 +26,8 @@ pub struct DetailedEstimate {
     pub windows: Vec<WindowEstimate>,
     /// Reasons to trust it less.
     pub warnings: Vec<Warning>,
+    /// What the recording says apart from what rooms are like in general, for [`Estimator::combine`](crate::Estimator::combine).
+    pub evidence: Evidence,
 }
 
 /// What one window says, on the scale of the network.
@@ -45,4 +48,6 @@ pub(crate) struct HeardWindow {
     pub first: usize,
     pub loudness: Loudness,
     pub output: WindowOutput,
+    /// Cues for warnings; none of small windows.
+    pub cues: Vec<f64>,
 }

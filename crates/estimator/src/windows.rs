@@ -42,15 +42,8 @@ pub(crate) struct Loudness {
 }
 
 impl Loudness {
-    /// Of levels in dB `[mel][frame]`: the power of a frame is the sum over its bands.
-    pub fn of(window_db: &[f32], frames: usize) -> Self {
-        let mut levels = vec![0.0f64; frames];
-        for row in window_db.chunks_exact(frames) {
-            for (power, db) in levels.iter_mut().zip(row) {
-                *power += 10f64.powf(f64::from(*db) / 10.0);
-            }
-        }
-        levels.iter_mut().for_each(|level| *level = 10.0 * level.log10());
+    /// Of the levels of frames in dB.
+    pub fn of(mut levels: Vec<f64>) -> Self {
         levels.sort_by(f64::total_cmp);
         let at = |share: f64| levels[((levels.len() - 1) as f64 * share).round() as usize];
         Self { high_db: at(0.95), range_db: at(0.95) - at(0.05) }

@@ -106,6 +106,14 @@ class Estimate(unittest.TestCase):
         self.assertEqual(found.eq_db.at(1000), 0.0)
         self.assertEqual(found.warnings, ("resampled from 22050 to 16000 Hz",))
 
+    def test_two_recordings_of_a_room_are_surer_than_one(self):
+        speech, rate_hz = read_wav(FIXTURES / "speech/recording.wav")
+        halves = [speech[: len(speech) // 2], speech[len(speech) // 2 :]]
+        one, both = sabine.estimate(halves[0], rate_hz), sabine.estimate(halves, rate_hz)
+        self.assertLess(both.t60_s.standard_error[3], one.t60_s.standard_error[3])
+        self.assertLess(both.eq_db.standard_error[2], one.eq_db.standard_error[2])
+        self.assertTrue(all(warning.startswith("recording ") for warning in both.warnings))
+
 
 class Trace(unittest.TestCase):
     def test_a_diffuse_box_decays_as_eyring_says(self):

@@ -1,12 +1,12 @@
 //! Estimates reverberation time and equalisation from recordings of speech.
 //!
-//! `sabine estimate FILE... [--json F]`
+//! `sabine estimate FILE... [--one-room] [--json F]`
 
 use crate::channel::channel;
 use crate::failure::Failure;
 use clap::Args;
-use sabine::acoustics::{AudioReader, Channel, write_atomically};
-use sabine::estimator::{DetailedEstimate, Estimator, LABEL_COUNT, T60_COUNT, label_hz};
+use sabine::acoustics::{AudioReader, Channel, RoomTargets, write_atomically};
+use sabine::estimator::{Estimator, LABEL_COUNT, T60_COUNT, Warning, label_hz};
 use serde::Serialize;
 use std::io::Write;
 use std::path::PathBuf;
@@ -17,6 +17,9 @@ pub struct Arguments {
     /// Recordings, 1 s or longer.
     #[arg(required = true)]
     files: Vec<PathBuf>,
+    /// The recordings are of one place in one room, best each by another talker: say what they tell together, too.
+    #[arg(long)]
+    one_room: bool,
     /// Channel of files that have several, from 0, or `mean`; without it they must be mono
     #[arg(long, value_name = "N|mean", value_parser = channel)]
     channel: Option<Channel>,
@@ -31,10 +34,14 @@ pub struct Arguments {
 /// Quantile of a normal distribution that leaves 5 % on either side.
 const NORMAL_90: f64 = 1.645;
 
-/// One recording in the JSON file; octaves rise from 125 Hz (T60) and from 62.5 Hz (EQ, without 1 kHz).
+/// One recording in the JSON file, or all of one room; octaves rise from 125 Hz (T60) and from 62.5 Hz (EQ, without 1 kHz).
 #[derive(Serialize)]
 struct Entry {
-    file: PathBuf,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    file: Option<PathBuf>,
+    /// Files that are combined.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    combined: Vec<PathBuf>,
     t60_s: Vec<f64>,
     t60_sd_s: Vec<f64>,
     /// Ends of the 90 % intervals, log-normal.
@@ -54,7 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(path) => Estimator::from_file(path)?,
         None => Estimator::pretrained()?,
     };
-    let mut entries = Vec::new();
+    let (mut entries, mut heard) = (Vec::new(), Vec::new());
     for file in &arguments.files {
         let name = |error: &dyn std::fmt::Display| format!("{}: {error}", file.display());
         let channel = arguments.channel.unwrap_or_default();
@@ -63,8 +70,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             Err(error @ sabine::estimator::Error::Acoustics(_)) => return Err(error.into()),
             other => other.map_err(|error| name(&error))?,
         };
-        let entry = entry(file.clone(), &estimate);
-        print(&entry);
+        let entry = Entry { file: Some(file.clone()), ..entry(&estimate.targets, &estimate.warnings) };
+        print(&file.display().to_string(), &entry);
+        entries.push(entry);
+        heard.push(estimate);
+    }
+    if arguments.one_room {
+        let combined = arguments.files.clone();
+        let entry = Entry { combined, ..entry(&estimator.combine(&heard)?, &[]) };
+        print(&format!("{} recordings of one room", heard.len()), &entry);
         entries.push(entry);
     }
     if let Some(path) = &arguments.json {
@@ -74,23 +88,24 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-fn entry(file: PathBuf, estimate: &DetailedEstimate) -> Entry {
-    let (t60, eq) = (estimate.targets.t60_s(), estimate.targets.eq_db());
+fn entry(targets: &RoomTargets, warnings: &[Warning]) -> Entry {
+    let (t60, eq) = (targets.t60_s(), targets.eq_db());
     let levels = || eq.iter().filter(|(hz, _)| *hz != 1000.0);
     Entry {
-        file,
+        file: None,
+        combined: Vec::new(),
         t60_s: t60.values().iter().map(|e| e.value).collect(),
         t60_sd_s: t60.values().iter().map(|e| e.standard_error).collect(),
         t60_low_s: t60.values().iter().map(|e| e.log_normal_interval(NORMAL_90).0).collect(),
         t60_high_s: t60.values().iter().map(|e| e.log_normal_interval(NORMAL_90).1).collect(),
         eq_db: levels().map(|(_, e)| e.value).collect(),
         eq_sd_db: levels().map(|(_, e)| e.standard_error).collect(),
-        warnings: estimate.warnings.iter().map(ToString::to_string).collect(),
+        warnings: warnings.iter().map(ToString::to_string).collect(),
     }
 }
 
-fn print(entry: &Entry) {
-    println!("{}", entry.file.display());
+fn print(title: &str, entry: &Entry) {
+    println!("{title}");
     for label in 0..T60_COUNT {
         println!(
             "  {:>6} Hz  T60 {:.2} s, 90 % within {:.2} to {:.2} s",

@@ -6,6 +6,7 @@
 mod bad_inputs;
 mod console;
 mod diagnose;
+mod estimate;
 mod exchange;
 #[cfg(unix)]
 mod faults;

@@ -11,5 +11,6 @@ mod odd_layouts;
 #[cfg(unix)]
 #[path = "../../../acoustics/tests/faults/process.rs"]
 mod process;
+mod several;
 mod support;
 mod training;

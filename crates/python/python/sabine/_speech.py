@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Tuple
 
+import numpy as np
+
 from . import _inputs, _plots, _sabine
 from ._readings import Readings
 
@@ -37,15 +39,18 @@ def estimate(speech, sample_rate: float) -> SpeechEstimate:
     deep acoustic analysis, IEEE TVCG 26 (5), 2020.
 
     Args:
-        speech: the recording, shape (samples,), 1 s or longer; full scale is 1.
+        speech: the recording, shape (samples,), 1 s or longer; full scale is 1. A list or tuple of recordings is taken for one place in one
+            room, best with another talker in each, and answered together.
         sample_rate: samples per second, 16 kHz or more.
 
     Raises:
         ValueError: the recording is empty, too short, silent, too loud, not finite, or of another shape or type; the sample rate
             is too low.
     """
-    samples, sample_rate = _inputs.samples(speech, "speech"), _inputs.number(sample_rate, "sample_rate")
-    heard = _sabine.estimate(samples, sample_rate)
+    # A list of numbers is one recording.
+    several = isinstance(speech, (list, tuple)) and len(speech) > 0 and isinstance(speech[0], np.ndarray)
+    recordings = [_inputs.samples(one, "speech") for one in (speech if several else [speech])]
+    heard = _sabine.estimate(recordings, _inputs.number(sample_rate, "sample_rate"))
     return SpeechEstimate(
         t60_s=Readings._of(heard["t60_bands_hz"], heard["t60_s"]),
         eq_db=Readings._of(heard["eq_bands_hz"], heard["eq_db"]),
