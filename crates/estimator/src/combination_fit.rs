@@ -22,7 +22,7 @@ const LEAST_VARIANCE: f64 = 1e-2;
 pub struct HeardPlace {
     /// Name of the room.
     pub room: String,
-    /// Whether the room was measured: measured and simulated rooms count half each, rooms of a kind alike.
+    /// Whether the room was measured: measured and simulated rooms count half each, rooms of a kind equally.
     pub measured: bool,
     /// Whether the network can be judged there: not where it was trained. Labels count for the prior all the same.
     pub is_judged: bool,
@@ -163,7 +163,7 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// The judged places with missing levels as the prior expects them from those that are known, and weights with which both kinds of
-/// rooms count alike.
+/// rooms count equally.
 fn known<'a>(
     scale: &LabelScale,
     places: &'a [HeardPlace],

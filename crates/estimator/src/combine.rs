@@ -11,7 +11,10 @@ impl Estimator {
     /// its own, and what rooms are like in general is taken into account once ([`Combination`](crate::Combination)). The order does not
     /// matter.
     ///
-    /// `docs/validation/estimator.md` says what it gains. A single recording is answered, too: its equalisation then rests on the prior of rooms in place of that of the training.
+    /// In eight measured rooms to 1.5 s the equalisation of five talkers was 2.19 dB off in clips of 4 s and 2.39 dB in 12 s, where the mean of
+    /// five answers was 2.20 and 2.14 dB off; in 124 simulated rooms 2.40 and 2.37 dB for 2.76 and 2.74. Its 90 % intervals held 81 to 86 %
+    /// (`docs/validation/estimator.md`). A single recording is answered, too: its equalisation then rests on the prior
+    /// of rooms in place of that of the training.
     ///
     /// ```
     /// use sabine_acoustics::Signal;

@@ -121,8 +121,8 @@ impl fmt::Display for Warning {
     }
 }
 
-/// Warnings of what was heard. Noise and music say all: what else seems to be there is not to be relied on; and a clipped voice sounds
-/// like several.
+/// Warnings of what was heard. Noise and music say all: what else seems to be there is not to be relied on; a clipped voice sounds
+/// like several, and so does one without high octaves.
 pub(crate) fn of_sounds(heard: &[Sound], clipped: bool, high_s: f64) -> Vec<Warning> {
     let warning = |sound: &Sound| match sound {
         Sound::Noise => Warning::NoiseAlone,
@@ -135,7 +135,9 @@ pub(crate) fn of_sounds(heard: &[Sound], clipped: bool, high_s: f64) -> Vec<Warn
     if let Some(sound) = [Sound::Noise, Sound::Music].iter().find(|sound| heard.contains(sound)) {
         return vec![warning(sound)];
     }
-    let relied_on = heard.iter().filter(|sound| !(clipped && **sound == Sound::SeveralTalkers));
+    let distorted =
+        clipped || [Sound::Telephone, Sound::BandLimited].iter().any(|sound| heard.contains(sound));
+    let relied_on = heard.iter().filter(|sound| !(distorted && **sound == Sound::SeveralTalkers));
     let mut warnings: Vec<Warning> = relied_on.map(warning).collect();
     warnings.dedup();
     warnings
@@ -150,6 +152,7 @@ mod tests {
         let said = |heard: &[Sound], clipped| of_sounds(heard, clipped, 2.5);
         assert_eq!(said(&[Sound::Music, Sound::SeveralTalkers, Sound::LongDecay], false), [Warning::Music]);
         assert_eq!(said(&[Sound::Telephone, Sound::BandLimited], false), [Warning::BandLimited]);
+        assert_eq!(said(&[Sound::Telephone, Sound::SeveralTalkers], false), [Warning::BandLimited]);
         let both = [Sound::SeveralTalkers, Sound::LongDecay];
         assert_eq!(said(&both, true), [Warning::LongDecay { high_s: 2.5 }]);
         assert_eq!(said(&both, false).len(), 2);

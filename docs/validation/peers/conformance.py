@@ -9,7 +9,7 @@ Needs Python 3.13, numpy, soundfile, phonometry 4.0.0rc1 (`pip install --pre pho
 of pyrato, whose tests hold a measured response and its modulation transfer by WinMF; without it that row is left out.
 
 The cases are closed forms of phonometry's tests (room/test_acoustics.py, test_auditorium.py, test_auditorium_lateral.py,
-speech/test_sti.py) and of pyrato's (tests/test_parameters.py, test_parameters_rt.py), made anew here. pyrato's are decay curves; a
+speech/test_sti.py) and of pyrato's (tests/test_parameters.py, test_parameters_rt.py), written again here. pyrato's are decay curves; a
 response with that decay is made of each. Some of phonometry's are of the full band, where we read the quantity in octaves only: the same
 figure is then expected of each octave that the case leaves whole, and the row says which. The peers read the same samples, phonometry as
 its own test calls it. One row a case: the number of figures, the largest difference of each program from what the case prints, and our bound.
@@ -267,7 +267,7 @@ def ears():
         return np.concatenate([numbers(found[n]) for n in names])
 
     x, shift = noise(1.0, 0.5, 31), round(0.0005 * RATE)
-    for right, case in ((x, "both ears alike"), (-x, "in opposite phase"), (4.0 * x, "one four times as loud")):
+    for right, case in ((x, "both ears equal"), (-x, "in opposite phase"), (4.0 * x, "one four times as loud")):
         row("IACC", f"{case} (phonometry), octaves, whole, early, late", np.ones(18), mine(x, right), theirs(x, right), None, 0.01)
     y = noise(1.0, 0.5, 34)
     late = np.concatenate([np.zeros(shift), y])[: y.size]

@@ -194,7 +194,7 @@ fn plain_json(text: &str) -> String {
     plain
 }
 
-/// The beginning of a text of strangers, on one line.
+/// The beginning of a text from outside, on one line.
 fn shortened(text: &str) -> String {
     let mut short = String::new();
     for c in text.trim().chars().take(MAX_REPEATED) {
