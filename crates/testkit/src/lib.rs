@@ -10,6 +10,7 @@
 //! - [`Phonons`]: particles in any closed mesh, as energy with standard errors and as pressure: the truth behind the
 //!   recording in `fixtures/`.
 //! - [`Laboratory`]: random rooms, measured with any of the effects of [`Hidden`] at work.
+//! - [`PolyhedralRoom`]: random rooms that are no box, by image sources in any mesh and particles.
 //! - [`ScreenedRoom`]: random rooms with a screen, measured by [`WaveGrid`].
 //! - [`assert_close`], [`assert_all_close`], [`assert_within_standard_errors`], [`read_golden`]: tolerances that say what they allow.
 //!
@@ -42,6 +43,7 @@ mod geometry;
 mod laboratory;
 mod own_air;
 mod phonons;
+mod polyhedra;
 mod shoebox;
 mod tolerance;
 mod wave_grid;
@@ -53,6 +55,7 @@ pub use laboratory::{
     TrueMicrophone, TrueSession, TrueSource, Truth,
 };
 pub use phonons::{PhononConfig, PhononEnergy, Phonons};
+pub use polyhedra::{MovedWall, Planted, PolyhedralConfig, PolyhedralRoom, Polyhedron};
 pub use shoebox::{Image, ShoeboxImages};
 pub use tolerance::{assert_all_close, assert_close, assert_within_standard_errors, read_golden};
 pub use wave_grid::{GridResponse, ThinScreen, WaveGrid};

@@ -156,7 +156,26 @@ fn doubtful(
     if let Some(worst) = unsettled(search, state, &found.more_with_half)? {
         return Ok(Some((worst, Doubt::Rays)));
     }
-    Ok(least_confirmed(search, state, predicted).map(|worst| (worst, Doubt::Elsewhere)))
+    let rests_on_tables = state
+        .chosen
+        .iter()
+        .map(|&candidate| rests_on_tables(search, state, candidate))
+        .collect::<Result<Vec<bool>, _>>()?;
+    Ok(least_confirmed(search, state, predicted, &rests_on_tables).map(|worst| (worst, Doubt::Elsewhere)))
+}
+
+/// Whether a cause says that a table is wrong, and takes more strain off the tables than it brings the decays nearer: at positions left out a
+/// model that strains all tables predicts as well, and only what was stated speaks against it.
+fn rests_on_tables(search: &Search<'_>, state: &State, candidate: usize) -> Result<bool, Error> {
+    let relaxes = &search.candidates[candidate].case.relaxes;
+    if !relaxes.iter().any(|(nuisance, _)| matches!(nuisance, Nuisance::Absorption(_))) {
+        return Ok(false);
+    }
+    let rest: Vec<usize> = state.chosen.iter().copied().filter(|&c| c != candidate).collect();
+    let without = search.state(&rest, Some(state))?;
+    let decays = state.energy.log_likelihood - without.energy.log_likelihood;
+    let all = state.energy.log_posterior - without.energy.log_posterior;
+    Ok(all > 0.0 && decays < 0.5 * all)
 }
 
 /// A cause that bears on decays alone, and for which those above the Schroeder frequency do not speak. Below it neither paths nor waves
@@ -192,8 +211,14 @@ fn is_of_decays_alone(candidate: &Candidate<'_>) -> bool {
         && case.channel_change().is_none()
 }
 
-/// The cause at work everywhere that gains least at positions which the fit has not seen, if chance may explain even that.
-fn least_confirmed(search: &Search<'_>, state: &State, predicted: &Predicted) -> Option<usize> {
+/// The cause at work everywhere that gains least at positions which the fit has not seen, if chance may explain even that. One that rests on
+/// the tables need not gain there, but may not lose.
+fn least_confirmed(
+    search: &Search<'_>,
+    state: &State,
+    predicted: &Predicted,
+    rests_on_tables: &[bool],
+) -> Option<usize> {
     let everywhere = |c: &usize| {
         let case = search.candidates[*c].case;
         let local = |(nuisance, _): &(Nuisance, f64)| {
@@ -216,7 +241,9 @@ fn least_confirmed(search: &Search<'_>, state: &State, predicted: &Predicted) ->
         // Likelier bins under decays that lie farther off: the cause stands for something else.
         let farther = MAX_RMSE_RATIO * after > before;
         let gains = gain.low > 0.0 || predicted.gains_everywhere[place];
-        (gains && !farther) || (gain.nats_per_bin > 0.0 && nearer)
+        (gains && !farther)
+            || (gain.nats_per_bin > 0.0 && nearer)
+            || (rests_on_tables[place] && gain.high > 0.0 && !farther)
     };
     (0..predicted.gains.len())
         .filter(|&place| everywhere(&state.chosen[place]) && !helps(place))
@@ -274,7 +301,11 @@ mod tests {
                 diffuse_rmse_db: vec![diffuse_rmse_db],
                 ..Predicted::default()
             };
-            assert_eq!(least_confirmed(&search, &state, &predicted), doubted, "{diffuse_rmse_db:?}");
+            assert_eq!(
+                least_confirmed(&search, &state, &predicted, &[false]),
+                doubted,
+                "{diffuse_rmse_db:?}"
+            );
         }
     }
 }

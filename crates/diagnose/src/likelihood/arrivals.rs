@@ -105,7 +105,7 @@ impl<'a> ArrivalModel<'a> {
         priors.extend(vec![Prior::normal(0.0, latency_sd_s); layout.latencies()]);
         let cases = cases.iter().copied().enumerate();
         let all = ModelTerms::new(priors, cases, survey, |nuisance| layout.nuisance(nuisance));
-        let ModelTerms { priors, terms, assignment } = all;
+        let ModelTerms { priors, terms, assignment, .. } = all;
         Self { data, layout, terms, priors, used, assignment, width_s: None }
     }
 

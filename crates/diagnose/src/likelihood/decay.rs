@@ -18,7 +18,7 @@ pub(crate) use offsets::{DRIFTS, unit_drift};
 use pair_likelihood::ComparedBand;
 
 use crate::effect::{Case, Parameter, Stage};
-use crate::likelihood::laplace::{Model, Prior, Slopes};
+use crate::likelihood::laplace::{Model, Prior, Slopes, Together};
 use crate::likelihood::parameters::{DecayLayout, ModelTerm, ModelTerms};
 use crate::observe::observed_response::Measured;
 use crate::simulate::band_state::BandState;
@@ -79,6 +79,7 @@ pub(crate) struct EnergyModel<'a> {
     pub layout: DecayLayout,
     pub terms: Vec<ModelTerm<'a>>,
     priors: Vec<Prior>,
+    together: Vec<Together>,
     /// Pairs that count.
     used: &'a [bool],
     /// Which response holds which pair.
@@ -117,8 +118,8 @@ impl<'a> EnergyModel<'a> {
         let mut ordered: Vec<(usize, &Case)> = cases.iter().copied().enumerate().collect();
         ordered.sort_by_key(|(_, c)| c.stage);
         let all = ModelTerms::new(priors, ordered, survey, |nuisance| layout.nuisance(nuisance));
-        let ModelTerms { priors, terms, assignment } = all;
-        Self { data, layout, terms, priors, used, assignment }
+        let ModelTerms { priors, together, terms, assignment } = all;
+        Self { data, layout, terms, priors, together, used, assignment }
     }
 
     /// Values to start from: those of another fit as far as they go, and the effect's.
@@ -356,6 +357,10 @@ impl<'a> EnergyModel<'a> {
 impl Model for EnergyModel<'_> {
     fn priors(&self) -> &[Prior] {
         &self.priors
+    }
+
+    fn together(&self) -> &[Together] {
+        &self.together
     }
 
     fn log_likelihood(&self, values: &[f64], slopes: Option<&mut Slopes>) -> f64 {

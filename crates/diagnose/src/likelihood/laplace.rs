@@ -3,6 +3,7 @@
 use crate::effect::Parameter;
 use crate::error::Error;
 use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 
 /// What is known of a parameter beforehand.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +23,78 @@ impl Prior {
     pub fn of(parameter: &Parameter) -> Self {
         let (low, high) = parameter.bounds;
         Self { mean: parameter.neutral, sd: parameter.prior_sd, low, high }
+    }
+}
+
+/// Parameters, one behind the other, whose priors go together: the inverse of their correlation.
+#[derive(Clone, Debug)]
+pub(crate) struct Together {
+    pub range: Range<usize>,
+    inverse: DMatrix<f64>,
+    half_log_determinant: f64,
+}
+
+impl Together {
+    /// `None` where the matrix is no correlation of that many parameters.
+    pub fn new(range: Range<usize>, correlation: DMatrix<f64>) -> Option<Self> {
+        if correlation.shape() != (range.len(), range.len()) {
+            return None;
+        }
+        let factor = correlation.cholesky()?;
+        let half_log_determinant = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
+        Some(Self { range, inverse: factor.inverse(), half_log_determinant })
+    }
+}
+
+/// The normal densities of all parameters beforehand: each independent, but for those that go together.
+#[derive(Clone, Copy)]
+pub(crate) struct Priors<'a> {
+    each: &'a [Prior],
+    together: &'a [Together],
+}
+
+impl<'a> Priors<'a> {
+    fn of(model: &'a dyn Model) -> Self {
+        Self { each: model.priors(), together: model.together() }
+    }
+
+    /// Visits the inverse of the covariance: row, column, value.
+    fn for_each(&self, mut visit: impl FnMut(usize, usize, f64)) {
+        let mut alone = vec![true; self.each.len()];
+        for block in self.together {
+            for (i, a) in block.range.clone().enumerate() {
+                alone[a] = false;
+                for (j, b) in block.range.clone().enumerate() {
+                    visit(a, b, block.inverse[(i, j)] / (self.each[a].sd * self.each[b].sd));
+                }
+            }
+        }
+        let alone = alone.iter().enumerate().filter(|(_, alone)| **alone);
+        alone.for_each(|(i, _)| visit(i, i, self.each[i].sd.powi(-2)));
+    }
+
+    /// Logarithm of the density, constants left out.
+    fn penalty(&self, x: &[f64]) -> f64 {
+        let off = |i: usize| x[i] - self.each[i].mean;
+        let mut sum = 0.0;
+        self.for_each(|i, j, inverse| sum -= 0.5 * off(i) * inverse * off(j));
+        sum
+    }
+
+    /// Adds its gradient.
+    fn pull(&self, x: &[f64], gradient: &mut DVector<f64>) {
+        self.for_each(|i, j, inverse| gradient[i] -= inverse * (x[j] - self.each[j].mean));
+    }
+
+    /// Adds the inverse of the covariance.
+    fn add_to(&self, information: &mut DMatrix<f64>) {
+        self.for_each(|i, j, inverse| information[(i, j)] += inverse);
+    }
+
+    /// Half the logarithm of the determinant of the covariance.
+    fn log_volume(&self) -> f64 {
+        let alone: f64 = self.each.iter().map(|p| p.sd.ln()).sum();
+        alone + self.together.iter().map(|block| block.half_log_determinant).sum::<f64>()
     }
 }
 
@@ -56,6 +129,10 @@ impl Slopes {
 /// A log-likelihood of parameters with priors.
 pub(crate) trait Model {
     fn priors(&self) -> &[Prior];
+    /// Parameters whose priors go together.
+    fn together(&self) -> &[Together] {
+        &[]
+    }
     /// Log-likelihood, its slopes added where wanted.
     fn log_likelihood(&self, values: &[f64], slopes: Option<&mut Slopes>) -> f64;
 }
@@ -94,17 +171,16 @@ const PROMISED_NATS: f64 = 1e-3;
 pub(crate) fn maximise(model: &dyn Model, start: &[f64], what: &'static str) -> Result<LaplaceFit, Error> {
     let priors = model.priors();
     let n = priors.len();
-    let penalty =
-        |x: &[f64]| -> f64 { x.iter().zip(priors).map(|(x, p)| -0.5 * ((x - p.mean) / p.sd).powi(2)).sum() };
+    let known = Priors::of(model);
     let mut x: Vec<f64> = start.iter().zip(priors).map(|(x, p)| x.clamp(p.low, p.high)).collect();
     let [mut slopes, mut tried_slopes] = [(); 2].map(|()| Slopes::zero(n));
     let mut damping = FIRST_DAMPING;
     let mut converged = false;
     let mut likelihood = fill(model, &x, &mut slopes);
     'steps: for _ in 0..MAX_STEPS {
-        let value = likelihood + penalty(&x);
-        let gradient = &slopes.gradient
-            + DVector::from_iterator(n, x.iter().zip(priors).map(|(x, p)| (p.mean - x) / (p.sd * p.sd)));
+        let value = likelihood + known.penalty(&x);
+        let mut gradient = slopes.gradient.clone();
+        known.pull(&x, &mut gradient);
         let held: Vec<bool> = (0..n)
             .map(|i| {
                 (x[i] <= priors[i].low && gradient[i] < 0.0) || (x[i] >= priors[i].high && gradient[i] > 0.0)
@@ -112,26 +188,27 @@ pub(crate) fn maximise(model: &dyn Model, start: &[f64], what: &'static str) -> 
             .collect();
         let mut accepted = None;
         while damping < 1e8 {
-            let step = damped_step(&slopes.information, &gradient, &held, damping, priors)
+            let step = damped_step(&slopes.information, &gradient, &held, damping, known)
                 .ok_or(Error::Singular { what })?;
             let tried = moved(&x, &step, priors);
             let length = (0..n).map(|i| ((tried[i] - x[i]) / priors[i].sd).abs()).fold(0.0, f64::max);
             let promised = 0.5 * step.dot(&gradient);
             if damping <= FIRST_DAMPING && length < TOLERANCE && promised < PROMISED_NATS {
                 // The top of the parabola, without another look at the data.
-                let full = damped_step(&slopes.information, &gradient, &held, 0.0, priors);
+                let full = damped_step(&slopes.information, &gradient, &held, 0.0, known);
                 let last = moved(&x, &full.ok_or(Error::Singular { what })?, priors);
                 let by = DVector::from_iterator(n, last.iter().zip(&x).map(|(l, x)| l - x));
-                let bent: f64 = by.iter().zip(priors).map(|(b, p)| (b / p.sd).powi(2)).sum();
-                let gain = gradient.dot(&by) - 0.5 * (by.dot(&(&slopes.information * &by)) + bent);
+                let mut bent = slopes.information.clone();
+                known.add_to(&mut bent);
+                let gain = gradient.dot(&by) - 0.5 * by.dot(&(bent * &by));
                 converged = value.is_finite();
-                likelihood = value + gain - penalty(&last);
+                likelihood = value + gain - known.penalty(&last);
                 x = last;
                 break 'steps;
             }
             // Most steps are taken: their slopes are wanted next.
             let found = fill(model, &tried, &mut tried_slopes);
-            let gain = found + penalty(&tried) - value;
+            let gain = found + known.penalty(&tried) - value;
             if gain.is_finite() && gain >= -1e-9 {
                 accepted = Some((tried, found, length, gain));
                 damping = (damping * 0.2).max(1e-9);
@@ -155,19 +232,16 @@ pub(crate) fn maximise(model: &dyn Model, start: &[f64], what: &'static str) -> 
         }
     }
     let mut h = slopes.information;
-    for i in 0..n {
-        h[(i, i)] += priors[i].sd.powi(-2);
-    }
+    known.add_to(&mut h);
     let factor = h.cholesky().ok_or(Error::Singular { what })?;
     let half_log_determinant: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
-    let log_sd: f64 = priors.iter().map(|p| p.sd.ln()).sum();
-    let log_posterior = likelihood + penalty(&x);
+    let log_posterior = likelihood + known.penalty(&x);
     Ok(LaplaceFit {
         values: x,
         log_likelihood: likelihood,
         log_posterior,
         covariance: factor.inverse(),
-        log_evidence: log_posterior - half_log_determinant - log_sd,
+        log_evidence: log_posterior - half_log_determinant - known.log_volume(),
         converged,
     })
 }
@@ -178,14 +252,14 @@ fn damped_step(
     gradient: &DVector<f64>,
     held: &[bool],
     damping: f64,
-    priors: &[Prior],
+    priors: Priors<'_>,
 ) -> Option<DVector<f64>> {
     let mut h = information.clone();
     let mut g = gradient.clone();
-    for (i, prior) in priors.iter().enumerate() {
-        let own = h[(i, i)] + prior.sd.powi(-2);
-        h[(i, i)] = own * (1.0 + damping);
-        if held[i] {
+    priors.add_to(&mut h);
+    for (i, &held) in held.iter().enumerate() {
+        h[(i, i)] *= 1.0 + damping;
+        if held {
             h.row_mut(i).fill(0.0);
             h.column_mut(i).fill(0.0);
             h[(i, i)] = 1.0;
@@ -214,6 +288,7 @@ mod tests {
     /// Measurements of a line, with known error: everything has a closed form.
     struct Line {
         priors: Vec<Prior>,
+        together: Vec<Together>,
         data: Vec<(f64, f64)>,
         sd: f64,
     }
@@ -221,6 +296,10 @@ mod tests {
     impl Model for Line {
         fn priors(&self) -> &[Prior] {
             &self.priors
+        }
+
+        fn together(&self) -> &[Together] {
+            &self.together
         }
 
         fn log_likelihood(&self, x: &[f64], slopes: Option<&mut Slopes>) -> f64 {
@@ -244,25 +323,36 @@ mod tests {
     #[test]
     fn evidence_of_a_linear_model_is_that_of_the_joint_normal() {
         let data = vec![(0.0, 0.4), (1.0, 1.9), (2.0, 2.2), (3.0, 4.1)];
-        let priors = vec![Prior::normal(0.5, 2.0), Prior::normal(0.0, 3.0)];
-        let line = Line { priors, data: data.clone(), sd: 0.7 };
-        let found = maximise(&line, &[0.0, 0.0], "a line").unwrap();
-        // y ~ N(A mean, A P A' + s2 I).
-        let a = DMatrix::from_fn(4, 2, |i, j| if j == 0 { 1.0 } else { data[i].0 });
-        let p = DMatrix::from_diagonal(&DVector::from_vec(vec![4.0, 9.0]));
-        let c = &a * &p * a.transpose() + DMatrix::identity(4, 4) * 0.49;
-        let r = DVector::from_fn(4, |i, _| data[i].1 - 0.5);
-        let quadratic = (r.transpose() * c.clone().try_inverse().unwrap() * &r)[(0, 0)];
-        let expected = -0.5 * (quadratic + c.determinant().ln() + 4.0 * std::f64::consts::TAU.ln());
-        assert!((found.log_evidence - expected).abs() < 1e-9, "{} {expected}", found.log_evidence);
-        assert!(found.converged);
+        for correlation in [0.0, 0.8] {
+            let priors = vec![Prior::normal(0.5, 2.0), Prior::normal(0.0, 3.0)];
+            let block = DMatrix::from_row_slice(2, 2, &[1.0, correlation, correlation, 1.0]);
+            let together = vec![Together::new(0..2, block).unwrap()];
+            let line = Line { priors, together, data: data.clone(), sd: 0.7 };
+            let found = maximise(&line, &[0.0, 0.0], "a line").unwrap();
+            // y ~ N(A mean, A P A' + s2 I).
+            let a = DMatrix::from_fn(4, 2, |i, j| if j == 0 { 1.0 } else { data[i].0 });
+            let p = DMatrix::from_row_slice(2, 2, &[4.0, 6.0 * correlation, 6.0 * correlation, 9.0]);
+            let c = &a * &p * a.transpose() + DMatrix::identity(4, 4) * 0.49;
+            let r = DVector::from_fn(4, |i, _| data[i].1 - 0.5);
+            let quadratic = (r.transpose() * c.clone().try_inverse().unwrap() * &r)[(0, 0)];
+            let expected = -0.5 * (quadratic + c.determinant().ln() + 4.0 * std::f64::consts::TAU.ln());
+            assert!((found.log_evidence - expected).abs() < 1e-9, "{} {expected}", found.log_evidence);
+            assert!(found.converged);
+        }
+    }
+
+    #[test]
+    fn what_is_no_correlation_is_refused() {
+        assert!(Together::new(0..2, DMatrix::from_element(2, 2, 1.5)).is_none());
+        assert!(Together::new(0..3, DMatrix::identity(2, 2)).is_none());
     }
 
     #[test]
     fn bounds_hold() {
         let mut priors = vec![Prior::normal(0.0, 10.0), Prior::normal(0.0, 10.0)];
         priors[1].high = 0.5;
-        let line = Line { priors, data: vec![(0.0, 0.0), (1.0, 2.0), (2.0, 4.0)], sd: 0.1 };
+        let line =
+            Line { priors, together: Vec::new(), data: vec![(0.0, 0.0), (1.0, 2.0), (2.0, 4.0)], sd: 0.1 };
         let found = maximise(&line, &[0.0, 0.0], "a line").unwrap();
         assert_eq!(found.values[1], 0.5);
         // The best level under that slope: the mean of y - t / 2.

@@ -9,6 +9,7 @@ mod hidden_modes;
 mod imports;
 mod laboratory;
 mod oracles;
+mod polyhedra;
 mod rooms;
 mod screened_room;
 mod spectrum;

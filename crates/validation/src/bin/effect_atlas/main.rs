@@ -36,7 +36,7 @@ struct Arguments {
     #[arg(long, default_value_t = 6000)]
     seed: u64,
     /// Do each N-th room alone, from the K-th on: several processes side by side, each with a record of its own
-    #[arg(long, value_name = "K/N", value_parser = part, default_value = "1/1")]
+    #[arg(long, value_name = "K/N", value_parser = sabine_validation::part, default_value = "1/1")]
     part: (usize, usize),
     /// Reflections keep their sign, as image sources of other programs do
     #[arg(long)]
@@ -150,16 +150,6 @@ fn tasks(arguments: &Arguments) -> Vec<Task> {
     }
     let (first, each) = arguments.part;
     tasks.into_iter().skip(first - 1).step_by(each).collect()
-}
-
-/// `K/N`, K from 1 to N.
-fn part(text: &str) -> Result<(usize, usize), String> {
-    let (first, each) = text.split_once('/').ok_or("a part is written 1/4")?;
-    let parse = |number: &str| number.parse::<usize>().map_err(|error| format!("{number}: {error}"));
-    match (parse(first)?, parse(each)?) {
-        (first, each) if (1..=each).contains(&first) => Ok((first, each)),
-        (first, each) => Err(format!("part {first} of {each} does not exist")),
-    }
 }
 
 fn read(path: &Path) -> Result<Vec<Trial>, AnyError> {

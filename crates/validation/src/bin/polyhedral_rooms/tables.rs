@@ -1,0 +1,99 @@
+//! What a record comes to.
+
+use crate::trial::{Outcome, Trial, shape_name};
+use sabine_testkit::{Planted, Polyhedron};
+use sabine_validation::exact_interval;
+
+/// Prints all tables as Markdown. Intervals are exact, over rooms.
+pub fn print(trials: &[Trial]) {
+    println!("| hidden | world | rooms | right | set | extra | wrong | unexplained | missed |");
+    println!("|---|---|---|---|---|---|---|---|---|");
+    for planted in Planted::ALL {
+        for nuisances in [false, true] {
+            let own: Vec<&Trial> = trials
+                .iter()
+                .filter(|t| t.task.planted == planted && t.task.nuisances == nuisances)
+                .collect();
+            if own.is_empty() {
+                continue;
+            }
+            let count = |o: Outcome| own.iter().filter(|t| t.outcome == o).count();
+            println!(
+                "| {planted} | {} | {} | {} | {} | {} | {} | {} | {} |",
+                world(nuisances),
+                own.len(),
+                count(Outcome::Right),
+                count(Outcome::Set),
+                count(Outcome::Extra),
+                count(Outcome::Wrong),
+                count(Outcome::Unexplained),
+                count(Outcome::Missed),
+            );
+        }
+    }
+    println!("\n| figure | found | 95 % interval |\n|---|---|---|");
+    for nuisances in [false, true] {
+        let own: Vec<&Trial> = trials.iter().filter(|t| t.task.nuisances == nuisances).collect();
+        let of = |wanted: fn(&Trial) -> bool| own.iter().copied().filter(move |t| wanted(t));
+        let null = |t: &Trial| t.task.planted == Planted::Nothing;
+        let due = |t: &Trial| t.task.planted.effect().is_some();
+        let named_it = |t: &&Trial| matches!(t.outcome, Outcome::Right | Outcome::Extra);
+        let says = |what: &str| format!("{what}, {}", world(nuisances));
+        share(&says("a false name where nothing is hidden"), of(null).map(|t| !t.false_names.is_empty()));
+        share(&says("`adequate` where nothing is hidden"), of(null).map(|t| t.answer == "adequate"));
+        share(&says("right and nothing else, of one effect"), of(due).map(|t| t.outcome == Outcome::Right));
+        share(&says("what is hidden is named"), of(due).map(|t| named_it(&t)));
+        share(&says("a false name, of one effect"), of(due).map(|t| !t.false_names.is_empty()));
+    }
+    let seconds: Vec<f64> = trials.iter().map(|t| t.seconds).collect();
+    println!("| seconds for a diagnosis (median) | {:.0} | |", median(seconds));
+    println!("\n| shape | null rooms with a false name | rooms with an effect: right |\n|---|---|---|");
+    for shape in Polyhedron::ALL {
+        let own: Vec<&Trial> = trials.iter().filter(|t| t.task.shape == shape).collect();
+        let (null, rest): (Vec<&Trial>, Vec<&Trial>) =
+            own.into_iter().partition(|t| t.task.planted == Planted::Nothing);
+        println!(
+            "| {} | {} of {} | {} of {} |",
+            shape_name(shape),
+            null.iter().filter(|t| !t.false_names.is_empty()).count(),
+            null.len(),
+            rest.iter().filter(|t| t.outcome == Outcome::Right).count(),
+            rest.len()
+        );
+    }
+    println!("\n| hidden | shape | world | seed | answer | p of what is left | decays left out (dB) |");
+    println!("|---|---|---|---|---|---|---|");
+    for t in trials.iter().filter(|t| t.outcome != Outcome::Right) {
+        println!(
+            "| {} | {} | {} | {} | {} | {:.2} | {} |",
+            t.task.planted,
+            shape_name(t.task.shape),
+            world(t.task.nuisances),
+            t.task.seed,
+            t.answer,
+            t.p_value,
+            t.decay_db.map_or("-".into(), |[before, after]| format!("{before:.2} to {after:.2}")),
+        );
+    }
+}
+
+fn world(nuisances: bool) -> &'static str {
+    if nuisances { "nuisances" } else { "plain" }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+fn share(what: &str, hits: impl Iterator<Item = bool>) {
+    let hits: Vec<bool> = hits.collect();
+    if hits.is_empty() {
+        return;
+    }
+    let count = hits.iter().filter(|h| **h).count();
+    let (low, high) = exact_interval(count, hits.len());
+    let percent = 100.0 * count as f64 / hits.len() as f64;
+    let (low, high) = (100.0 * low, 100.0 * high);
+    println!("| {what} | {count} of {} ({percent:.0} %) | {low:.0}-{high:.0} % |", hits.len());
+}
