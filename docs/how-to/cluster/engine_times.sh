@@ -12,13 +12,16 @@ here=$(realpath "$(dirname "$0")")
 mkdir "$folder"
 folder=$(realpath "$folder")
 export RAYON_NUM_THREADS=1
+# Else Ray's workers give way to whatever else runs (niceness 15), and the clock of the engines does not compare.
+export RAY_worker_niceness=0
 
 # Runs the program and writes down what it took of the processor.
 cat >"$folder/timed" <<END
 #!/bin/bash
 "$program" "\$@"
 code=\$?
-times | tail -n 1 >>"$folder/\$TIMED"
+# In a pipe times would tell of another shell. Its second line is of the children.
+times >"$folder/\$TIMED.\$\$"
 exit \$code
 END
 chmod +x "$folder/timed"
@@ -42,7 +45,7 @@ for engine in $engines; do
         begin "$engine" "$workers" "$@" --out "$folder/$engine-$workers" >"$folder/$engine-$workers.log" 2>&1
         clock=$(awk -v from="$start" -v to="$(date +%s.%N)" 'BEGIN {printf "%.1f", to - from}')
         # Lines such as 1m2.345s 0m0.120s.
-        processor=$(tr 'ms' '  ' <"$folder/$TIMED" | awk '{sum += 60 * $1 + $2 + 60 * $3 + $4} END {printf "%.1f", sum}')
+        processor=$(tail -q -n 1 "$folder/$TIMED".* | tr 'ms' '  ' | awk '{sum += 60 * $1 + $2 + 60 * $3 + $4} END {printf "%.1f", sum}')
         echo "| $engine | $workers | $processor | $clock | $(sums "$folder/$engine-$workers") |"
     done
 done

@@ -1,7 +1,7 @@
 //! An atlas made by several processes: byte for byte what one process makes, though one of them is killed.
 
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
@@ -27,7 +27,7 @@ fn said(output: &Output) -> String {
 }
 
 /// Kills the process once the file is there, in the middle of its next room.
-fn kill_after(mut worker: Child, path: &PathBuf) {
+fn kill_after(mut worker: Child, path: &Path) {
     let begun = Instant::now();
     while !path.exists() {
         assert!(begun.elapsed() < Duration::from_secs(500), "{} does not come", path.display());
