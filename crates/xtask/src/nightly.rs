@@ -6,9 +6,10 @@ use crate::workspace::{Package, Workspace};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// Fuzzes a reader of untrusted files for a minute, from its seeds on, with the limits of the fuzz targets' page: `$0` is its name.
+/// Fuzzes a reader of untrusted files for a minute, from its seeds on, with the limits of the fuzz targets' page: `$0` is its name, `$1`
+/// the features that it needs, which are built for no other target.
 const FUZZ: &str = "set -e; cd crates/testkit/fuzz; mkdir -p \"corpus/$0\"; [ ! -d /dev/shm ] || export TMPDIR=/dev/shm; \
-    rustup run nightly cargo fuzz run --fuzz-dir . \"$0\" \"corpus/$0\" \"seeds/$0\" -- \
+    rustup run nightly cargo fuzz run --fuzz-dir . --no-default-features --features \"$1\" \"$0\" \"corpus/$0\" \"seeds/$0\" -- \
     -max_total_time=60 -rss_limit_mb=1024 -malloc_limit_mb=256";
 
 /// Installs the command as a user does, and runs it where nothing of the repository is.
@@ -57,7 +58,14 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<(), Error> {
     run_all(root, &jobs)
 }
 
-fn jobs(packages: &[Package], fuzz_targets: &[String]) -> Vec<Job> {
+/// A program of the fuzz targets' manifest.
+struct Target {
+    name: String,
+    /// Those that it requires, with commas between.
+    features: String,
+}
+
+fn jobs(packages: &[Package], fuzz_targets: &[Target]) -> Vec<Job> {
     let mut jobs = vec![
         Job::new("every test in release, those that take long too", "bash", &["-c", EVERY_TEST]),
         Job::cargo("main example in release", &["run", "--release", "--example", "match_room"]),
@@ -66,8 +74,8 @@ fn jobs(packages: &[Package], fuzz_targets: &[String]) -> Vec<Job> {
     jobs.extend(packages.iter().flat_map(feature_jobs));
     jobs.extend(least_rust_jobs(packages));
     jobs.extend(publishing_jobs());
-    for target in fuzz_targets {
-        let job = Job::new(format!("fuzz {target}"), "bash", &["-c", FUZZ, target]);
+    for Target { name, features } in fuzz_targets {
+        let job = Job::new(format!("fuzz {name}"), "bash", &["-c", FUZZ, name, features]);
         jobs.push(job.needs(&["rustup", "run", "nightly", "cargo", "fuzz", "--version"]));
     }
     jobs
@@ -125,13 +133,20 @@ fn publishing_jobs() -> [Job; 3] {
     ]
 }
 
-/// Names of the fuzz targets: the programs of their manifest.
-fn fuzz_targets(root: &Path) -> Result<Vec<String>, Error> {
+/// The fuzz targets: the programs of their manifest. Those that require features come last, for these take long to build.
+fn fuzz_targets(root: &Path) -> Result<Vec<Target>, Error> {
     let path = root.join("crates/testkit/fuzz/Cargo.toml");
     let manifest = std::fs::read_to_string(&path).map_err(Error::io(&path))?;
-    let programs = manifest.split("[[bin]]").skip(1);
-    let name = |entry: &str| Some(entry.split_once("name = \"")?.1.split_once('"')?.0.to_owned());
-    Ok(programs.filter_map(name).collect())
+    let between = |text: &str, before: &str, after: &str| {
+        Some(text.split_once(before)?.1.split_once(after)?.0.to_owned())
+    };
+    let target = |entry: &str| {
+        let features = between(entry, "required-features = [", "]").unwrap_or_default();
+        Some(Target { name: between(entry, "name = \"", "\"")?, features: features.replace(['"', ' '], "") })
+    };
+    let mut targets: Vec<Target> = manifest.split("[[bin]]").skip(1).filter_map(target).collect();
+    targets.sort_by_key(|target| !target.features.is_empty());
+    Ok(targets)
 }
 
 #[cfg(test)]
@@ -157,5 +172,13 @@ mod tests {
             assert!(names.iter().any(|name| name == wanted), "{wanted} is not among {names:?}");
         }
         assert!(!names.iter().any(|name| name.ends_with("default alone")));
+    }
+
+    #[test]
+    fn the_network_is_built_for_the_fuzz_target_that_needs_it_and_last() {
+        let targets = fuzz_targets(&root()).unwrap();
+        let (last, others) = targets.split_last().unwrap();
+        assert_eq!((last.name.as_str(), last.features.as_str()), ("weights", "weights"));
+        assert!(others.len() >= 7 && others.iter().all(|target| target.features.is_empty()));
     }
 }

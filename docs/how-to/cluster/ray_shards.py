@@ -1,7 +1,8 @@
-"""Makes a data set with sabine augment under Ray: one task for each of N workers, started anew where it fails.
+"""Makes a data set, or an atlas, under Ray: one task for each of N workers, started anew where it fails.
 
 usage: ray_shards.py WORKERS PROGRAM [ARGUMENT ...]
     ray_shards.py 8 ./sabine augment --speech SPEECH --rir RIR --out /shared/set --count 94500
+    ray_shards.py 8 ./effect_atlas --rooms 20 --out /shared/atlas
 
 Joins the cluster that RAY_ADDRESS names, else starts one on this machine. The folder given as --out must be the same one on
 every machine (NFS, Lustre, ...). `--resume` and `--worker I/N` are added here: what a dead worker has finished is kept.
@@ -20,7 +21,7 @@ CPUS = int(os.environ.get("RAY_SHARDS_CPUS", "1"))
 
 @ray.remote(num_cpus=CPUS, max_retries=5, retry_exceptions=True)
 def make(index, workers, command):
-    """The shards of one worker. A program that dies, or a machine that does, is tried again up to five times."""
+    """What one worker makes. A program that dies, or a machine that does, is tried again up to five times."""
     process = subprocess.Popen(
         [*command, "--resume", "--worker", f"{index}/{workers}"],
         env={**os.environ, "RAYON_NUM_THREADS": str(CPUS)},
@@ -33,7 +34,7 @@ def make(index, workers, command):
     if process.returncode != 0:
         print(f"worker {index}/{workers}: ended with {process.returncode}", flush=True)
         raise RuntimeError(f"worker {index}/{workers} ended with {process.returncode}: {output[-2000:]}")
-    lines = [line for line in output.splitlines() if "shards made" in line]
+    lines = [line for line in output.splitlines() if " made, " in line]
     return f"worker {index}/{workers}: {lines[-1] if lines else output[-200:]}"
 
 

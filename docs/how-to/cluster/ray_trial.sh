@@ -1,34 +1,38 @@
 #!/bin/bash
-# Does a set made under Ray, one of whose two workers is killed half-way, equal the set made at once?
+# Does what two workers make under Ray, one of them killed half-way, equal what one process makes at once?
 #
-# usage: ray_trial.sh PYTHON SABINE FOLDER [ARGUMENT ...]
-#   ray_trial.sh python3 ./sabine /tmp/trial --speech SPEECH --rir RIR --count 1536 --shard-size 128 --rooms 12
-# PYTHON must have ray. FOLDER is made; it receives the sets `alone` and `ray`, and the log of Ray.
+# usage: ray_trial.sh PYTHON FOLDER PATTERN PROGRAM [ARGUMENT ...]
+#   ray_trial.sh python3 /tmp/trial '*.safetensors' ./sabine augment --speech SPEECH --rir RIR --count 1536 --shard-size 128 --rooms 12
+#   ray_trial.sh python3 /tmp/trial 'room-*.json' ./effect_atlas --effects none,truncation --rooms 3
+# PYTHON must have ray. FOLDER is made; it receives the results `alone` and `ray`, and their logs. PATTERN is what finished pieces are
+# called; PIECES of them (default 1) are waited for before the kill.
 set -euo pipefail
-python=$1 program=$2 folder=$3
-shift 3
-here=$(dirname "$0")
+python=$1 folder=$2 pattern=$3 program=$(realpath "$4")
+shift 4
+here=$(realpath "$(dirname "$0")")
 mkdir "$folder"
+folder=$(realpath "$folder")
+pieces() { find "$folder/ray" -name "$pattern" 2>/dev/null | wc -l; }
 
-"$program" augment --out "$folder/alone" "$@" >"$folder/alone.log" 2>&1
+"$program" "$@" --out "$folder/alone" >"$folder/alone.log" 2>&1
 
-# A program that leaves its number and becomes augment_dataset.
+# A program that leaves its number and becomes the real one.
 cat >"$folder/noted" <<END
 #!/bin/bash
 echo "\$\$ \$*" >>"$folder/processes"
-exec "$program" augment "\$@"
+exec "$program" "\$@"
 END
 chmod +x "$folder/noted"
-"$python" "$here/ray_shards.py" 2 "$folder/noted" --out "$folder/ray" "$@" >"$folder/ray.log" 2>&1 &
+"$python" "$here/ray_shards.py" 2 "$folder/noted" "$@" --out "$folder/ray" >"$folder/ray.log" 2>&1 &
 driver=$!
-# Wait until a shard is there and the first worker is in the middle of its next one.
-until ls "$folder"/ray/*.safetensors >/dev/null 2>&1; do
+# Wait until enough pieces are there and the first worker is in the middle of its next one.
+until [ "$(pieces)" -ge "${PIECES:-1}" ]; do
     kill -0 "$driver"
     sleep 0.05
 done
 sleep 0.5
 victim=$(sed -n 's/^\([0-9]*\) .*--worker 1\/2$/\1/p' "$folder/processes" | head -n 1)
-echo "$(ls "$folder"/ray/*.safetensors | wc -l) shards are there; killing process $victim, worker 1/2"
+echo "$(pieces) pieces are there; killing process $victim, worker 1/2"
 kill -KILL "$victim"
 wait "$driver"
 grep -o 'worker [12]/2: .*' "$folder/ray.log" | sed 's/RuntimeError.*//'

@@ -1,11 +1,12 @@
 #!/bin/bash
-# Makes a data set as a Slurm job array, one worker a task:
+# Makes a data set, or an atlas, as a Slurm job array, one worker a task:
 #
 #   sbatch --array=1-16 --cpus-per-task=4 slurm.sh ./sabine augment --speech /data/speech --rir /data/rir --noise /data/noise \
 #       --rooms 1000 --out /scratch/set --count 94500 --seed 1
+#   sbatch --array=1-16 --cpus-per-task=2 slurm.sh ./effect_atlas --rooms 20 --out /scratch/atlas
 #
 # `--resume` and `--worker I/N` are added here. The array must be whole (1-N, no gaps).
-#SBATCH --job-name=sabine-set
+#SBATCH --job-name=sabine
 #SBATCH --mem=2G
 #SBATCH --time=01:00:00
 #SBATCH --requeue

@@ -1,10 +1,12 @@
 //! How well hidden effects are found: laboratory rooms, each with effects of some strength or none, diagnosed blind.
 //!
 //! Prints answers by effect and strength, detection by d', false alarms, coverage and controls with 95 % intervals. With `--record`
-//! every room is written to a CSV file as soon as it is done, and rooms that the file holds are not done again.
+//! every room is written to a CSV file as soon as it is done, and rooms that the file holds are not done again. With `--out` several
+//! processes, on one machine or on many, make one atlas in a folder (`docs/how-to/dataset-on-a-cluster.md`).
 
 mod decide;
 mod sham;
+mod shards;
 mod tables;
 mod task;
 mod trial;
@@ -12,6 +14,8 @@ mod trial;
 use clap::Parser;
 use sabine::diagnose::DiagnoseConfig;
 use sabine_testkit::Hidden;
+use shards::{Built, Shards};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use task::Task;
@@ -77,6 +81,16 @@ struct Arguments {
     /// CSV file that trials are added to, and whose trials count in the tables
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+    /// Folder of an atlas: a file for each room, and `record.csv` once all of them are there. The bytes depend on the other arguments
+    /// and on this program alone
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["record", "part"])]
+    out: Option<PathBuf>,
+    /// Do every N-th room of the folder alone, from the I-th on (I from 1)
+    #[arg(long, value_name = "I/N", value_parser = part, default_value = "1/1", requires = "out")]
+    worker: (usize, usize),
+    /// Keep the rooms that the folder holds, if they are whole
+    #[arg(long, requires = "out")]
+    resume: bool,
 }
 
 fn main() -> ExitCode {
@@ -84,36 +98,62 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), AnyError> {
+    let scratch = std::env::temp_dir().join(format!("sabine_effect_atlas_{}", std::process::id()));
+    if let Some(out) = &arguments.out {
+        return share(arguments, out, &scratch);
+    }
     let mut trials = match &arguments.record {
         Some(path) if path.exists() => read(path)?,
         _ => Vec::new(),
     };
-    let folder = std::env::temp_dir().join(format!("sabine_effect_atlas_{}", std::process::id()));
     for task in tasks(arguments) {
         if task.is_done(&trials) {
             continue;
         }
-        let trial = task.run(&folder).inspect_err(|_| {
-            // The error that counts is the first.
-            let _ = std::fs::remove_dir_all(&folder);
-        })?;
-        eprintln!(
-            "{:22} {:4.2} seed {}: {:?}, {}, d' {:.1}, {:.0} s",
-            trial.hidden,
-            trial.strength,
-            trial.seed,
-            trial.outcome,
-            trial.answer,
-            trial.d_prime.unwrap_or(f64::NAN),
-            trial.seconds
-        );
-        trials.push(trial);
+        trials.push(diagnose(&task, &scratch)?);
         if let Some(path) = &arguments.record {
-            write(path, &trials)?;
+            let text = csv_text(&trials)?;
+            sabine::acoustics::write_atomically(path, |file| file.write_all(text.as_bytes()))?;
         }
     }
     tables::print(&trials);
     Ok(())
+}
+
+/// A worker's share of an atlas in a folder; the last one to end prints the tables.
+fn share(arguments: &Arguments, out: &Path, scratch: &Path) -> Result<(), AnyError> {
+    let started = std::time::Instant::now();
+    let tasks = tasks(arguments);
+    let shards = Shards::begin(out, &tasks, arguments.worker, arguments.resume)?;
+    let Built { made, kept, mended } = shards.run(arguments.worker, |task| diagnose(task, scratch))?;
+    let seconds = started.elapsed().as_secs_f64();
+    eprintln!("{made} rooms made, {kept} kept, {mended} mended in {seconds:.0} s");
+    match shards.finish()? {
+        Ok(trials) => tables::print(&trials),
+        Err(there) => {
+            eprintln!("{there} of {} rooms are there; the others are left to other workers", tasks.len())
+        }
+    }
+    Ok(())
+}
+
+/// Does a room and says what came of it.
+fn diagnose(task: &Task, scratch: &Path) -> Result<Trial, AnyError> {
+    let trial = task.run(scratch).inspect_err(|_| {
+        // The error that counts is the first.
+        let _ = std::fs::remove_dir_all(scratch);
+    })?;
+    eprintln!(
+        "{:22} {:4.2} seed {}: {:?}, {}, d' {:.1}, {:.0} s",
+        trial.hidden,
+        trial.strength,
+        trial.seed,
+        trial.outcome,
+        trial.answer,
+        trial.d_prime.unwrap_or(f64::NAN),
+        trial.seconds.unwrap_or(f64::NAN)
+    );
+    Ok(trial)
 }
 
 fn tasks(arguments: &Arguments) -> Vec<Task> {
@@ -158,11 +198,11 @@ fn read(path: &Path) -> Result<Vec<Trial>, AnyError> {
     trials.map_err(|error| format!("{}: {error}", path.display()).into())
 }
 
-fn write(path: &Path, trials: &[Trial]) -> Result<(), AnyError> {
+fn csv_text(trials: &[Trial]) -> Result<String, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for trial in trials {
         writer.serialize(trial)?;
     }
-    let bytes = writer.into_inner()?;
-    Ok(sabine::acoustics::write_atomically(path, |file| std::io::Write::write_all(file, &bytes))?)
+    let bytes = writer.into_inner().map_err(|error| error.into_error())?;
+    String::from_utf8(bytes).map_err(|error| std::io::Error::other(error).into())
 }

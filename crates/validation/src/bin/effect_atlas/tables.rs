@@ -73,7 +73,7 @@ fn conditions(trials: &[Trial]) {
             format!("{} of {}", among.iter().filter(|t| hit(t)).count(), among.len())
         };
         println!(
-            "| {receivers} | {sources} | {} | {sessions} | {per_octave} | {} | {} | {} | {} | {} | {} | {:.0} |",
+            "| {receivers} | {sources} | {} | {sessions} | {per_octave} | {} | {} | {} | {} | {} | {} | {} |",
             f64::from(*rate) / 1000.0,
             if *positive { "kept" } else { "random" },
             of(&nulls, &|t| t.outcome != Outcome::Right),
@@ -81,7 +81,7 @@ fn conditions(trials: &[Trial]) {
             of(&hidden, &|t| t.outcome == Outcome::Right),
             of(&hidden, &|t| matches!(t.outcome, Outcome::Wrong | Outcome::Extra)),
             mean_d_prime(&hidden).map_or("-".into(), |d| format!("{d:.1}")),
-            median(own.iter().map(|t| t.seconds).collect())
+            seconds(own)
         );
     }
 }
@@ -167,14 +167,19 @@ fn figures(trials: &[Trial]) {
         "| error of fitted absorption, after / before, rightly named (median) | {:.2} | |",
         median(ratios)
     );
-    let seconds = plain.iter().map(|t| t.seconds).collect();
-    println!("| seconds for a diagnosis (median) | {:.0} | |", median(seconds));
+    println!("| seconds for a diagnosis (median) | {} | |", seconds(&plain));
 }
 
 /// Root of the mean square: of the squares the mean is unbiased.
 fn mean_d_prime(trials: &[&Trial]) -> Option<f64> {
     let squares: Vec<f64> = trials.iter().filter_map(|t| t.d_prime).map(|d| d * d).collect();
     (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+}
+
+/// Median of the rooms that have a time.
+fn seconds(trials: &[&Trial]) -> String {
+    let known: Vec<f64> = trials.iter().filter_map(|t| t.seconds).collect();
+    if known.is_empty() { "-".into() } else { format!("{:.0}", median(known)) }
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

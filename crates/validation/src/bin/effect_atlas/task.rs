@@ -6,10 +6,11 @@ use sabine::acoustics::Bands;
 use sabine::diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, catalogue};
 use sabine::scene::TimeZero;
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
+use serde::Serialize;
 use std::path::Path;
 
 /// What is to be diagnosed.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Task {
     /// Effects to hide; none in a null room.
     pub hidden: Vec<String>,

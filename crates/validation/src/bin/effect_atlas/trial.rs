@@ -62,7 +62,8 @@ pub struct Trial {
     /// Mean absolute error of fitted absorption under the baseline and beside the named causes.
     pub absorption_before: f64,
     pub absorption_after: f64,
-    pub seconds: f64,
+    /// On the clock; a room of an atlas in a folder has none, for its bytes must not depend on when it was made.
+    pub seconds: Option<f64>,
     /// The measurement that would decide, and whether it does; the same of one drawn from the others.
     #[serde(default)]
     pub asked: Option<String>,
@@ -173,7 +174,7 @@ impl Task {
             covered: held.iter().filter(|h| **h).count(),
             absorption_before: before,
             absorption_after: after,
-            seconds,
+            seconds: Some(seconds),
             asked: follow_up.as_ref().map(|f| format!("{:?}", f.asked.0)),
             asked_decides: follow_up.as_ref().map(|f| f.asked.1),
             other: follow_up.as_ref().map(|f| format!("{:?}", f.other.0)),
