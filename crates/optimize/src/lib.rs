@@ -61,6 +61,8 @@
 //! | [`MaterialFitter`], [`FitConfig`] | the fit to reverberation times |
 //! | [`Retrace`], [`RetraceConfig`], [`RetracedFit`] | the same, traced again until other rays confirm it |
 //! | [`MeasuredDecay`], [`MeasuredPair`], [`ResponseFit`] | the fit to measured responses ([`MaterialFitter::fit_responses`]) |
+//! | [`MeasuredParameter`], [`MeasuredTable`], [`TableFit`] | the fit to tables of T30, EDT, C80 ... of each pair ([`MaterialFitter::fit_tables`]), or to tables and responses ([`MaterialFitter::fit_measured`]) |
+//! | [`TableMisfit`], [`ParameterMisfit`], [`OctaveMisfit`] | a simulation against a table, value by value and octave by octave |
 //! | [`DecayMisfit`] | a simulation against a response, for places that were held out |
 //! | [`PredictedChange`], [`RoomPrediction`] | what if: T60, C50, D50 before and after a change of materials, and how sure their difference is |
 //! | [`AbsorptionPrior`] | what is known of a material beforehand; a standard deviation of zero holds it |
@@ -122,8 +124,10 @@ mod fitter;
 mod group;
 mod history;
 mod measured_decay;
+mod measured_parameter;
 mod misfit;
 mod objective;
+mod parameter_readings;
 mod prediction;
 mod pulse;
 mod response_band;
@@ -137,6 +141,10 @@ mod scale;
 mod single_paths;
 mod slope_evaluation;
 mod slope_model;
+mod table_band;
+mod table_expansion;
+mod table_misfit;
+mod tables;
 mod uncertainty;
 mod unknowns;
 mod variables;
@@ -151,10 +159,13 @@ pub use fit::{
 pub use fit_problem::FitProblem;
 pub use fitter::MaterialFitter;
 pub use measured_decay::MeasuredDecay;
+pub use measured_parameter::{MeasuredParameter, MeasuredTable};
 pub use misfit::DecayMisfit;
 pub use objective::Objective;
 pub use prediction::{PredictedChange, RoomPrediction};
 pub use responses::{MeasuredPair, ResponseFit};
 pub use retrace::{NotVerified, Retrace, RetraceConfig, RetracedFit};
 pub use slope_evaluation::SlopeEvaluation;
+pub use table_misfit::{OctaveMisfit, ParameterMisfit, TableMisfit};
+pub use tables::TableFit;
 pub use variables::{ForArgmin, Logit, RegularisedSlope};

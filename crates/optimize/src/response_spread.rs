@@ -27,12 +27,13 @@ impl Spread {
             standard_error: zeros(),
             remaining: zeros(),
             shows: absorption.iter().map(|a| vec![false; a.len()]).collect(),
-            data: expansions.iter().map(|e| !e.bins.is_empty()).collect(),
+            data: expansions.iter().map(|e| !e.bins.is_empty() || !e.tables.is_empty()).collect(),
         };
         let mut information = DMatrix::<f64>::zeros(n, n);
         let mut chance = DMatrix::<f64>::zeros(n, n);
-        let batches = expansions.iter().flat_map(|e| e.bins.first()).map(|b| b.batches.len()).max();
-        let batches = batches.unwrap_or(0);
+        let of_bins = expansions.iter().flat_map(|e| e.bins.first()).map(|b| b.batches.len());
+        let of_tables = expansions.iter().flat_map(|e| e.tables.first()).map(|t| t.parts.len());
+        let batches = of_bins.chain(of_tables).max().unwrap_or(0);
         let mut parts = vec![DVector::<f64>::zeros(n); batches];
         for (b, expansion) in expansions.iter().enumerate() {
             let sd = &expansion.band.prior.standard_deviation;
@@ -61,6 +62,19 @@ impl Spread {
                 chance += outer * (weight * weight * dispersion[b] * bin.chance);
                 for (part, share) in parts.iter_mut().zip(&bin.batches) {
                     *part += &row * (weight * share);
+                }
+            }
+            for table in &expansion.tables {
+                let Some(slopes) = table.slopes(&absorption[b]) else { continue };
+                let rows = DMatrix::from_fn(slopes.nrows(), n, |value, i| match unknowns.free[i] {
+                    (of, k) if of == b => slopes[(value, k)] * sd[k],
+                    _ => 0.0,
+                });
+                let weighted = rows.transpose() * &table.weight / expansion.table_dispersion;
+                information += &weighted * &rows;
+                chance += &weighted * &table.chance * weighted.transpose() * expansion.table_dispersion;
+                for (part, of_batch) in parts.iter_mut().zip(&table.parts) {
+                    *part += &weighted * of_batch;
                 }
             }
         }
