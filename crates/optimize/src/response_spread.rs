@@ -2,6 +2,7 @@
 
 use crate::fit::at_bound;
 use crate::response_expansion::ResponseExpansion;
+use crate::table_expansion::TableExpansion;
 use crate::uncertainty::Spread;
 use crate::unknowns::Unknowns;
 use nalgebra::{DMatrix, DVector};
@@ -65,28 +66,21 @@ impl Spread {
                 }
             }
             for table in &expansion.tables {
-                let Some(slopes) = table.slopes(&absorption[b]) else { continue };
-                let rows = DMatrix::from_fn(slopes.nrows(), n, |value, i| match unknowns.free[i] {
+                let row = |slopes: &DMatrix<f64>, value: usize, i: usize| match unknowns.free[i] {
                     (of, k) if of == b => slopes[(value, k)] * sd[k],
                     _ => 0.0,
-                });
-                let weighted = rows.transpose() * &table.weight / expansion.table_dispersion;
-                information += &weighted * &rows;
-                chance += &weighted * &table.chance * weighted.transpose() * expansion.table_dispersion;
-                for (part, of_batch) in parts.iter_mut().zip(&table.parts) {
-                    *part += &weighted * of_batch;
-                }
+                };
+                let Some(slopes) = table.slopes(&absorption[b]) else { continue };
+                let rows = DMatrix::from_fn(slopes.nrows(), n, |value, i| row(&slopes, value, i));
+                add_table(
+                    table,
+                    rows,
+                    expansion.table_dispersion,
+                    (&mut information, &mut chance, &mut parts),
+                );
             }
         }
-        let mean = parts.iter().fold(DVector::zeros(n), |sum, part| sum + part) / batches.max(1) as f64;
-        let mut rays = DMatrix::<f64>::zeros(n, n);
-        for part in &parts {
-            let off = part - &mean;
-            rays += &off * off.transpose();
-        }
-        if batches > 1 {
-            rays *= batches as f64 / (batches as f64 - 1.0);
-        }
+        let rays = scatter(&parts, n);
 
         let prior = unknowns.prior_precision();
         // Positive definite by construction: a unit matrix and squares.
@@ -108,4 +102,32 @@ impl Spread {
         }
         spread
     }
+}
+
+/// Adds what a table tells of the deviations, by the derivatives of its values: information, what chance makes of it, what each batch of
+/// rays does.
+fn add_table(
+    table: &TableExpansion<'_>,
+    rows: DMatrix<f64>,
+    dispersion: f64,
+    (information, chance, parts): (&mut DMatrix<f64>, &mut DMatrix<f64>, &mut [DVector<f64>]),
+) {
+    let weighted = rows.transpose() * &table.weight / dispersion;
+    *information += &weighted * &rows;
+    *chance += &weighted * &table.chance * weighted.transpose() * dispersion;
+    for (part, of_batch) in parts.iter_mut().zip(&table.parts) {
+        *part += &weighted * of_batch;
+    }
+}
+
+/// Covariance of the sum of independent parts of `n` numbers, from their scatter.
+pub(crate) fn scatter(parts: &[DVector<f64>], n: usize) -> DMatrix<f64> {
+    let batches = parts.len() as f64;
+    let mean = parts.iter().fold(DVector::zeros(n), |sum, part| sum + part) / batches.max(1.0);
+    let mut scatter = DMatrix::<f64>::zeros(n, n);
+    for part in parts {
+        let off = part - &mean;
+        scatter += &off * off.transpose();
+    }
+    if parts.len() > 1 { scatter * (batches / (batches - 1.0)) } else { scatter }
 }

@@ -4,6 +4,7 @@ use crate::MeasuredParameter;
 use crate::expansion::Bins;
 use crate::history::{History, Traces};
 use crate::parameter_readings::{reading, scaled, scaled_sd};
+use crate::response_spread::scatter;
 use nalgebra::{DMatrix, DVector};
 use sabine_acoustics::{Bands, NoReading, ParameterKind};
 use sabine_paths::PathSet;
@@ -135,14 +136,7 @@ impl<'a> TableBand<'a> {
 impl TableReadings {
     /// Covariance of the predictions by the rays: the scatter of their batches.
     pub fn rays(&self) -> DMatrix<f64> {
-        let (n, batches) = (self.predicted.len(), self.parts.len() as f64);
-        let mean = self.parts.iter().fold(DVector::zeros(n), |sum, part| sum + part) / batches;
-        let mut scatter = DMatrix::<f64>::zeros(n, n);
-        for part in &self.parts {
-            let off = part - &mean;
-            scatter += &off * off.transpose();
-        }
-        scatter * (batches / (batches - 1.0))
+        scatter(&self.parts, self.predicted.len())
     }
 
     /// Inverse covariance of measured less predicted.
