@@ -83,7 +83,8 @@ impl MeasuredRoom {
             return Err(error.in_file(path, "bytes"));
         }
         let text = String::from_utf8_lossy(&bytes);
-        let text = text.trim_start_matches('\u{feff}');
+        // Lines are counted by their newlines alone: after the pair of other systems the parser says one too few.
+        let text = text.trim_start_matches('\u{feff}').replace("\r\n", "\n");
         let head = text.lines().next().unwrap_or_default();
         let delimiter =
             [b'\t', b';'].into_iter().find(|&mark| head.contains(char::from(mark))).unwrap_or(b',');

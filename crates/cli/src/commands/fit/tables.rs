@@ -12,7 +12,7 @@ use sabine::optimize::{
 use sabine::paths::Conditions;
 use sabine::scene::{MeasuredRoom, ParameterEntry, Receiver, Source};
 use serde::Serialize;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 use std::collections::BTreeMap;
 
 /// An octave of a pair stands out where one room in so many shows such a one by chance, all octaves and pairs counted (Bonferroni).
@@ -195,7 +195,7 @@ impl TableReport {
                 band_hz: octave.band_hz,
                 values: octave.count,
                 chi_squared: octave.chi_squared,
-                p: self.probability(octave),
+                p: self.probability(octave, worst),
                 stands_out: false,
                 sentence: sentence(&pair, octave, worst, entry),
             });
@@ -203,11 +203,15 @@ impl TableReport {
         Ok(())
     }
 
-    /// Probability of an octave's distance, the others' dispersion being that of the model.
-    fn probability(&self, octave: &OctaveMisfit) -> f64 {
+    /// Probability of an octave's distance, or of its worst value's own deviation, whichever is less likely; the others' dispersion is taken to
+    /// be that of the model. The first sees many values that are off, the second one slip among values that are right.
+    fn probability(&self, octave: &OctaveMisfit, worst: &ParameterMisfit) -> f64 {
         let dispersion = OCTAVES.index_of(octave.band_hz).and_then(|b| self.dispersion[b]).unwrap_or(1.0);
-        let chi_squared = octave.chi_squared / dispersion;
-        ChiSquared::new(octave.count as f64).map_or(1.0, |distribution| distribution.sf(chi_squared))
+        let count = octave.count as f64;
+        let all = ChiSquared::new(count).map_or(1.0, |chance| chance.sf(octave.chi_squared / dispersion));
+        let deviations = worst.own_deviations.abs() / dispersion.sqrt();
+        let one = 2.0 * count * Normal::standard().sf(deviations);
+        (2.0 * all.min(one)).min(1.0)
     }
 
     /// With means, and with what stands out.
