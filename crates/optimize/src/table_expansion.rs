@@ -5,6 +5,9 @@ use crate::parameter_readings::reading;
 use crate::table_band::{TableBand, TableReadings};
 use nalgebra::{DMatrix, DVector};
 
+/// A value on the scale of the fit, and its derivative by the energy of each bin.
+type Slope = (f64, Vec<f64>);
+
 /// A table of a pair in a band, expanded about an absorption: energies follow the mean hits of their bins as in
 /// [`Expansion`](crate::expansion::Expansion).
 pub(crate) struct TableExpansion<'b> {
@@ -43,7 +46,7 @@ impl<'b> TableExpansion<'b> {
     }
 
     /// Energies at an absorption, the values there and their derivatives by them.
-    fn read(&self, absorption: &[f64]) -> Option<(Vec<f64>, Vec<(f64, Vec<f64>)>)> {
+    fn read(&self, absorption: &[f64]) -> Option<(Vec<f64>, Vec<Slope>)> {
         let ratio = |(a, a0): (&f64, &f64)| (-a).ln_1p() - (-a0).ln_1p();
         let change: Vec<f64> = absorption.iter().zip(&self.about).map(ratio).collect();
         let rows = self.bins.hits.chunks_exact(change.len());
@@ -80,7 +83,7 @@ impl<'b> TableExpansion<'b> {
         (2.0 * cost, self.band.values.len() as f64)
     }
 
-    fn residual(&self, read: &[(f64, Vec<f64>)]) -> DVector<f64> {
+    fn residual(&self, read: &[Slope]) -> DVector<f64> {
         let values = self.band.values.iter().zip(read);
         DVector::from_iterator(read.len(), values.map(|(value, (predicted, _))| value.measured - predicted))
     }
