@@ -100,7 +100,7 @@ mod tests {
     fn energy() -> Vec<f64> {
         let of = |j: usize| {
             let t = (j as f64 + 0.5) * 1e-3;
-            let peaks = if j % 17 == 0 && j < 120 { 0.02 } else { 0.0 };
+            let peaks = if j.is_multiple_of(17) && j < 120 { 0.02 } else { 0.0 };
             (-13.8 * t / 0.9).exp() + 0.3 * (-13.8 * t / 0.3).exp() + peaks
         };
         (0..1500).map(of).collect()

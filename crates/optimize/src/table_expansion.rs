@@ -128,7 +128,8 @@ mod tests {
                     arrival: up,
                     batch,
                 });
-                chain = set.reflect(chain, u32::from((ray + hit * hit) % 3 == 0), Reflection::Specular);
+                chain =
+                    set.reflect(chain, u32::from((ray + hit * hit).is_multiple_of(3)), Reflection::Specular);
             }
         }
         set
