@@ -112,10 +112,10 @@ pub enum Error {
         /// Why.
         source: sabine_acoustics::NoReading,
     },
-    /// No response can be read in any band.
-    #[error("none of {responses} responses has a decay that can be read in any of {bands} bands")]
+    /// No response and no table of parameters can be read in any band.
+    #[error("none of {responses} responses and tables has a decay that can be read in any of {bands} bands")]
     NoDecay {
-        /// Number of responses.
+        /// Number of responses and tables.
         responses: usize,
         /// Number of bands.
         bands: usize,

@@ -56,6 +56,23 @@ impl<'a> FitProblem<'a> {
         traces: &[Trace<'_>],
         bin_s: f64,
     ) -> Result<(Vec<History>, Vec<Unabsorbed>), Error> {
+        self.histories_since(traces, bin_s, usize::MAX)
+    }
+
+    /// The same, the time of pairs from `tables_from` on counted from their first arrival, as parameters are.
+    pub(crate) fn histories_since(
+        &self,
+        traces: &[Trace<'_>],
+        bin_s: f64,
+        tables_from: usize,
+    ) -> Result<(Vec<History>, Vec<Unabsorbed>), Error> {
+        let history = |trace: &Trace<'_>, air: &Air, delays_s: Option<&[f64]>| {
+            if trace.pair >= tables_from {
+                History::since_first_arrival(trace.paths, air, delays_s, bin_s)
+            } else {
+                History::delayed(trace.paths, air, delays_s, bin_s)
+            }
+        };
         let pairs = traces.iter().map(|trace| trace.pair + 1).max().unwrap_or(0);
         if !self.under.is_empty() && self.under.len() != pairs {
             return Err(Error::ConditionCount { pairs, found: self.under.len() });
@@ -65,14 +82,14 @@ impl<'a> FitProblem<'a> {
             let Some(conditions) = self.under.get(trace.pair) else {
                 let bands = self.materials[0].bands();
                 let unabsorbed = Unabsorbed::Air(self.air.energy_exponent_per_m(bands));
-                return Ok((History::new(trace.paths, self.air, bin_s), unabsorbed));
+                return Ok((history(trace, self.air, None), unabsorbed));
             };
             let conditions = conditions.with_materials(&rigid);
             if trace.paths.added_energy(&conditions, STEP_S, 1)?.is_some() {
                 return Err(Error::AddedSound);
             }
             let delays_s = trace.paths.delays_s(&conditions)?;
-            let history = History::delayed(trace.paths, conditions.air, delays_s.as_deref(), bin_s);
+            let history = history(trace, conditions.air, delays_s.as_deref());
             Ok((history, Unabsorbed::Under(trace.paths.energies(&conditions)?)))
         };
         let all = traces.par_iter().map(one).collect::<Result<Vec<_>, Error>>()?;

@@ -86,6 +86,17 @@ impl History {
         }
     }
 
+    /// The same, time counted from the first arrival in place of the emission.
+    pub fn since_first_arrival(paths: &PathSet, air: &Air, delays_s: Option<&[f64]>, bin_s: f64) -> Self {
+        let speed_m_s = air.speed_of_sound_m_s();
+        let delay_s = |i: usize| delays_s.map_or(0.0, |delays_s| delays_s[i]);
+        let lengths_m = || paths.lengths_m().iter().enumerate();
+        let arrival_s = |(i, length_m): (usize, &f32)| f64::from(*length_m) / speed_m_s + delay_s(i);
+        let first_s = lengths_m().map(arrival_s).fold(f64::INFINITY, f64::min);
+        let earlier_s: Vec<f64> = (0..paths.len()).map(|i| delay_s(i) - first_s).collect();
+        Self::delayed(paths, air, Some(&earlier_s), bin_s)
+    }
+
     pub fn bins(&self) -> usize {
         self.starts.len() - 1
     }
@@ -221,7 +232,32 @@ impl History {
     }
 }
 
+/// Energies of the bins by batches of rays.
+pub(crate) struct BatchEnergies {
+    /// `energy[bin * (BATCHES + 1) + batch]`; the last place of a bin is for exact paths.
+    pub energy: Vec<f64>,
+    /// Sum of the squared energies of the exact paths of each bin.
+    pub exact_squares: Vec<f64>,
+}
+
 impl History {
+    /// Energy of each batch in each bin.
+    pub fn batch_energies(&self, weights: &[f32], absorption: &[f64]) -> BatchEnergies {
+        let (powers, stride) = self.powers(absorption);
+        let places = usize::from(PathSet::BATCHES) + 1;
+        let mut energy = vec![0.0; self.bins() * places];
+        let mut exact_squares = vec![0.0; self.bins()];
+        for bin in 0..self.bins() {
+            for (e, _, batch) in self.paths(bin, weights, &powers, stride) {
+                energy[bin * places + usize::from(batch)] += e;
+                if batch == PathSet::BATCHES {
+                    exact_squares[bin] += e * e;
+                }
+            }
+        }
+        BatchEnergies { energy, exact_squares }
+    }
+
     /// What each batch of rays contributes to a linear functional of the bins' energies.
     pub fn batch_sums(&self, weights: &[f32], absorption: &[f64], functional: &[f64]) -> Vec<f64> {
         let (powers, stride) = self.powers(absorption);

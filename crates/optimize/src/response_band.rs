@@ -4,6 +4,7 @@ use crate::AbsorptionPrior;
 use crate::history::{History, Traces};
 use crate::measured_decay::BinnedDecay;
 use crate::pulse::Pulse;
+use crate::table_band::TableBand;
 use crate::unknowns::BandPrior;
 use sabine_paths::PathSet;
 use sabine_scene::Levels;
@@ -28,6 +29,8 @@ pub(crate) struct ResponseBand<'a> {
     pub prior: BandPrior,
     pub levels: Levels,
     pub responses: Vec<BandResponse<'a>>,
+    /// Parameters of pairs that were measured as tables.
+    pub tables: Vec<TableBand<'a>>,
 }
 
 /// A response in a band, its bins counted from the emission.
@@ -76,7 +79,7 @@ pub(crate) struct Arrival {
 
 impl<'a> ResponseBand<'a> {
     pub fn new(priors: &[AbsorptionPrior], band: usize, levels: Levels) -> Self {
-        Self { prior: BandPrior::new(priors, band), levels, responses: Vec::new() }
+        Self { prior: BandPrior::new(priors, band), levels, responses: Vec::new(), tables: Vec::new() }
     }
 
     /// Adds a response as far as the paths reach; whether anything is left of it.
@@ -158,9 +161,10 @@ impl<'a> ResponseBand<'a> {
         self.responses.iter_mut().for_each(|response| response.fitted = response.windows.len());
     }
 
-    /// Whether no response can be read.
+    /// Whether no response can be read, and no table has a value.
     pub fn is_empty(&self) -> bool {
         self.responses.iter().all(|response| response.windows.is_empty())
+            && self.tables.iter().all(|table| table.values.is_empty())
     }
 
     /// Whether a response has a gain of its own, shares it with the band, or has none.

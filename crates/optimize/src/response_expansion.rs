@@ -3,6 +3,7 @@
 use crate::expansion::Bins;
 use crate::history::variance_of_sum;
 use crate::response_band::{Arrival, BandResponse, ResponseBand, Window};
+use crate::table_expansion::TableExpansion;
 use sabine_scene::Levels;
 
 /// A measured bin and what the paths give for it near an absorption.
@@ -33,6 +34,10 @@ pub(crate) struct ResponseExpansion<'b> {
     pub band: &'b ResponseBand<'b>,
     about: Vec<f64>,
     pub bins: Vec<Bin>,
+    pub tables: Vec<TableExpansion<'b>>,
+    /// How much farther the values of the tables lie from the paths than chance puts them, as a variance ratio; at least 1, and held while
+    /// the materials move.
+    pub table_dispersion: f64,
 }
 
 impl<'b> ResponseExpansion<'b> {
@@ -50,6 +55,10 @@ impl<'b> ResponseExpansion<'b> {
             bin.batches.iter_mut().for_each(|p| *p /= energy);
             bin.weight = 1.0 / (bin.chance + variance_of_sum(&bin.batches));
         }
+        let tables = band.tables.iter().filter(|table| !table.values.is_empty());
+        // What cannot be read at the start was left out, and no step is taken to where it cannot be read.
+        expansion.tables =
+            tables.filter_map(|table| TableExpansion::about(table, absorption, path_error)).collect();
         expansion
     }
 
@@ -62,6 +71,8 @@ impl<'b> ResponseExpansion<'b> {
         for (bin, old) in moved.bins.iter_mut().zip(&self.bins) {
             bin.weight = old.weight;
         }
+        moved.tables = self.tables.iter().map(|table| table.moved_to(absorption)).collect::<Option<_>>()?;
+        moved.table_dispersion = self.table_dispersion;
         Some(moved)
     }
 
@@ -79,7 +90,7 @@ impl<'b> ResponseExpansion<'b> {
                 bins.extend(bin.map(|bin| Bin { group, place, window: j, ..bin }));
             }
         }
-        Self { band, about: absorption.to_vec(), bins }
+        Self { band, about: absorption.to_vec(), bins, tables: Vec::new(), table_dispersion: 1.0 }
     }
 
     /// ln E of a bin at an absorption, and the share of the band's own paths in E.
@@ -150,6 +161,20 @@ impl<'b> ResponseExpansion<'b> {
             }
         }
         cost
+    }
+
+    /// Half the squared distance of the values of the tables, over their dispersion. `gradient` receives its derivative by each absorption,
+    /// added to what is there.
+    pub fn table_cost(&self, absorption: &[f64], gradient: &mut [f64]) -> f64 {
+        let share = 1.0 / self.table_dispersion;
+        self.tables.iter().map(|table| table.cost(absorption, gradient, share)).sum()
+    }
+
+    /// Takes the dispersion of the tables at an absorption.
+    pub fn weigh_tables(&mut self, absorption: &[f64]) {
+        let sums = self.tables.iter().map(|table| table.chi_squared(absorption));
+        let (chi_squared, values) = sums.fold((0.0, 0.0), |(c, n), (chi, count)| (c + chi, n + count));
+        self.table_dispersion = if values > 0.0 { (chi_squared / values).max(1.0) } else { 1.0 };
     }
 
     /// Mean deviance of the bins, in what it would be by chance; at least 1.

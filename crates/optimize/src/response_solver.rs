@@ -1,4 +1,4 @@
-//! The most probable materials, given measured responses.
+//! The most probable materials, given measured responses and tables of parameters.
 
 use crate::bounded::minimise;
 use crate::fit::Unconverged;
@@ -43,8 +43,10 @@ pub(crate) struct Solved {
     pub spread: Spread,
     /// Gain of each response of each band in dB.
     pub gains_db: Vec<Vec<(usize, f64)>>,
-    /// `None` in a band without data.
+    /// `None` in a band without responses.
     pub dispersion: Vec<Option<f64>>,
+    /// The same of tables of parameters.
+    pub table_dispersion: Vec<Option<f64>>,
     pub prior_cost: f64,
     pub iterations: usize,
     /// Whether the late decay of each band was left out.
@@ -129,6 +131,7 @@ pub(crate) fn solve(
         expansions = expand(&x);
         let absorption = unknowns.absorption(&x);
         dispersion = expansions.iter().zip(&absorption).map(|(e, a)| e.dispersion(a)).collect();
+        expansions.iter_mut().zip(&absorption).for_each(|(e, a)| e.weigh_tables(a));
         unconverged = Some(Unconverged::StillMoving { deviations: moved });
         if moved < TOLERANCE {
             unconverged = (!descent.converged).then_some(Unconverged::NoDescent);
@@ -141,8 +144,20 @@ pub(crate) fn solve(
     let prior_cost = unknowns.prior_cost(&x, &mut vec![0.0; x.len()]);
     let dispersion = dispersion.iter().zip(&expansions).map(|(d, e)| (!e.bins.is_empty()).then_some(*d));
     let dispersion = dispersion.collect();
+    let of_tables = |e: &ResponseExpansion<'_>| (!e.tables.is_empty()).then_some(e.table_dispersion);
+    let table_dispersion = expansions.iter().map(of_tables).collect();
     let confined = vec![false; bands.len()];
-    Ok(Solved { absorption, spread, gains_db, dispersion, prior_cost, iterations, confined, unconverged })
+    Ok(Solved {
+        absorption,
+        spread,
+        gains_db,
+        dispersion,
+        table_dispersion,
+        prior_cost,
+        iterations,
+        confined,
+        unconverged,
+    })
 }
 
 /// What a descent came to.
@@ -239,6 +254,7 @@ impl Objective for Likelihood<'_, '_> {
             let mut by = vec![0.0; a.len()];
             cost += expansion.cost(a, &mut by) / dispersion;
             by.iter_mut().for_each(|g| *g /= dispersion);
+            cost += expansion.table_cost(a, &mut by);
             by_absorption.push(by);
         }
         for (i, g) in gradient.iter_mut().enumerate() {

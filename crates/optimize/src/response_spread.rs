@@ -2,6 +2,7 @@
 
 use crate::fit::at_bound;
 use crate::response_expansion::ResponseExpansion;
+use crate::table_expansion::TableExpansion;
 use crate::uncertainty::Spread;
 use crate::unknowns::Unknowns;
 use nalgebra::{DMatrix, DVector};
@@ -27,12 +28,13 @@ impl Spread {
             standard_error: zeros(),
             remaining: zeros(),
             shows: absorption.iter().map(|a| vec![false; a.len()]).collect(),
-            data: expansions.iter().map(|e| !e.bins.is_empty()).collect(),
+            data: expansions.iter().map(|e| !e.bins.is_empty() || !e.tables.is_empty()).collect(),
         };
         let mut information = DMatrix::<f64>::zeros(n, n);
         let mut chance = DMatrix::<f64>::zeros(n, n);
-        let batches = expansions.iter().flat_map(|e| e.bins.first()).map(|b| b.batches.len()).max();
-        let batches = batches.unwrap_or(0);
+        let of_bins = expansions.iter().flat_map(|e| e.bins.first()).map(|b| b.batches.len());
+        let of_tables = expansions.iter().flat_map(|e| e.tables.first()).map(|t| t.parts.len());
+        let batches = of_bins.chain(of_tables).max().unwrap_or(0);
         let mut parts = vec![DVector::<f64>::zeros(n); batches];
         for (b, expansion) in expansions.iter().enumerate() {
             let sd = &expansion.band.prior.standard_deviation;
@@ -63,16 +65,22 @@ impl Spread {
                     *part += &row * (weight * share);
                 }
             }
+            for table in &expansion.tables {
+                let row = |slopes: &DMatrix<f64>, value: usize, i: usize| match unknowns.free[i] {
+                    (of, k) if of == b => slopes[(value, k)] * sd[k],
+                    _ => 0.0,
+                };
+                let Some(slopes) = table.slopes(&absorption[b]) else { continue };
+                let rows = DMatrix::from_fn(slopes.nrows(), n, |value, i| row(&slopes, value, i));
+                add_table(
+                    table,
+                    rows,
+                    expansion.table_dispersion,
+                    (&mut information, &mut chance, &mut parts),
+                );
+            }
         }
-        let mean = parts.iter().fold(DVector::zeros(n), |sum, part| sum + part) / batches.max(1) as f64;
-        let mut rays = DMatrix::<f64>::zeros(n, n);
-        for part in &parts {
-            let off = part - &mean;
-            rays += &off * off.transpose();
-        }
-        if batches > 1 {
-            rays *= batches as f64 / (batches as f64 - 1.0);
-        }
+        let rays = scatter(&parts, n);
 
         let prior = unknowns.prior_precision();
         // Positive definite by construction: a unit matrix and squares.
@@ -94,4 +102,32 @@ impl Spread {
         }
         spread
     }
+}
+
+/// Adds what a table tells of the deviations, by the derivatives of its values: information, what chance makes of it, what each batch of
+/// rays does.
+fn add_table(
+    table: &TableExpansion<'_>,
+    rows: DMatrix<f64>,
+    dispersion: f64,
+    (information, chance, parts): (&mut DMatrix<f64>, &mut DMatrix<f64>, &mut [DVector<f64>]),
+) {
+    let weighted = rows.transpose() * &table.weight / dispersion;
+    *information += &weighted * &rows;
+    *chance += &weighted * &table.chance * weighted.transpose() * dispersion;
+    for (part, of_batch) in parts.iter_mut().zip(&table.parts) {
+        *part += &weighted * of_batch;
+    }
+}
+
+/// Covariance of the sum of independent parts of `n` numbers, from their scatter.
+pub(crate) fn scatter(parts: &[DVector<f64>], n: usize) -> DMatrix<f64> {
+    let batches = parts.len() as f64;
+    let mean = parts.iter().fold(DVector::zeros(n), |sum, part| sum + part) / batches.max(1.0);
+    let mut scatter = DMatrix::<f64>::zeros(n, n);
+    for part in parts {
+        let off = part - &mean;
+        scatter += &off * off.transpose();
+    }
+    if parts.len() > 1 { scatter * (batches / (batches - 1.0)) } else { scatter }
 }

@@ -8,8 +8,10 @@ use crate::measured_decay::MeasuredDecay;
 use crate::prediction::t60_of_traces;
 use crate::response_band::ResponseBand;
 use crate::response_leaks::solve_with_leaks;
-use crate::{Error, MaterialFit, MaterialFitter};
-use sabine_acoustics::{NoReading, Observer, PerBand, report};
+use crate::response_solver::Solved;
+use crate::tables::{TableFit, check_tables};
+use crate::{Error, FitConfig, MaterialFit, MaterialFitter, MeasuredTable};
+use sabine_acoustics::{Material, NoReading, Observer, PerBand, report};
 use sabine_paths::PathSet;
 use sabine_scene::{Measurement, TimeZero};
 
@@ -67,10 +69,29 @@ impl MaterialFitter {
         problem: &FitProblem<'_>,
         observer: &dyn Observer,
     ) -> Result<ResponseFit, Error> {
+        Ok(self.fit_measured((pairs, measurement), &[], problem, observer)?.of_responses)
+    }
+
+    /// Fits to the energy decays of responses, as [`fit_responses`](Self::fit_responses) does, and to the parameters of other pairs, as
+    /// [`fit_tables`](Self::fit_tables) does. A pair that has both should be given once: its parameters are read from its response.
+    ///
+    /// Conditions of the problem are those of the responses' pairs, followed by those of the tables'.
+    ///
+    /// # Errors
+    /// As either.
+    pub fn fit_measured(
+        &self,
+        (pairs, measurement): (&[MeasuredPair<'_>], Measurement),
+        tables: &[MeasuredTable<'_>],
+        problem: &FitProblem<'_>,
+        observer: &dyn Observer,
+    ) -> Result<TableFit, Error> {
         let FitProblem { materials, priors, .. } = *problem;
-        let paths: Vec<&PathSet> = pairs.iter().map(|p| p.paths).collect();
+        let paths: Vec<&PathSet> =
+            pairs.iter().map(|p| p.paths).chain(tables.iter().map(|t| t.paths)).collect();
         check_paths(&paths, materials)?;
         self.check_priors(materials, priors)?;
+        check_tables(tables)?;
         let octaves = materials[0].bands();
         if let Some(other) = pairs.iter().map(|p| p.measured.bands()).find(|b| *b != octaves) {
             return Err(sabine_acoustics::Error::BandMismatch { left: octaves, right: other }.into());
@@ -78,11 +99,14 @@ impl MaterialFitter {
         let config = self.config();
         let traces: Vec<Trace<'_>> =
             paths.iter().enumerate().map(|(pair, paths)| Trace { pair, paths, share: 1.0 }).collect();
-        let (histories, unabsorbed) = problem.histories(&traces, config.bin_s)?;
+        let (histories, unabsorbed) = problem.histories_since(&traces, config.bin_s, pairs.len())?;
+        let (of_pairs, of_tables) = histories.split_at(pairs.len());
         let (mut bands, left_out) =
-            self.read_bands(pairs, (&histories, &unabsorbed), measurement, problem)?;
+            self.read_bands(pairs, (of_pairs, &unabsorbed[..pairs.len()]), measurement, problem)?;
+        let values_left_out =
+            self.read_tables(&mut bands, tables, (of_tables, &unabsorbed[pairs.len()..]), problem)?;
         if bands.iter().all(ResponseBand::is_empty) {
-            return Err(Error::NoDecay { responses: pairs.len(), bands: octaves.len() });
+            return Err(Error::NoDecay { responses: paths.len(), bands: octaves.len() });
         }
 
         let together = if config.smoothness > 0.0 { bands.len() } else { 1 };
@@ -90,28 +114,10 @@ impl MaterialFitter {
         let solved = solve_with_leaks(&mut bands, together, config)?;
         report(observer, STAGE, 1, 1)?;
 
-        let group = |b: usize| (&solved[b / together], b % together);
-        let found: Vec<FoundBand<'_>> = bands
-            .iter()
-            .enumerate()
-            .map(|(b, band)| {
-                let (group, place) = group(b);
-                let (prior, absorption, spread) = (&band.prior, &group.absorption[place][..], &group.spread);
-                // A band without data keeps its priors, and says so.
-                let unconverged = group.unconverged.filter(|_| !band.is_empty());
-                FoundBand { prior, absorption, spread, place, unconverged }
-            })
-            .collect();
-        let mut fit = MaterialFit::of_bands(materials, &histories, &found, config)?;
-        fit.iterations = solved.iter().map(|s| s.iterations).sum();
-        fit.cost = solved.iter().map(|s| s.prior_cost).sum();
-        for (b, band_hz) in octaves.iter_hz().enumerate() {
-            if group(b).0.confined[group(b).1] {
-                fit.warnings.push(Warning::LateDecayLeftOut { band_hz });
-            }
-        }
+        let mut fit = material_fit(materials, &histories, (&bands, &solved), config)?;
         let fitted = FitProblem { materials: &fit.materials, ..*problem };
         fit.predicted_t60_s = t60_of_traces(&traces, &fitted, config.bin_s, config.range_db)?;
+        let group = |b: usize| (&solved[b / together], b % together);
         let gain_db = (0..pairs.len())
             .map(|i| {
                 PerBand::from_fn(octaves, |b| {
@@ -121,7 +127,11 @@ impl MaterialFitter {
             })
             .collect();
         let dispersion = PerBand::from_fn(octaves, |b| group(b).0.dispersion[group(b).1]);
-        Ok(ResponseFit { fit, gain_db, dispersion, left_out })
+        Ok(TableFit {
+            of_responses: ResponseFit { fit, gain_db, dispersion, left_out },
+            dispersion: PerBand::from_fn(octaves, |b| group(b).0.table_dispersion[group(b).1]),
+            left_out: values_left_out,
+        })
     }
 
     /// What each band holds of each response, and what is left out of it.
@@ -160,6 +170,37 @@ impl MaterialFitter {
         }
         Ok((bands, left_out))
     }
+}
+
+/// The materials of bands that were solved in groups, and what must be said of them.
+fn material_fit(
+    materials: &[Material],
+    histories: &[History],
+    (bands, solved): (&[ResponseBand<'_>], &[Solved]),
+    config: &FitConfig,
+) -> Result<MaterialFit, Error> {
+    let together = bands.len() / solved.len();
+    let group = |b: usize| (&solved[b / together], b % together);
+    let found: Vec<FoundBand<'_>> = bands
+        .iter()
+        .enumerate()
+        .map(|(b, band)| {
+            let (group, place) = group(b);
+            let (prior, absorption, spread) = (&band.prior, &group.absorption[place][..], &group.spread);
+            // A band without data keeps its priors, and says so.
+            let unconverged = group.unconverged.filter(|_| !band.is_empty());
+            FoundBand { prior, absorption, spread, place, unconverged }
+        })
+        .collect();
+    let mut fit = MaterialFit::of_bands(materials, histories, &found, config)?;
+    fit.iterations = solved.iter().map(|s| s.iterations).sum();
+    fit.cost = solved.iter().map(|s| s.prior_cost).sum();
+    for (b, band_hz) in materials[0].bands().iter_hz().enumerate() {
+        if group(b).0.confined[group(b).1] {
+            fit.warnings.push(Warning::LateDecayLeftOut { band_hz });
+        }
+    }
+    Ok(fit)
 }
 
 /// Seconds from the first sample of each response to the emission.

@@ -42,7 +42,7 @@
 //! - [`FloorPlan`]: corners of a room, or four of a rectangle.
 //! - Theory of diffuse fields, kept apart from measurement: [`DiffuseRoom`] (Sabine, Eyring, Millington, Fitzroy,
 //!   Arau-Puchades, critical distance, mean free path), [`schroeder_frequency_hz`].
-//! - With the feature `rooms`: [`MeasuredRoom`] (a folder with `room.toml`, a mesh and responses), [`Materials`] (tables of
+//! - With the feature `rooms`: [`MeasuredRoom`] (a folder with `room.toml`, a mesh, responses and tables of parameters), [`Materials`] (tables of
 //!   absorption from file to file), [`DrawnRoom`] (a folder from a floor plan), [`NewRoom`] (a folder from measurements),
 //!   [`Measurements`] (responses and places from REW's text, tables and SOFA files), [`RoomModel`] (what to put them into).
 //!
@@ -96,8 +96,8 @@ pub use floor_plan::FloorPlan;
 pub use measured_room::materials::{MaterialTable, Materials};
 #[cfg(feature = "rooms")]
 pub use measured_room::{
-    DrawnRoom, Levels, MaterialPrior, MeasuredRoom, Measurement, NewResponse, NewRoom, PositionSd,
-    ReadOptions, ResponseEntry, RoomModel, RoomNote, TimeZero,
+    DrawnRoom, Levels, MaterialPrior, MeasuredRoom, Measurement, NewResponse, NewRoom, ParameterEntry,
+    PositionSd, ReadOptions, ResponseEntry, RoomModel, RoomNote, TimeZero,
 };
 #[cfg(feature = "sofa")]
 pub use measurements::SofaConvention;

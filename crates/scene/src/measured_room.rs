@@ -7,6 +7,7 @@ pub(crate) mod materials;
 mod model;
 mod notes;
 mod other_model;
+mod parameter_tables;
 mod position_sd;
 mod prior;
 pub(crate) mod response_check;
@@ -17,6 +18,7 @@ mod write;
 pub use drawn_room::DrawnRoom;
 pub use model::RoomModel;
 pub use notes::RoomNote;
+pub use parameter_tables::ParameterEntry;
 pub use position_sd::PositionSd;
 pub use prior::MaterialPrior;
 pub use write::{NewResponse, NewRoom};
@@ -183,6 +185,7 @@ pub struct MeasuredRoom {
     sources: Vec<Source>,
     receivers: Vec<Receiver>,
     responses: Vec<ResponseEntry>,
+    parameters: Vec<ParameterEntry>,
 }
 
 impl MeasuredRoom {
@@ -232,10 +235,13 @@ impl MeasuredRoom {
             let entry = room.entry(&file, i, table, wav, None)?;
             room.responses.push(entry);
         }
+        for (i, table) in file.parameters.iter().enumerate() {
+            room.read_parameters(i, table, &named(format!("parameters[{i}].file"), &table.file)?)?;
+        }
         Ok(room)
     }
 
-    /// Everything but the responses.
+    /// Everything but responses and tables of parameters.
     fn assemble(
         path: &Path,
         file: &RoomFile,
@@ -310,6 +316,7 @@ impl MeasuredRoom {
             sources,
             receivers,
             responses: Vec::new(),
+            parameters: Vec::new(),
         })
     }
 

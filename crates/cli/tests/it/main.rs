@@ -25,6 +25,7 @@ mod replace;
 mod rooms;
 mod sheet;
 mod sweep;
+mod tables;
 mod trace;
 
 use std::process::Command;

@@ -11,6 +11,7 @@ mod other_tracers;
 mod refusals;
 mod retracing;
 mod swinging_weights;
+mod tables;
 mod twelve_pairs;
 mod two_room_flat;
 mod under_conditions;

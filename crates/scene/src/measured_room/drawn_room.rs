@@ -82,6 +82,7 @@ impl DrawnRoom {
             sources: self.sources.iter().map(|s| place(&s.id, s.position_m, s.axis, None)).collect(),
             receivers: self.receivers.iter().map(|r| place(&r.id, r.position_m, r.axis, None)).collect(),
             responses: Vec::new(),
+            parameters: Vec::new(),
         };
         write_folder(folder.as_ref(), &file, &scene.to_obj(), &[])
     }

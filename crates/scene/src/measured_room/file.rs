@@ -23,6 +23,8 @@ pub(super) struct RoomFile {
     pub receivers: Vec<PlaceTable>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub responses: Vec<ResponseTable>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parameters: Vec<ParameterTable>,
 }
 
 #[derive(Deserialize, Serialize)]
@@ -97,4 +99,15 @@ pub(super) struct ResponseTable {
     pub session: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recorded_at: Option<f64>,
+}
+
+/// A table of measured parameters: of one pair where source and receiver are named, else of those that its lines name.
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ParameterTable {
+    pub file: PathBuf,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub receiver: Option<String>,
 }

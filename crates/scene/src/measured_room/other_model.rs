@@ -54,10 +54,10 @@ impl MeasuredRoom {
         Self { responses, ..self.clone() }
     }
 
-    /// The same room with other receivers and without any response: nothing has been measured at them yet.
+    /// The same room with other receivers and without any response or table: nothing has been measured at them yet.
     #[must_use]
     pub fn unmeasured_at(&self, receivers: Vec<Receiver>) -> Self {
-        Self { receivers, responses: Vec::new(), ..self.clone() }
+        Self { receivers, responses: Vec::new(), parameters: Vec::new(), ..self.clone() }
     }
 }
 

@@ -174,6 +174,7 @@ impl NewRoom {
                 .map(|r| place(&r.id, r.position_m, r.axis, self.position_sd.receivers_m.get(&r.id)))
                 .collect(),
             responses: self.responses.iter().map(response).collect(),
+            parameters: Vec::new(),
         }
     }
 }

@@ -11,6 +11,8 @@ mod hostile_sizes;
 #[cfg(feature = "rooms")]
 mod measured_rooms;
 mod obj_against_tobj;
+#[cfg(feature = "rooms")]
+mod parameter_tables;
 #[cfg(feature = "tables")]
 mod position_tables;
 #[cfg(unix)]

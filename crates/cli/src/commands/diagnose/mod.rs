@@ -93,6 +93,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     // A folder that cannot be written to should not cost the user a computation first.
     let mut out = OutputFolder::create(&arguments.out)?;
     let (room, name) = arguments.room.read(&mut demo)?;
+    if room.responses().is_empty() && !room.parameters().is_empty() {
+        return Err("room.toml: there are tables of parameters and no responses: a diagnosis weighs arrivals and decays, which tables do not hold; `sabine fit` says which pairs and octaves the model does not explain".into());
+    }
     let bar = Bar::stopped_on_request(arguments.time_limit.map(Duration::from_secs))?;
     let mut diagnosis = diagnoser.diagnose(&room, &arguments.hold_out, &bar).map_err(|error| -> Failure {
         // An error of its own may come first, and counts then.
@@ -105,6 +108,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     })?;
     bar.finish();
 
+    if !room.parameters().is_empty() {
+        diagnosis
+            .notes
+            .push("tables of parameters were not used: `sabine fit` holds them against the model".to_owned());
+    }
     let mut receivers: Vec<usize> = room.responses().iter().map(|r| r.receiver).collect();
     receivers.sort_unstable();
     receivers.dedup();

@@ -1,8 +1,11 @@
-//! Fits the absorption of a room's materials to reverberation times or to measured responses, and says what that leaves open.
+//! Fits the absorption of a room's materials to reverberation times, to measured responses or to tables of measured parameters, and
+//! says what that leaves open.
 //!
 //! Without arguments it fits the built-in demo to its two responses.
 
+mod measured;
 mod summary;
+mod tables;
 mod verdict;
 
 use crate::bar::Bar;
@@ -16,20 +19,20 @@ use crate::room::{PlaceArguments, RoomArguments};
 use clap::{Args, ValueEnum};
 use rayon::prelude::*;
 use sabine::acoustics::{
-    Air, Bands, Error as AcousticsError, Estimate, Material, NoReading, PerBand, Reading, RoomParameters,
-    SampleFormat, Signal, encode_wav,
+    Air, Bands, EnergyResponse, Error as AcousticsError, Estimate, Material, NoReading, PerBand, Reading,
+    RoomParameters, SampleFormat, Signal, encode_wav,
 };
 use sabine::optimize::{
-    AbsorptionPrior, DecayMisfit, FitConfig, FitProblem, MaterialFit, MaterialFitter, MeasuredDecay,
-    MeasuredPair, Retrace, RetraceConfig, SlopeObjective,
+    AbsorptionPrior, DecayMisfit, FitConfig, FitProblem, MaterialFit, MaterialFitter, Retrace, RetraceConfig,
+    SlopeObjective,
 };
 use sabine::paths::laws::BoundLaws;
-use sabine::paths::{Conditions, PathSet, Propagator};
+use sabine::paths::{PathSet, Propagator};
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use sabine::scene::{MeasuredRoom, Receiver, Scene, Source};
 use std::path::PathBuf;
-use std::time::Instant;
-use summary::{Compared, Seconds, Summary, mean_of};
+use summary::{Compared, Seconds, Summary};
+use tables::TableReport;
 use verdict::Aim;
 
 /// Octaves of targets and materials: 125 Hz to 8 kHz.
@@ -42,6 +45,8 @@ const RATE_HZ: u32 = 48_000;
 /// Paths are looked for as long as this many times the longest reverberation time, within these limits in seconds.
 const DURATION_FACTOR: f64 = 1.25;
 const DURATION_S: (f64, f64) = (0.3, 6.0);
+/// Step of the decay curves that are drawn, in seconds.
+const DECAY_STEP_S: f64 = 5e-3;
 
 /// Find the absorption with which a simulated room decays like the real one.
 #[derive(Args)]
@@ -49,12 +54,15 @@ pub struct Arguments {
     #[command(flatten)]
     room: RoomArguments,
     /// Reverberation times at 125 Hz to 8 kHz, in seconds, between --source and --receiver
-    #[arg(long, value_delimiter = ',', value_name = "S,...", conflicts_with = "responses")]
+    #[arg(long, value_delimiter = ',', value_name = "S,...", conflicts_with_all = ["responses", "tables"])]
     t60: Option<Vec<f64>>,
-    /// Fit to the room's measured responses (the default without --t60)
+    /// Fit to the room's measured responses only [default without --t60: to responses and tables of parameters, as far as there are any]
     #[arg(long)]
     responses: bool,
-    /// Receivers, or SOURCE/RECEIVER, whose responses are not fitted but predicted
+    /// Fit to the room's tables of measured parameters only
+    #[arg(long, conflicts_with = "responses")]
+    tables: bool,
+    /// Receivers, or SOURCE/RECEIVER, whose responses and parameters are not fitted but predicted
     #[arg(long, value_delimiter = ',', value_name = "ID", conflicts_with = "t60")]
     hold_out: Vec<String>,
     /// What is made to meet --t60
@@ -105,6 +113,8 @@ struct Outcome<'a> {
     /// Where it comes from, and where it is heard.
     place: (&'a Source, &'a Receiver),
     compared: Vec<Compared>,
+    /// Tables of parameters against the simulation, where there are any.
+    tables: Option<TableReport>,
     /// Besides those of the fit.
     warnings: Vec<String>,
     seconds: Seconds,
@@ -132,7 +142,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let bar = Bar::new();
     let outcome = match &arguments.t60 {
         Some(t60_s) => room.fit_t60(t60_s, &bar)?,
-        None => room.fit_responses(&bar)?,
+        None => room.fit_measured(&bar)?,
     };
     bar.finish();
 
@@ -147,6 +157,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     out.write("materials.toml", outcome.fit.tables(&names)?.to_toml()?.as_bytes())?;
     if !outcome.compared.is_empty() {
         out.write("responses.json", serde_json::to_string_pretty(&outcome.compared)?.as_bytes())?;
+    }
+    if let Some(tables) = &outcome.tables {
+        out.write("parameters.json", serde_json::to_string_pretty(tables)?.as_bytes())?;
     }
     let mut page = Page::new("Materials fitted");
     page.paragraph(&summary.verdict);
@@ -163,6 +176,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     page.markup("</div>").heading("Absorption");
     page.table(&summary.table());
+    if let Some(tables) = &outcome.tables {
+        tables.add_to(&mut page);
+    }
     out.write("report.html", page.html().as_bytes())?;
     out.finish()?;
     if let Some(path) = &arguments.json {
@@ -223,6 +239,16 @@ impl<'a> Room<'a> {
         tracer.trace(&self.scene, source, receiver, &self.air, &())
     }
 
+    /// Energy over time of paths with given materials.
+    fn decay(
+        &self,
+        paths: &PathSet,
+        materials: &[Material],
+        laws: &BoundLaws,
+    ) -> Result<EnergyResponse, AcousticsError> {
+        paths.energy_response(&conditions(materials, &self.air, laws), DECAY_STEP_S)
+    }
+
     fn fit_t60(&self, t60_s: &[f64], bar: &Bar) -> Result<Outcome<'a>, Failure> {
         let targets = PerBand::new(OCTAVES, t60_s.iter().map(|&t| Estimate::exact(t)).collect())?;
         let longest_s = t60_s.iter().copied().fold(0.0, f64::max);
@@ -243,21 +269,9 @@ impl<'a> Room<'a> {
             bar,
         )?;
         let independent = done.independent_paths.into_iter().next().ok_or("no paths")?;
-        let curve = |materials: &[Material]| {
-            independent.energy_response(&conditions(materials, &self.air, &laws), 5e-3)
-        };
-        let (before, after) = (curve(&self.materials)?, curve(&done.fit.materials)?);
-        let points = |energy: &sabine::acoustics::EnergyResponse, b: usize| {
-            let level = energy.decay_curve(b).level_db().into_iter().enumerate();
-            level.map(|(i, l)| (i as f64 * 5e-3, l)).filter(|p| p.1 > -65.0).collect::<Vec<_>>()
-        };
-        let curves = (0..OCTAVES.len()).map(|b| {
-            vec![
-                ("before", Look::Line, points(&before, b)),
-                ("after", Look::Line, points(&after, b)),
-                ("wanted", Look::Dashed, vec![(0.0, 0.0), (t60_s[b], -60.0)]),
-            ]
-        });
+        let before = self.decay(&independent, &self.materials, &laws)?;
+        let after = self.decay(&independent, &done.fit.materials, &laws)?;
+        let curves = (0..OCTAVES.len()).map(|b| wanted_curves(&before, &after, b, Some(t60_s[b])));
         let warnings = done.not_verified.iter().map(ToString::to_string).collect();
         let (trace, fit) = done.seconds;
         Ok(Outcome {
@@ -268,111 +282,10 @@ impl<'a> Room<'a> {
             independent,
             place,
             compared: Vec::new(),
+            tables: None,
             warnings,
             seconds: Seconds { trace, fit },
             fit: done.fit,
-        })
-    }
-
-    fn is_held_out(&self, source: &Source, receiver: &Receiver) -> bool {
-        let pair = format!("{}/{}", source.id, receiver.id);
-        self.arguments.hold_out.iter().any(|id| *id == receiver.id || *id == pair)
-    }
-
-    fn fit_responses(&self, bar: &Bar) -> Result<Outcome<'a>, Failure> {
-        let entries = self.file.responses();
-        let places: Vec<(&Source, &Receiver)> = entries
-            .iter()
-            .map(|e| (&self.file.sources()[e.source], &self.file.receivers()[e.receiver]))
-            .collect();
-        let unknown =
-            |id: &&String| !places.iter().any(|(s, r)| **id == r.id || **id == format!("{}/{}", s.id, r.id));
-        if let Some(id) = self.arguments.hold_out.iter().find(unknown) {
-            return Err(format!("--hold-out {id}: the room has no response of this receiver").into());
-        }
-        let held_out: Vec<bool> = places.iter().map(|(s, r)| self.is_held_out(s, r)).collect();
-        if held_out.iter().all(|h| *h) {
-            return Err("room.toml: responses: none is left to fit to".into());
-        }
-        let fitter = self.fitter()?;
-        let measured = (0..entries.len())
-            .map(|i| Ok(MeasuredDecay::new(&self.file.load_response(i)?, OCTAVES)?))
-            .collect::<Result<Vec<_>, Failure>>()?;
-        let t30 =
-            |m: &MeasuredDecay| m.t30_s().values().iter().flatten().map(|t| t.value).fold(0.0, f64::max);
-        let longest_s = measured.iter().map(t30).fold(0.0, f64::max);
-        let duration_s = (DURATION_FACTOR * longest_s).clamp(DURATION_S.0, DURATION_S.1);
-        let seed = self.arguments.seed;
-        let start = Instant::now();
-        let trace = |seed| -> Result<Vec<PathSet>, AcousticsError> {
-            places.iter().map(|p| self.trace(*p, duration_s, seed, 1.0)).collect()
-        };
-        let paths = trace(seed)?;
-        let traced_s = start.elapsed().as_secs_f64();
-        let pairs: Vec<MeasuredPair<'_>> =
-            measured.iter().zip(&paths).map(|(measured, paths)| MeasuredPair { measured, paths }).collect();
-        let fitted: Vec<MeasuredPair<'_>> =
-            pairs.iter().zip(&held_out).filter(|(_, held)| !**held).map(|(pair, _)| *pair).collect();
-        let laws = places.iter().map(|place| self.laws(*place)).collect::<Result<Vec<_>, _>>()?;
-        let under: Vec<Conditions<'_>> =
-            laws.iter().map(|laws| conditions(&self.materials, &self.air, laws)).collect();
-        let of_fitted: Vec<Conditions<'_>> =
-            under.iter().zip(&held_out).filter(|(_, held)| !**held).map(|(own, _)| *own).collect();
-        let start = Instant::now();
-        let measurement = self.file.measurement();
-        let done =
-            fitter.fit_responses(
-                &fitted,
-                measurement,
-                &FitProblem::new(&self.materials, &self.priors, &self.air)
-                    .under(if self.model.laws.is_empty() { &[] } else { &of_fitted }),
-                bar,
-            )?;
-        let fit_s = start.elapsed().as_secs_f64();
-
-        // Held against rays that the fit has not seen.
-        let other = trace(seed.wrapping_add(1))?;
-        let (mut compared, mut curves) = (Vec::new(), Vec::new());
-        for (i, (measured, paths)) in measured.iter().zip(&other).enumerate() {
-            let pair = MeasuredPair { measured, paths };
-            let misfit = |materials: &[Material]| {
-                DecayMisfit::under(pair, measurement.time_zero, &under[i].with_materials(materials))
-            };
-            let (before, after) = (misfit(&self.materials)?, misfit(&done.fit.materials)?);
-            if curves.is_empty() && (held_out[i] || !held_out.contains(&true)) {
-                curves = (0..OCTAVES.len()).map(|b| response_curves(&before, &after, b)).collect();
-            }
-            let levels = |m: &DecayMisfit| m.rmse_db.values().iter().map(|r| r.clone().ok()).collect();
-            compared.push(Compared {
-                source: places[i].0.id.clone(),
-                receiver: places[i].1.id.clone(),
-                held_out: held_out[i],
-                measured_t30_s: values(&before.measured_t30_s),
-                t30_before_s: values(&before.simulated_t30_s),
-                t30_after_s: values(&after.simulated_t30_s),
-                decay_rmse_before_db: levels(&before),
-                decay_rmse_after_db: levels(&after),
-            });
-        }
-        let left_out = done.left_out.iter();
-        let warnings =
-            left_out.map(|(i, hz, why)| format!("response {i} at {hz} Hz is left out: {why}")).collect();
-        let mean = |of: &dyn Fn(&Compared) -> &Vec<Option<f64>>| -> Vec<Option<f64>> {
-            let used = || compared.iter().filter(|c| !c.held_out);
-            (0..OCTAVES.len()).map(|b| mean_of(used().filter_map(|c| of(c)[b]))).collect()
-        };
-        let one = held_out.iter().filter(|held| !**held).count() == 1;
-        Ok(Outcome {
-            aim: Aim { quantity: "T30", of: if one { "the response" } else { "the responses" } },
-            target_s: mean(&|c| &c.measured_t30_s),
-            reached_s: mean(&|c| &c.t30_after_s),
-            independent: other.into_iter().next().ok_or("no paths")?,
-            place: *places.first().ok_or("no paths")?,
-            fit: done.fit,
-            compared,
-            warnings,
-            seconds: Seconds { trace: traced_s, fit: fit_s },
-            curves,
         })
     }
 }
@@ -408,6 +321,25 @@ impl Retrace for Retraced<'_> {
         let all = (0..RENDERINGS).into_par_iter().map(read).collect::<Result<Vec<_>, _>>()?;
         Ok(Some(PerBand::from_fn(OCTAVES, |band| mean_reading(all.iter().map(|one| &one.values()[band])))))
     }
+}
+
+/// Decay curves of an octave before and after a fit, and the straight decay that was wanted.
+fn wanted_curves(
+    before: &EnergyResponse,
+    after: &EnergyResponse,
+    b: usize,
+    t60_s: Option<f64>,
+) -> Vec<Curve> {
+    let points = |energy: &EnergyResponse| {
+        let level = energy.decay_curve(b).level_db().into_iter().enumerate();
+        level.map(|(i, l)| (i as f64 * DECAY_STEP_S, l)).filter(|p| p.1 > -65.0).collect::<Vec<_>>()
+    };
+    let wanted = t60_s.map_or_else(Vec::new, |t60_s| vec![(0.0, 0.0), (t60_s, -60.0)]);
+    vec![
+        ("before", Look::Line, points(before)),
+        ("after", Look::Line, points(after)),
+        ("wanted", Look::Dashed, wanted),
+    ]
 }
 
 /// Mean of readings of the same quantity, with the standard error of their scatter; the reason of the first that could not be read.

@@ -149,6 +149,9 @@ impl Summary {
             println!("  decay dB     {}", row(&mean(&|c, b| c.decay_rmse_before_db[b])));
             println!("           ->  {}", row(&mean(&|c, b| c.decay_rmse_after_db[b])));
         }
+        if let Some(tables) = &outcome.tables {
+            tables.print();
+        }
         for band in &self.unreachable {
             println!("unreachable: {} Hz: {}", band.band_hz, band.reason);
         }
