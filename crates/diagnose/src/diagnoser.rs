@@ -6,12 +6,13 @@ use crate::effects::{LawEffect, UnknownLaw, catalogue};
 use crate::error::Error;
 use crate::extend::extended_model::ExtendedModel;
 use crate::extend::extension::extended_model;
+use crate::infer::arrival_fits::ArrivalFits;
 use crate::infer::baseline::Baseline;
 use crate::infer::candidates::{self, CatalogueCase};
-use crate::infer::confirmation::confirm;
-use crate::infer::ray_dependence::more_with_half;
+use crate::infer::confirmation::{Confirmation, Doubt, confirm, is_of_decays_alone};
+use crate::infer::ray_dependence::{could_be_chance, more_with_half};
 use crate::infer::search::Search;
-use crate::infer::selection::{give, select};
+use crate::infer::selection::{Selection, give, select};
 use crate::report::composition::compose;
 use crate::report::diagnosis::Diagnosis;
 use crate::simulate::scene_tracer::{Rays, SceneTracer};
@@ -21,6 +22,9 @@ use sabine_scene::MeasuredRoom;
 use std::sync::Arc;
 use web_time::Instant;
 
+/// Names that fall before the search for others in their absence ends.
+const MOST_FALLEN: usize = 3;
+
 /// Says what is wrong with a simulated room, given what was measured in it.
 ///
 /// 1. Traces every measured pair and fits the baseline: absorption within its stated uncertainty, gains and latencies as
@@ -29,7 +33,8 @@ use web_time::Instant;
 ///    likelihood with all parameters integrated out (Laplace's approximation), which charges for every parameter that is not needed.
 /// 3. Names the strongest if its odds, corrected for the number tried, reach [`DiagnoseConfig::naming_nats`]; and so on up to
 ///    [`DiagnoseConfig::most_causes`]; drops those that later ones made superfluous.
-/// 4. Predicts positions that it leaves out.
+/// 4. Where a cause of decays could owe its evidence to the rays that were drawn, starts again with four times as many.
+/// 5. Predicts positions that it leaves out.
 ///
 /// Same seed, same diagnosis, on any number of threads.
 pub struct Diagnoser {
@@ -159,30 +164,82 @@ impl Diagnoser {
         observer: &dyn Observer,
     ) -> Result<Diagnosis, Error> {
         let held = held_receivers(room, hold_out)?;
-        let Prepared { mut baseline, cases, given, used } = self.prepare(room, &held, observer)?;
-        let started = Instant::now();
-        let arrival_fits = Arc::default();
-        let fits = (&used[..], &arrival_fits);
-        let first_dispersion = baseline.dispersion.clone();
         let effects = self.effects.len();
-        let named = give(&mut baseline, &cases, effects, fits, &given)?;
-        let mut found = select(&mut baseline, &cases, effects, fits, named, observer)?;
-        let other_rays = (&*self.tracer, observer);
-        found.more_with_half = more_with_half(&mut baseline, &cases, &found.chosen, &used, other_rays)?;
-        baseline.seconds.insert("search", started.elapsed().as_secs_f64());
+        let started = Instant::now();
+        let mut weighed = self.weigh(room, &held, &self.tracer, observer)?;
+        let mut tracer = Arc::clone(&self.tracer);
+        // Behind an edge the first bins hold next to no rays, however many: there the scatter of what is left is no measure of chance.
+        let again = weighed.could_be_chance && weighed.baseline.survey().diffracted.is_empty();
+        if let Some(more) = self.tracer.with_more_rays().filter(|_| again) {
+            let first_s = started.elapsed().as_secs_f64();
+            weighed = self.weigh(room, &held, &more, observer)?;
+            weighed.baseline.seconds.insert("with fewer rays first", first_s);
+            tracer = more;
+        }
+        let mut dropped: Vec<(usize, Doubt)> = Vec::new();
+        loop {
+            let mut confirmed = weighed.confirmed((&*tracer, &held), effects, observer)?;
+            let fallen: Vec<usize> = confirmed.dropped.iter().map(|(candidate, _)| *candidate).collect();
+            let of_decays = {
+                let search = weighed.search(effects);
+                fallen.iter().all(|&c| is_of_decays_alone(&search.candidates[c]))
+            };
+            dropped.append(&mut confirmed.dropped);
+            let nothing_stands = confirmed.state.chosen.is_empty() && weighed.given.is_empty();
+            if fallen.is_empty() || !of_decays || !nothing_stands || dropped.len() > MOST_FALLEN {
+                confirmed.dropped = dropped;
+                return self.composed(&weighed, confirmed, observer);
+            }
+            // What stood in the shadow of names that have fallen is looked for in their absence.
+            let mut without = std::mem::take(&mut weighed.found.without);
+            without.extend(fallen);
+            weighed.baseline.expand_towards((&confirmed.base.energy.values, 1.0), &weighed.cases, &[])?;
+            weighed.baseline.calibrate_scatter(&[], &weighed.used)?;
+            weighed = weighed.searched(effects, without, observer)?;
+        }
+    }
 
-        let search = Search::new(&baseline, &cases, effects, used).knowing(&arrival_fits);
-        let confirmed = confirm(&search, &mut found, &held, observer)?;
+    /// The answer.
+    fn composed(
+        &self,
+        weighed: &Weighed,
+        confirmed: Confirmation,
+        observer: &dyn Observer,
+    ) -> Result<Diagnosis, Error> {
         let stands = |candidate: &usize| confirmed.state.chosen.contains(candidate);
-        let gone = given.iter().zip(&self.given).filter(|(candidate, _)| !stands(candidate));
+        let gone = weighed.given.iter().zip(&self.given).filter(|(candidate, _)| !stands(candidate));
         let notes: Vec<String> = gone
             .map(|(_, cause)| {
                 format!("The model's {} is not at work here: these data do not need it.", cause.name)
             })
             .collect();
-        let mut diagnosis = compose(&self.effects, &search, &found, confirmed, &first_dispersion, observer)?;
+        let search = weighed.search(self.effects.len());
+        let (found, dispersion) = (&weighed.found, &weighed.first_dispersion);
+        let mut diagnosis = compose(&self.effects, &search, found, confirmed, dispersion, observer)?;
         diagnosis.notes.extend(notes);
         Ok(diagnosis)
+    }
+
+    /// Traces the room with a tracer and searches for causes.
+    fn weigh(
+        &self,
+        room: &MeasuredRoom,
+        held: &[usize],
+        tracer: &Arc<dyn SceneTracer>,
+        observer: &dyn Observer,
+    ) -> Result<Weighed, Error> {
+        let Prepared { baseline, cases, given, used } = self.prepare(room, held, tracer, observer)?;
+        let weighed = Weighed {
+            first_dispersion: baseline.dispersion.clone(),
+            baseline,
+            cases,
+            given,
+            used,
+            found: Selection::default(),
+            arrival_fits: Arc::default(),
+            could_be_chance: false,
+        };
+        weighed.searched(self.effects.len(), Vec::new(), observer)
     }
 
     /// The model from which the diagnosis starts, its parameters and the absorption fitted anew to a room's responses: nothing is looked for,
@@ -191,7 +248,8 @@ impl Diagnoser {
     /// # Errors
     /// As [`Diagnoser::diagnose`].
     pub fn refit(&self, room: &MeasuredRoom, observer: &dyn Observer) -> Result<ExtendedModel, Error> {
-        let Prepared { mut baseline, cases, given, used } = self.prepare(room, &[], observer)?;
+        let Prepared { mut baseline, cases, given, used } =
+            self.prepare(room, &[], &self.tracer, observer)?;
         let (effects, arrival_fits) = (self.effects.len(), Arc::default());
         give(&mut baseline, &cases, effects, (&used, &arrival_fits), &given)?;
         let search = Search::new(&baseline, &cases, effects, used).knowing(&arrival_fits);
@@ -204,9 +262,10 @@ impl Diagnoser {
         &self,
         room: &MeasuredRoom,
         held: &[usize],
+        tracer: &Arc<dyn SceneTracer>,
         observer: &dyn Observer,
     ) -> Result<Prepared, Error> {
-        let mut baseline = Baseline::new(room, held, &self.config, &self.tracer, observer)?;
+        let mut baseline = Baseline::new(room, held, &self.config, tracer, observer)?;
         let used = baseline.observations.fitted.clone();
         let mut cases = candidates::cases(&self.effects, baseline.survey());
         // What cannot be prepared takes no part.
@@ -232,6 +291,61 @@ struct Prepared {
     /// The given causes among the cases.
     given: Vec<usize>,
     used: Vec<bool>,
+}
+
+/// What a search found.
+struct Weighed {
+    baseline: Baseline,
+    cases: Vec<CatalogueCase>,
+    given: Vec<usize>,
+    used: Vec<bool>,
+    found: Selection,
+    /// Dispersion before anything was named.
+    first_dispersion: Vec<f64>,
+    arrival_fits: Arc<ArrivalFits>,
+    /// Whether more rays might name something else.
+    could_be_chance: bool,
+}
+
+impl Weighed {
+    fn search(&self, effects: usize) -> Search<'_> {
+        Search::new(&self.baseline, &self.cases, effects, self.used.clone()).knowing(&self.arrival_fits)
+    }
+
+    /// The causes that are found beside those given, some effects (by one of their candidates) left out.
+    fn searched(
+        mut self,
+        effects: usize,
+        without: Vec<usize>,
+        observer: &dyn Observer,
+    ) -> Result<Self, Error> {
+        let started = Instant::now();
+        let fits = (&self.used[..], &self.arrival_fits);
+        let mut named = give(&mut self.baseline, &self.cases, effects, fits, &self.given)?;
+        named.without = without;
+        self.found = select(&mut self.baseline, &self.cases, effects, fits, named, observer)?;
+        self.could_be_chance = could_be_chance(&self.search(effects), &self.found.chosen)?;
+        *self.baseline.seconds.entry("search").or_default() += started.elapsed().as_secs_f64();
+        Ok(self)
+    }
+
+    /// Which of them stand.
+    fn confirmed(
+        &mut self,
+        (tracer, held): (&dyn SceneTracer, &[usize]),
+        effects: usize,
+        observer: &dyn Observer,
+    ) -> Result<Confirmation, Error> {
+        let started = Instant::now();
+        let chosen = &self.found.chosen;
+        self.found.more_with_half =
+            more_with_half(&mut self.baseline, &self.cases, chosen, &self.used, (tracer, observer))?;
+        *self.baseline.seconds.entry("search").or_default() += started.elapsed().as_secs_f64();
+        let mut found = std::mem::take(&mut self.found);
+        let confirmed = confirm(&self.search(effects), &mut found, held, observer);
+        self.found = found;
+        confirmed
+    }
 }
 
 /// Receivers (indices) to be held out.

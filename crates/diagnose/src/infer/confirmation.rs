@@ -49,7 +49,7 @@ pub(crate) struct Confirmation {
     /// Causes that the discrepancy without a name beats.
     pub unseated: Vec<String>,
     /// Causes that were dropped, and why.
-    pub dropped: Vec<(String, Doubt)>,
+    pub dropped: Vec<(usize, Doubt)>,
     pub predicting_s: f64,
     pub testing_s: f64,
 }
@@ -80,9 +80,13 @@ pub(crate) fn confirm(
     report(observer, "lack of fit", 1, 2)?;
     let mut dropped = Vec::new();
     while let Some((worst, doubt)) = doubtful(search, &state, found, &predicted)? {
-        dropped.push((search.candidates[worst].id.to_owned(), doubt));
+        dropped.push((worst, doubt));
         found.drop(worst);
-        state = search.state(&found.chosen, Some(&base))?;
+        // What was worth a name beside it need not be without it.
+        state = search.backward(search.state(&found.chosen, Some(&base))?)?;
+        for hanger_on in found.chosen.clone().into_iter().filter(|c| !state.chosen.contains(c)) {
+            found.drop(hanger_on);
+        }
         predicted = predict(search, &state, &in_turn, observer)?;
     }
     let lack_after = lack_of(search, &state)?;
@@ -204,7 +208,7 @@ fn resting_on_modes(search: &Search<'_>, state: &State) -> Result<Option<usize>,
 }
 
 /// Whether decays alone speak for a cause, and paths explain it.
-fn is_of_decays_alone(candidate: &Candidate<'_>) -> bool {
+pub(crate) fn is_of_decays_alone(candidate: &Candidate<'_>) -> bool {
     let case = candidate.case;
     candidate.id != RoomModes.id()
         && case.observable() == Observable::Decay

@@ -2,7 +2,8 @@
 //!
 //! A predicted decay is noisy by the rays that were drawn, and a cause that makes it smoother comes nearer to the measurement for that
 //! alone. This gain falls as one over the number of rays: what half of the rays say more for a cause, all of them still say too much, and
-//! evidence extrapolated to any number of rays is less by the difference (Richardson's extrapolation).
+//! evidence extrapolated to any number of rays is less by the difference (Richardson's extrapolation). A name that could be chance at all
+//! ([`could_be_chance`]) is looked for again with several times as many rays before that.
 
 use crate::effect::{Case, Observable};
 use crate::error::Error;
@@ -12,6 +13,27 @@ use crate::infer::search::{Search, State};
 use crate::simulate::scene_tracer::SceneTracer;
 use sabine_acoustics::Observer;
 use web_time::Instant;
+
+/// A cause of decays with more evidence than this is not asked for with more rays, in nats: more than chance was seen to lend to any in a
+/// room that scatters (24 nats; docs/validation/diagnose.md), by a factor of four.
+const BEYOND_CHANCE_NATS: f64 = 100.0;
+
+/// Whether one of the chosen causes bears on decays and could owe its evidence to the rays that were drawn.
+pub(crate) fn could_be_chance(search: &Search<'_>, chosen: &[usize]) -> Result<bool, Error> {
+    let bears = |&c: &usize| search.candidates[c].case.observable().concerns(Observable::Decay);
+    if !chosen.iter().any(bears) {
+        return Ok(false);
+    }
+    let all = search.state(chosen, None)?;
+    for &candidate in chosen.iter().filter(|c| bears(c)) {
+        let rest: Vec<usize> = chosen.iter().copied().filter(|&c| c != candidate).collect();
+        if all.energy.log_evidence - search.state(&rest, Some(&all))?.energy.log_evidence < BEYOND_CHANCE_NATS
+        {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
 
 /// Evidence of decays that half of the rays give a chosen cause beyond what all of them give, in nats.
 pub(crate) type MoreWithHalf = (usize, f64);
@@ -105,6 +127,8 @@ mod tests {
         let falls = |more: f64| unsettled(&search, &state, &[(0, more)]).expect("fits");
         assert_eq!(falls(nats - search.threshold() + 1.0), Some(0));
         assert_eq!(falls(nats - search.threshold() - 1.0), None);
+        assert!(could_be_chance(&search, &[0]).expect("fits") == (nats < BEYOND_CHANCE_NATS));
+        assert!(!could_be_chance(&search, &[]).expect("fits"));
         // What more rays make surer stands as it is, and what is not chosen is not asked.
         assert_eq!(falls(-nats), None);
         assert_eq!(unsettled(&search, &state, &[]).expect("fits"), None);

@@ -26,6 +26,8 @@ pub(crate) struct Selection {
     pub first: Vec<EffectScore>,
     /// Causes at the end of the search, and all other effects beside them, where none of these was worth a name.
     pub last: Option<(Vec<usize>, Vec<EffectScore>)>,
+    /// Effects of these candidates are named no more: they did not help at positions left out.
+    pub without: Vec<usize>,
     /// What half of the rays say more for a cause.
     pub more_with_half: Vec<MoreWithHalf>,
     /// Each cause, and cases of the same effect that explained as much when it was named.
@@ -95,6 +97,7 @@ pub(crate) fn select(
             let mut scores = search.scores(&state, observer)?;
             // What a cause stands for as well is not named beside it.
             scores.retain(|s| named.interchangeable.iter().all(|(_, others)| !others.contains(&s.candidate)));
+            scores.retain(|s| named.without.iter().all(|&w| cases[w].effect != cases[s.candidate].effect));
             let mut ranked: Vec<EffectScore> = search
                 .by_effect(&scores)
                 .into_iter()

@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::extend::extension;
 use crate::infer::baseline::Baseline;
 use crate::infer::candidates::EffectScore;
-use crate::infer::confirmation::Confirmation;
+use crate::infer::confirmation::{Confirmation, Doubt};
 use crate::infer::cross_validation::decay_curves;
 use crate::infer::isolability::isolability;
 use crate::infer::lack_of_fit::{Levels, Test};
@@ -156,6 +156,8 @@ fn notes_on(
         .map(|&c| (search.candidates[c].id, at_bounds(search, state, c)))
         .filter(|(_, parameters)| !parameters.is_empty())
         .collect();
+    let dropped: Vec<(&str, Doubt)> =
+        confirmed.dropped.iter().map(|&(c, doubt)| (search.candidates[c].id, doubt)).collect();
     let mut notes = notes(&Circumstances {
         baseline,
         verdict: confirmed.verdict,
@@ -165,7 +167,7 @@ fn notes_on(
         hopeless: confirmed.hopeless,
         scattered: first_dispersion.iter().any(|d| *d > WARN_DISPERSION),
         unseated: &confirmed.unseated,
-        dropped: &confirmed.dropped,
+        dropped: &dropped,
         beyond_limit: &beyond_limit(search, state, candidates),
         drift: drift_in_words(baseline),
         levels: levels_in_words(search.baseline, &confirmed.lack_after.levels),

@@ -20,7 +20,7 @@ pub(crate) struct Circumstances<'a> {
     /// Causes that a discrepancy without a name beats.
     pub unseated: &'a [String],
     /// Causes for which the data speak and that are not named, and why.
-    pub dropped: &'a [(String, Doubt)],
+    pub dropped: &'a [(&'a str, Doubt)],
     /// Effects that the data speak for beside as many causes as may be named.
     pub beyond_limit: &'a [&'a str],
     /// How far single responses drift along their decay where it is much, in dB, and in which octave.
@@ -87,11 +87,9 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
                 "fits the positions that it was fitted to, but does not help to predict those left out".to_owned()
             }
             Doubt::Modes => "would explain the lowest octaves alone, where few room modes decide and no simulation is that exact".into(),
-            Doubt::Rays => format!(
-                "is less probable the more rays are traced, and would not be named with very many: {} do not settle it, try `rays` of four \
-                 times as many",
-                about.baseline.config.rays
-            ),
+            Doubt::Rays => "is less probable the more rays are traced, and would not be named with very many: those that were traced do \
+                            not settle it, try more (`rays`)"
+                .into(),
         };
         notes.push(format!("{id} {why}: it is not named."));
     }

@@ -7,8 +7,11 @@ use sabine_propagate::{ImageSource, PathTracer, PreparedScene, TracerConfig};
 use sabine_scene::{Receiver, Scene, Source};
 use std::sync::Arc;
 
-/// Turns the seed of rays into that of others.
+/// Turns the seed of rays into that of others, fewer and more.
 const OTHER_RAYS: u64 = 0x5EED_0F07_4E25;
+const MORE_RAYS: u64 = 0x4E25_5EED_0F07;
+/// So many times as many are more. Chance falls to half.
+const TIMES: usize = 4;
 
 /// A tracer that a diagnosis can use: it prepares a scene once and then traces many pairs in it.
 ///
@@ -24,6 +27,12 @@ pub trait SceneTracer: Send + Sync {
     /// A tracer that draws half as many rays, others than this one: what the evidence for a cause owes to the number of rays shows in it.
     /// The default has none.
     fn with_half_the_rays(&self) -> Option<Arc<dyn SceneTracer>> {
+        None
+    }
+
+    /// A tracer that draws several times as many rays, others than this one: what chance alone names, it does not name again. The default has
+    /// none.
+    fn with_more_rays(&self) -> Option<Arc<dyn SceneTracer>> {
         None
     }
 }
@@ -86,6 +95,12 @@ impl SceneTracer for Rays {
         Some(Arc::new(Self {
             config: TracerConfig { rays: self.config.rays.div_ceil(2), seed, ..self.config.clone() },
         }))
+    }
+
+    fn with_more_rays(&self) -> Option<Arc<dyn SceneTracer>> {
+        let seed = self.config.seed ^ MORE_RAYS;
+        let rays = self.config.rays.saturating_mul(TIMES);
+        Some(Arc::new(Self { config: TracerConfig { rays, seed, ..self.config.clone() } }))
     }
 }
 

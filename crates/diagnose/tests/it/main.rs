@@ -13,6 +13,7 @@ mod hidden_surfaces;
 mod hidden_waves;
 mod invariances;
 mod look_alikes;
+mod no_box;
 mod odd_input;
 mod places;
 mod plan;

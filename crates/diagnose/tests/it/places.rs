@@ -59,5 +59,10 @@ fn places_that_are_off_by_as_much_as_is_stated_name_nothing() {
     // Where a centimetre is stated, or nothing, these places are wrong, and that is said.
     let found = diagnose(&misplaced(&write("silent"), 0.05, None));
     assert_ne!(found.verdict, Verdict::Adequate);
-    assert!(found.causes.iter().any(|c| c.effect == "position_error"), "{:?}", found.causes);
+    assert!(
+        found.causes.iter().any(|c| c.effect == "position_error"),
+        "{:?} {:?}",
+        found.causes,
+        found.notes
+    );
 }

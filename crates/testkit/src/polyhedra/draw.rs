@@ -14,7 +14,7 @@ use sabine_scene::NamedMaterial;
 /// Eyring's reverberation time in every octave, in seconds.
 const T60_S: (f64, f64) = (0.3, 0.85);
 /// Places stay so far from walls that stand elsewhere and from objects, in metres.
-const FROM_HIDDEN_M: f64 = 0.35;
+const FROM_HIDDEN_M: f64 = 0.55;
 
 /// Materials as stated, and as they are: absorption by octave, and scattering.
 pub(super) struct Tables {

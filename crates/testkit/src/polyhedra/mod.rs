@@ -11,8 +11,8 @@
 //! changes from third to third of an octave, microphones have a smooth octave response of 1 dB each, places are off by the 1 cm that the
 //! file states, and early reflections keep their sign (else each has a random one).
 //!
-//! What it does **not** do: phase at walls (nor angle), standing waves, diffraction. Particles' passages are blurred by the 2 ms
-//! that sound takes across a sphere of 0.6 m.
+//! What it does **not** do: phase at walls (nor angle), standing waves, diffraction. Particles' passages are blurred by the 3 ms
+//! that sound takes across a sphere of 1 m: the larger it is, the less they scatter.
 
 mod draw;
 mod images;
@@ -101,7 +101,7 @@ struct Surface {
 /// A random room of no box, with an effect hidden in it or none.
 ///
 /// Volume 40 to 250 m3, four or five materials, Eyring's reverberation time 0.3 to 0.85 s in every octave, one source, places at least
-/// 0.6 m from surfaces and 0.8 m from each other, at least half of the receivers in sight. Octaves of 125 Hz to 4 kHz at 16 kHz.
+/// 0.65 m from surfaces and 0.8 m from each other, at least half of the receivers in sight. Octaves of 125 Hz to 4 kHz at 16 kHz.
 pub struct PolyhedralRoom {
     config: PolyhedralConfig,
     bands: Bands,

@@ -11,7 +11,7 @@ use std::f64::consts::{PI, TAU};
 /// Batches in which particles fly, each with random numbers of its own: the same result on any number of threads.
 const BATCHES: usize = 64;
 /// Radius of the receivers' spheres in metres; places are farther from all surfaces.
-pub(super) const RADIUS_M: f64 = 0.3;
+pub(super) const RADIUS_M: f64 = 0.5;
 /// Width of a bin of energy in seconds.
 pub(super) const BIN_S: f64 = 5e-4;
 /// Share of its energy at which a particle is given up.

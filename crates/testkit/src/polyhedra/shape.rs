@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// Places are so far from every surface, and from each other, in metres.
-const FROM_SURFACES_M: f64 = 0.6;
+const FROM_SURFACES_M: f64 = 0.65;
 const APART_M: f64 = 0.8;
 /// Directions in which the distance to a surface is looked for.
 const DIRECTIONS: usize = 400;

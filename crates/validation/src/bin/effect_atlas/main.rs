@@ -86,7 +86,7 @@ struct Arguments {
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["record", "part"])]
     out: Option<PathBuf>,
     /// Do every N-th room of the folder alone, from the I-th on (I from 1)
-    #[arg(long, value_name = "I/N", value_parser = part, default_value = "1/1", requires = "out")]
+    #[arg(long, value_name = "I/N", value_parser = sabine_validation::part, default_value = "1/1", requires = "out")]
     worker: (usize, usize),
     /// Keep the rooms that the folder holds, if they are whole
     #[arg(long, requires = "out")]

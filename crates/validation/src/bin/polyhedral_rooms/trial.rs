@@ -168,6 +168,7 @@ impl Task {
         let seconds = started.elapsed().as_secs_f64();
         let (outcome, false_names) = self.outcome(&found, &laboratory);
         if outcome != Outcome::Right {
+            eprintln!("  hidden: {planted} {}", laboratory.subject().unwrap_or_default());
             found.notes.iter().for_each(|note| eprintln!("  {note}"));
             for cause in &found.causes {
                 let subject = cause.subject.as_deref().unwrap_or("everywhere");

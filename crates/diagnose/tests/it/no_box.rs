@@ -1,0 +1,61 @@
+//! Rooms of the second laboratory: no boxes, their responses by physics that the engine shares nothing with. Whole catalogue. Seeds were
+//! looked at before: rates are those of `polyhedral_rooms` (docs/validation/diagnose.md).
+#![allow(clippy::unwrap_used)] // a panic is how a test fails
+
+use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, Verdict};
+use sabine_testkit::{Planted, PolyhedralConfig, PolyhedralRoom, Polyhedron};
+
+fn diagnose(config: PolyhedralConfig, rays: usize) -> (PolyhedralRoom, Diagnosis) {
+    let laboratory = PolyhedralRoom::new(config).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let room = laboratory.write(&folder.path().join("room")).unwrap();
+    let config = DiagnoseConfig { rays, seed: config.seed, ..DiagnoseConfig::default() };
+    (laboratory, Diagnoser::new(config).unwrap().diagnose(&room, &[], &()).unwrap())
+}
+
+#[test]
+fn rooms_as_stated_are_adequate() {
+    for (shape, seed) in [(Polyhedron::SlopedCeiling, 701), (Polyhedron::Furnished, 703)] {
+        let config = PolyhedralConfig { seed, shape, ..PolyhedralConfig::default() };
+        let (_, found) = diagnose(config, 10_000);
+        assert_eq!(found.verdict, Verdict::Adequate, "{:?} {:?}", found.causes, found.notes);
+    }
+}
+
+/// The table of one material is far off in a room where nearly any other could swallow as much: an opening explains as much at most.
+#[test]
+fn a_table_that_is_wrong_is_named_though_all_tables_can_make_up_for_it() {
+    let config = PolyhedralConfig {
+        seed: 222,
+        shape: Polyhedron::Wedge,
+        planted: Planted::Surface,
+        nuisances: true,
+        receivers: 10,
+        ..PolyhedralConfig::default()
+    };
+    let (laboratory, found) = diagnose(config, 4000);
+    let wanted = laboratory.subject().unwrap();
+    let named = found.causes.iter().find(|c| c.effect == "surface_absorption").unwrap();
+    let mut subjects = named.subject.iter().chain(&named.other_subjects);
+    assert!(subjects.any(|s| s == wanted), "{wanted}: {:?}", found.causes);
+    // Reflections keep their sign there, and channels differ by 1 dB.
+    let others = found.causes.iter().filter(|c| c.effect != "surface_absorption");
+    for other in others {
+        assert!(["coherent_reflections", "channel_response"].contains(&&*other.effect), "{other:?}");
+    }
+}
+
+#[test]
+fn a_wall_of_an_l_is_found_where_it_stands() {
+    let planted = Planted::Wall;
+    let config = PolyhedralConfig { seed: 248, planted, receivers: 10, ..PolyhedralConfig::default() };
+    let (laboratory, found) = diagnose(config, 4000);
+    let wall = laboratory.moved_wall().unwrap();
+    let along = |p: [f64; 3]| -> f64 { (0..3).map(|k| wall.normal[k] * p[k]).sum() };
+    let [surface] = &found.model.applied().surfaces[..] else { panic!("{:?}", found.causes) };
+    assert!(along(surface.normal).abs() > 0.999);
+    assert!((along(surface.point_m) - along(wall.point_m)).abs() < 0.01);
+    let offset_m = surface.offset_m * along(surface.normal).signum();
+    assert!((offset_m - wall.offset_m).abs() < 0.02, "{offset_m} for {}", wall.offset_m);
+    assert_eq!(found.causes.len(), 1, "{:?}", found.causes);
+}
