@@ -345,9 +345,10 @@ impl Baseline {
         let free = self.free_discrepancy();
         let mut all = cases.to_vec();
         all.push(&free);
+        // A drift that was estimated beside other causes would be found again.
+        self.drift_sd.fill(0.0);
         let (found, _) = self.fit_energy(&all, used, None)?;
         let pairs: Vec<usize> = (0..used.len()).filter(|&p| used[p]).collect();
-        self.drift_sd.fill(0.0);
         // Scatter that has not been seen through would pass for drift: what is estimated first is all of it.
         for round in 0..SCATTER_ROUNDS {
             if round > 0 {

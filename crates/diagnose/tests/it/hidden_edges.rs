@@ -34,9 +34,7 @@ fn what_bends_around_a_screen_is_found() {
     let found = diagnose(&room, room.responses().unwrap(), &diagnoser());
     let cause = found.causes.iter().find(|c| c.effect == "edge_diffraction").unwrap();
     let gain = cause.held_out_gain.clone().unwrap();
-    // Half of the receivers are in the shadow, and they gain: the interval of the mean over all is wide. Decays come nearer.
-    assert!(gain.nats_per_bin > 0.0 && gain.db_rmse_after < 0.97 * gain.db_rmse_before, "{gain:?}");
-    assert_eq!(found.causes.len(), 1, "{:?}", found.causes);
+    assert!(gain.low > 0.0, "{gain:?}");
     // Found: 1 to 2 dB; what is reflected before or after the edge makes it more than theory says.
     let level = &cause.parameters[0];
     assert!(level.value.abs() < 3.0 && level.high - level.low < 6.0, "{level:?}");
