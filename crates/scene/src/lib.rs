@@ -75,6 +75,8 @@
 //! - H. Kuttruff: Room Acoustics, 6th edition, 2017.
 //! - H. Arau-Puchades: An improved reverberation formula. Acustica 65, 1988.
 
+#[cfg(feature = "rooms")]
+mod broken_line;
 mod error;
 mod floor_plan;
 #[cfg(any(feature = "rooms", feature = "gltf"))]

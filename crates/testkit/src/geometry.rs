@@ -1,4 +1,8 @@
-//! Vectors, and one ray against one triangle.
+//! Vectors, directions drawn at random, and one ray against one triangle or sphere.
+
+use rand::Rng;
+use rand_pcg::Pcg64Mcg;
+use std::f64::consts::TAU;
 
 pub(crate) type Vec3 = [f64; 3];
 
@@ -62,4 +66,35 @@ pub(crate) fn first_hit(
         }
     }
     best
+}
+
+/// A direction on the whole sphere.
+pub(crate) fn anywhere(random: &mut Pcg64Mcg) -> Vec3 {
+    let z = 2.0 * random.random::<f64>() - 1.0;
+    let azimuth = TAU * random.random::<f64>();
+    let r = (1.0 - z * z).sqrt();
+    [r * azimuth.cos(), r * azimuth.sin(), z]
+}
+
+/// A direction about a normal, as often as its cosine: the tip of a random unit vector set upon the normal's.
+pub(crate) fn lambert(random: &mut Pcg64Mcg, normal: Vec3) -> Vec3 {
+    loop {
+        let sum = add(normal, anywhere(random));
+        let length = norm(sum);
+        if length > 1e-6 {
+            return scale(sum, 1.0 / length);
+        }
+    }
+}
+
+/// Where a flight over `distance` enters and leaves a sphere about the origin.
+pub(crate) fn chord(start: Vec3, direction: Vec3, radius: f64, distance: f64) -> Option<(f64, f64)> {
+    let middle = -dot(start, direction);
+    let square = radius * radius - (dot(start, start) - middle * middle);
+    if square <= 0.0 {
+        return None;
+    }
+    let half = square.sqrt();
+    let (near, far) = ((middle - half).max(0.0), (middle + half).min(distance));
+    (far > near).then_some((near, far))
 }

@@ -2,13 +2,13 @@
 
 use crate::brute_force::corners;
 use crate::filter::{Complement, add_pulse, join_bands};
-use crate::geometry::{Vec3, add, cross, dot, first_hit, norm, scale, sub};
+use crate::geometry::{Vec3, add, anywhere, chord, cross, dot, first_hit, lambert, norm, scale, sub};
 use crate::own_air::{energy_exponent_per_m, speed_of_sound_m_s};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sabine_acoustics::{Air, Bands, EnergyResponse, Error, ImpulseResponse, OutOfRange};
 use sabine_scene::{Receiver, Scene, Source};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 /// Batches into which the particles fall: their scatter gives the standard errors, and each has its own random numbers, so that
 /// the result is the same on any number of threads.
@@ -281,35 +281,4 @@ impl Phonons {
         }
         result
     }
-}
-
-/// A direction on the whole sphere.
-fn anywhere(random: &mut Pcg64Mcg) -> Vec3 {
-    let z = 2.0 * random.random::<f64>() - 1.0;
-    let azimuth = TAU * random.random::<f64>();
-    let r = (1.0 - z * z).sqrt();
-    [r * azimuth.cos(), r * azimuth.sin(), z]
-}
-
-/// A direction about a normal, as often as its cosine: the tip of a random unit vector set upon the normal's.
-fn lambert(random: &mut Pcg64Mcg, normal: Vec3) -> Vec3 {
-    loop {
-        let sum = add(normal, anywhere(random));
-        let length = norm(sum);
-        if length > 1e-6 {
-            return scale(sum, 1.0 / length);
-        }
-    }
-}
-
-/// Where a flight over `distance` enters and leaves a sphere about the origin.
-fn chord(start: Vec3, direction: Vec3, radius: f64, distance: f64) -> Option<(f64, f64)> {
-    let middle = -dot(start, direction);
-    let square = radius * radius - (dot(start, start) - middle * middle);
-    if square <= 0.0 {
-        return None;
-    }
-    let half = square.sqrt();
-    let (near, far) = ((middle - half).max(0.0), (middle + half).min(distance));
-    (far > near).then_some((near, far))
 }

@@ -29,6 +29,13 @@ pub fn part(text: &str) -> Result<(usize, usize), String> {
     }
 }
 
+/// The median; the upper of two in the middle.
+#[must_use]
+pub fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
 /// Exact 95 % interval of a share (Clopper and Pearson, Biometrika 26, 1934): no smaller and no larger true share would leave so many, or so
 /// few, hits to chance.
 #[must_use]

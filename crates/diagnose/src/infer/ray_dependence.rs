@@ -14,8 +14,8 @@ use crate::simulate::scene_tracer::SceneTracer;
 use sabine_acoustics::Observer;
 use web_time::Instant;
 
-/// A cause of decays with more evidence than this is not asked for with more rays, in nats: more than chance was seen to lend to any in a
-/// room that scatters (24 nats; docs/validation/diagnose.md), by a factor of four.
+/// A cause of decays with more evidence than this is not asked for with more rays, in nats. A choice, to save time: chance was seen to lend 24
+/// nats in a room that scatters (docs/validation/diagnose.md, rooms that are no box), and more where nothing does.
 const BEYOND_CHANCE_NATS: f64 = 100.0;
 
 /// Whether one of the chosen causes bears on decays and could owe its evidence to the rays that were drawn.

@@ -121,7 +121,7 @@ impl ArrivalLayout {
 /// and 0.47.
 const ABSORPTION_OCTAVES: f64 = 8.0;
 
-/// How the absorption of a surface that is not what its table says goes together over the bands: what swallows much at 500 Hz swallows
+/// How the absorption of a surface that is not what its table says goes together over the bands: what absorbs much at 500 Hz absorbs
 /// much at 1 kHz. The narrower the bands, the fewer free values they are worth.
 fn over_bands(bands: &Bands) -> DMatrix<f64> {
     let n = bands.len();

@@ -2,6 +2,7 @@
 
 use super::MeasuredRoom;
 use super::file::ParameterTable;
+use crate::broken_line::broken;
 use crate::error::Error;
 use csv::{ReaderBuilder, StringRecord, Trim};
 use sabine_acoustics::{Bands, Error as ValueError, OutOfRange, ParameterKind, read_at_most};
@@ -348,15 +349,4 @@ fn octave(centre_hz: f64) -> Result<f64, Error> {
             value: centre_hz,
             range: "the nominal centre of an octave",
         })?)
-}
-
-/// A line with too few or too many cells.
-fn broken(path: &Path, error: &csv::Error) -> Error {
-    let line = error.position().map_or(0, csv::Position::line);
-    let (expected, found) = match error.kind() {
-        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => (*expected_len, *len),
-        _ => (0, 0),
-    };
-    let error = Error::Shape { expected: format!("{expected} cells"), found: format!("{found} cells") };
-    error.in_file(path, format!("line {line}"))
 }

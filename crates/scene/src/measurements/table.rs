@@ -3,6 +3,7 @@
 use super::file_names::Names;
 use super::places::{Place, Places};
 use super::{ImportOptions, Measurements, Sound, meaning, number};
+use crate::broken_line::broken;
 use crate::error::Error;
 use crate::inside_folder::check_inside;
 use crate::measured_room::NewResponse;
@@ -221,15 +222,4 @@ fn columns(head: &StringRecord) -> Result<HashMap<&'static str, usize>, Error> {
         }),
         None => Ok(columns),
     }
-}
-
-/// A line with too few or too many cells.
-fn broken(path: &Path, error: &csv::Error) -> Error {
-    let line = error.position().map_or(0, csv::Position::line);
-    let (expected, found) = match error.kind() {
-        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => (*expected_len, *len),
-        _ => (0, 0),
-    };
-    let error = Error::Shape { expected: format!("{expected} cells"), found: format!("{found} cells") };
-    error.in_file(path, format!("line {line}"))
 }

@@ -149,6 +149,9 @@ pub struct MovedWall {
 }
 
 impl PolyhedralRoom {
+    /// Width of a bin of [`PolyhedralRoom::energies`] in seconds.
+    pub const BIN_S: f64 = BIN_S;
+
     /// Draws a room.
     ///
     /// # Errors
@@ -274,22 +277,9 @@ impl PolyhedralRoom {
     /// # Errors
     /// As [`ImpulseResponse::new`].
     pub fn responses(&self) -> Result<Vec<ImpulseResponse>, Error> {
-        let truth = &self.truth;
-        let exponents: Vec<f64> =
-            (0..self.fine.len()).map(|b| energy_exponent_per_m(&truth.air, self.fine.exact_hz(b))).collect();
-        let surfaces: Vec<&Surface> = truth.materials.iter().map(|&m| &truth.surfaces[m]).collect();
-        let flight = Flight {
-            seed: self.config.seed,
-            particles: self.config.particles,
-            triangles: &truth.triangles,
-            surfaces: &surfaces,
-            source: truth.source,
-            receivers: &truth.receivers,
-            speed_m_s: speed_of_sound_m_s(&truth.air),
-            exponents_per_m: &exponents,
-            duration_s: truth.duration_s,
-            without_order: ORDER,
-        };
+        let exponents = self.exponents_per_m();
+        let surfaces = self.surfaces();
+        let flight = self.flight(&surfaces, &exponents);
         let energies = flight.energies();
         let mut all: Vec<Vec<f64>> = energies
             .into_par_iter()
@@ -307,6 +297,54 @@ impl PolyhedralRoom {
         all.into_iter().map(one).collect()
     }
 
+    /// Attenuation in air of each simulated band.
+    fn exponents_per_m(&self) -> Vec<f64> {
+        let air = &self.truth.air;
+        (0..self.fine.len()).map(|b| energy_exponent_per_m(air, self.fine.exact_hz(b))).collect()
+    }
+
+    /// Of each triangle.
+    fn surfaces(&self) -> Vec<&Surface> {
+        self.truth.materials.iter().map(|&m| &self.truth.surfaces[m]).collect()
+    }
+
+    fn flight<'a>(&'a self, surfaces: &'a [&'a Surface], exponents_per_m: &'a [f64]) -> Flight<'a> {
+        let truth = &self.truth;
+        Flight {
+            seed: self.config.seed,
+            particles: self.config.particles,
+            triangles: &truth.triangles,
+            surfaces,
+            source: truth.source,
+            receivers: &truth.receivers,
+            speed_m_s: speed_of_sound_m_s(&truth.air),
+            exponents_per_m,
+            duration_s: truth.duration_s,
+            without_order: ORDER,
+        }
+    }
+
+    /// What the responses hold on average over signs and noise, `[receiver][band][bin]`: energy in bins of [`PolyhedralRoom::BIN_S`] from the
+    /// emission on, that of the direct sound at 1 m being 1, of microphones without a gain. Bands are octaves, thirds of octaves
+    /// where nuisances are on. The same on any number of threads.
+    pub fn energies(&self) -> Vec<Vec<Vec<f64>>> {
+        let exponents = self.exponents_per_m();
+        let surfaces = self.surfaces();
+        let flight = self.flight(&surfaces, &exponents);
+        let mut energies = flight.energies();
+        for (of_receiver, &receiver) in energies.iter_mut().zip(flight.receivers) {
+            let ends = [flight.source, receiver];
+            for image in images::images(&self.truth.triangles, &planes(&self.truth.triangles), ends, ORDER) {
+                let bin = (image.length_m / flight.speed_m_s / BIN_S) as usize;
+                for (band, of_band) in of_receiver.iter_mut().enumerate() {
+                    let energy = flight.image_energy(&image, band);
+                    of_band.get_mut(bin).into_iter().for_each(|e| *e += energy);
+                }
+            }
+        }
+        energies
+    }
+
     fn response(&self, index: usize, flight: &Flight<'_>, energy: &[Vec<f64>]) -> Vec<f64> {
         let (truth, rate) = (&self.truth, f64::from(RATE_HZ));
         let samples = ((truth.duration_s + truth.latency_s) * rate).ceil() as usize;
@@ -319,13 +357,7 @@ impl PolyhedralRoom {
             let chance = unit_of(key(self.config.seed, Purpose::Signs, (index << 32) | number));
             let sign = if direct || chance < 0.5 { 1.0 } else { -1.0 };
             for (band, column) in columns.iter_mut().enumerate() {
-                let kept: f64 = image
-                    .met
-                    .iter()
-                    .map(|&t| flight.surfaces[t].kept[band] * (1.0 - flight.surfaces[t].scattering))
-                    .product();
-                let air = (-flight.exponents_per_m[band] * image.length_m).exp();
-                crate::filter::add_pulse(column, at, sign * (kept * air).sqrt() / image.length_m);
+                crate::filter::add_pulse(column, at, sign * flight.image_energy(image, band).sqrt());
             }
         }
         let mut random = stream(self.config.seed, Purpose::Scattered, index);

@@ -1,12 +1,12 @@
 //! Particles in any mesh, counted at all receivers at once and in all bands.
 
 use super::Surface;
-use crate::geometry::{Vec3, add, cross, dot, first_hit, norm, scale, sub};
+use super::images::Image;
+use crate::geometry::{Vec3, add, anywhere, chord, cross, dot, first_hit, lambert, norm, scale, sub};
 use crate::laboratory::stream::{Purpose, stream};
 use rand::Rng;
-use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 /// Batches in which particles fly, each with random numbers of its own: the same result on any number of threads.
 const BATCHES: usize = 64;
@@ -49,6 +49,13 @@ impl Flight<'_> {
         sum.chunks(bands * bins).map(of_receiver).collect()
     }
 
+    /// Of one specular path.
+    pub fn image_energy(&self, image: &Image, band: usize) -> f64 {
+        let surface = |&triangle: &usize| self.surfaces[triangle];
+        let kept: f64 = image.met.iter().map(surface).map(|s| s.kept[band] * (1.0 - s.scattering)).product();
+        kept * (-self.exponents_per_m[band] * image.length_m).exp() / image.length_m.powi(2)
+    }
+
     fn bins(&self) -> usize {
         (self.duration_s / BIN_S).ceil() as usize
     }
@@ -75,7 +82,8 @@ impl Flight<'_> {
                 };
                 if !(specular && reflections <= self.without_order) {
                     for (receiver, centre) in self.receivers.iter().enumerate() {
-                        let Some((near, far)) = chord(sub(place, *centre), direction, distance) else {
+                        let Some((near, far)) = chord(sub(place, *centre), direction, RADIUS_M, distance)
+                        else {
                             continue;
                         };
                         let way_m = length_m + 0.5 * (near + far);
@@ -119,33 +127,4 @@ impl Flight<'_> {
 fn unit_normal([a, b, c]: &[Vec3; 3]) -> Vec3 {
     let normal = cross(sub(*b, *a), sub(*c, *a));
     scale(normal, 1.0 / norm(normal))
-}
-
-/// Where a way enters and leaves the sphere about the origin.
-fn chord(from: Vec3, direction: Vec3, distance: f64) -> Option<(f64, f64)> {
-    let middle = -dot(from, direction);
-    let square = RADIUS_M * RADIUS_M - (dot(from, from) - middle * middle);
-    if square <= 0.0 {
-        return None;
-    }
-    let (near, far) = ((middle - square.sqrt()).max(0.0), (middle + square.sqrt()).min(distance));
-    (far > near).then_some((near, far))
-}
-
-/// A direction on the whole sphere.
-fn anywhere(random: &mut Pcg64Mcg) -> Vec3 {
-    let z = 2.0 * random.random::<f64>() - 1.0;
-    let (azimuth, r) = (TAU * random.random::<f64>(), (1.0 - z * z).sqrt());
-    [r * azimuth.cos(), r * azimuth.sin(), z]
-}
-
-/// A direction about a normal, as often as its cosine.
-fn lambert(random: &mut Pcg64Mcg, normal: Vec3) -> Vec3 {
-    loop {
-        let sum = add(normal, anywhere(random));
-        let length = norm(sum);
-        if length > 1e-6 {
-            return scale(sum, 1.0 / length);
-        }
-    }
 }

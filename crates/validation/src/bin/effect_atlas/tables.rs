@@ -1,6 +1,7 @@
 //! What a record of trials comes to.
 
 use crate::trial::{Outcome, Trial};
+use sabine_validation::median;
 use std::collections::BTreeMap;
 
 /// Edges of the classes of d'.
@@ -180,11 +181,6 @@ fn mean_d_prime(trials: &[&Trial]) -> Option<f64> {
 fn seconds(trials: &[&Trial]) -> String {
     let known: Vec<f64> = trials.iter().filter_map(|t| t.seconds).collect();
     if known.is_empty() { "-".into() } else { format!("{:.0}", median(known)) }
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 fn share(what: &str, hits: impl Iterator<Item = bool>) {

@@ -2,7 +2,7 @@
 
 use crate::trial::{Outcome, Trial, shape_name};
 use sabine_testkit::{Planted, Polyhedron};
-use sabine_validation::exact_interval;
+use sabine_validation::{exact_interval, median};
 
 /// Prints all tables as Markdown. Intervals are exact, over rooms.
 pub fn print(trials: &[Trial]) {
@@ -79,11 +79,6 @@ pub fn print(trials: &[Trial]) {
 
 fn world(nuisances: bool) -> &'static str {
     if nuisances { "nuisances" } else { "plain" }
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 fn share(what: &str, hits: impl Iterator<Item = bool>) {
