@@ -186,3 +186,87 @@ impl BoundLaws {
         named.map(|(values, (name, _, is_time))| PathVariable { name, values, is_time }).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)] // a panic is how a test fails
+    use super::*;
+    use crate::laws::{LawParameter, LawTarget};
+
+    fn law(target: LawTarget, formula: &str, names: &[(&'static str, &str)]) -> Law {
+        let parameters = names.iter().map(|(name, unit)| (*name, LawParameter::new(1.5, [0.5, 3.0], *unit)));
+        Law::new("x", target, None, formula, parameters).unwrap()
+    }
+
+    /// One place at a time, by the code that random formulas are tested with.
+    #[test]
+    fn many_places_have_the_values_of_each() {
+        let path = LawTarget::Path;
+        let laws = [
+            law(
+                path,
+                "-a * exp(-length_m / l) * resonance(frequency_hz, f0, q)",
+                &[("a", "dB"), ("l", "km"), ("f0", "kHz"), ("q", "1")],
+            ),
+            law(
+                path,
+                "a * above(length_m, l) * hits(wall)^2 - min(a, 2 * a) * sin(departure_azimuth_deg)",
+                &[("a", "dB"), ("l", "m")],
+            ),
+            law(LawTarget::Delay, "d * abs(departure_azimuth_deg / p)", &[("d", "us"), ("p", "deg")]),
+        ];
+        let numbers = [0.3, 1.7, 2.9, 40.0];
+        for law in &laws {
+            let given: Vec<f64> = law.parameters().map(|(_, p)| p.value).collect();
+            let many = |name: &str| {
+                Some(if name == "frequency_hz" {
+                    LawVariable::Same(500.0)
+                } else {
+                    LawVariable::Each(&numbers)
+                })
+            };
+            let found = law.values(&given, numbers.len(), many).unwrap();
+            for (found, x) in found.iter().zip(numbers) {
+                let one = law.value(|name| Some(if name == "frequency_hz" { 500.0 } else { x })).unwrap();
+                assert!((found - one).abs() <= 1e-12 * one.abs(), "{}: {found} {one}", law.formula());
+            }
+            // Other values of the parameters are those of the law with these values.
+            let other: Vec<f64> = given.iter().map(|x| 0.6 * x).collect();
+            let moved = law.with_values(&other).unwrap();
+            assert_eq!(law.values(&other, 4, many).unwrap(), moved.values(&other, 4, many).unwrap());
+            let one = moved.value(|name| Some(if name == "frequency_hz" { 500.0 } else { 2.9 })).unwrap();
+            assert!((law.values(&other, 4, many).unwrap()[2] - one).abs() <= 1e-12 * one.abs());
+        }
+        let error = laws[0].values(&[1.0; 4], 1, |_| None).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "law `x`, column 11 of its formula: `length_m` is not known: nobody gave its value"
+        );
+    }
+
+    #[test]
+    fn edges_of_bands_do_nothing_but_stand_between_them() {
+        let edge = |formula: &str, unit: &str| {
+            law(LawTarget::Path, formula, &[("a", "dB"), ("f0", unit)]).is_edge_of_bands("f0")
+        };
+        assert!(edge("a * above(frequency_hz, f0)", "kHz"));
+        assert!(edge("a * (above(frequency_hz, f0) - 2 * below(frequency_hz, f0))", "Hz"));
+        assert!(!edge("a * above(f0, frequency_hz)", "kHz"));
+        assert!(!edge("a * above(frequency_hz, 2 * f0)", "kHz"));
+        assert!(!edge("a * above(frequency_hz, f0) * frequency_hz / f0", "kHz"));
+        assert!(!edge("a * above(length_m, f0)", "m"));
+        assert!(!law(LawTarget::Delay, "f0", &[("f0", "s")]).is_edge_of_bands("f0"));
+    }
+
+    #[test]
+    fn amplitudes_are_the_fewest_that_make_a_law_vanish() {
+        let of = |formula: &str, names: &[(&'static str, &str)]| -> Vec<String> {
+            law(LawTarget::Path, formula, names).amplitudes().into_iter().map(str::to_owned).collect()
+        };
+        let db = [("a", "dB"), ("b", "dB"), ("c", "1")];
+        assert_eq!(of("a^2 / b", &db[..2]), [] as [&str; 0]);
+        assert_eq!(of("(a + b * ln(c)) * departure_cos", &db), ["a", "b"]);
+        assert_eq!(of("a * c + 0 * a", &[("a", "dB"), ("c", "1")]), ["a"]);
+        assert_eq!(of("a + 1 * b - b", &db[..2]), ["a", "b"]);
+    }
+}
