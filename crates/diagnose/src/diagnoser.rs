@@ -17,7 +17,7 @@ use crate::report::composition::compose;
 use crate::report::diagnosis::Diagnosis;
 use crate::simulate::scene_tracer::{Rays, SceneTracer};
 use sabine_acoustics::Observer;
-use sabine_paths::laws::Law;
+use sabine_paths::laws::{BoundLaws, Law, LawSite};
 use sabine_scene::MeasuredRoom;
 use std::sync::Arc;
 use web_time::Instant;
@@ -42,6 +42,8 @@ pub struct Diagnoser {
     pub(crate) effects: Vec<Box<dyn Effect>>,
     tracer: Arc<dyn SceneTracer>,
     /// Causes that are at work from the beginning.
+    /// The laws among them.
+    laws: Vec<Law>,
     given: Vec<GivenCause>,
 }
 
@@ -68,7 +70,7 @@ impl Diagnoser {
     pub fn new(config: DiagnoseConfig) -> Result<Self, Error> {
         config.check()?;
         let tracer = Arc::new(Rays { config: config.tracer() });
-        Ok(Self { config, effects: catalogue(), tracer, given: Vec::new() })
+        Ok(Self { config, effects: catalogue(), tracer, laws: Vec::new(), given: Vec::new() })
     }
 
     /// With these effects instead.
@@ -88,9 +90,28 @@ impl Diagnoser {
                 let reason = "an effect, or another law, has this identifier".to_owned();
                 return Err(Error::LawNotWeighed { id: law.id().to_owned(), reason });
             }
-            self.effects.push(Box::new(LawEffect::new(law)?));
+            self.push_law(LawEffect::new(law)?);
         }
         Ok(self)
+    }
+
+    fn push_law(&mut self, effect: LawEffect) {
+        self.laws.push(effect.law().clone());
+        self.effects.push(Box::new(effect));
+    }
+
+    /// That the names of all laws are found between every source and receiver of a room: those of delay and of added sound are not applied to
+    /// traced paths, where they would be.
+    fn check_laws(&self, room: &MeasuredRoom) -> Result<(), Error> {
+        for response in room.responses() {
+            let (source, receiver) = (&room.sources()[response.source], &room.receivers()[response.receiver]);
+            let site = LawSite::new(room.scene(), source, receiver, &room.air());
+            let site = response.recorded_at.map_or(site.clone(), |order| site.with_recording_order(order));
+            for law in &self.laws {
+                BoundLaws::new(std::slice::from_ref(law), &site).map_err(sabine_acoustics::Error::from)?;
+            }
+        }
+        Ok(())
     }
 
     /// With [`UnknownLaw`] beside its effects: what the misfit goes with, where no listed cause explains it.
@@ -113,10 +134,12 @@ impl Diagnoser {
             let knows = |effects: &[Box<dyn Effect>], id: &str| effects.iter().any(|e| e.id() == id);
             // A law is that law wherever it came from.
             if let Some(law) = cause.law() {
-                if !knows(&self.effects, law.id()) {
-                    self.effects.push(Box::new(LawEffect::new(law.clone())?));
+                let known = knows(&self.effects, law.id());
+                if !known {
+                    self.push_law(LawEffect::with_edges_as_written(law)?);
                 }
-                self.given.push(GivenCause { id: law.id().to_owned(), subject: None, name });
+                let subject = cause.subject.clone().filter(|_| known);
+                self.given.push(GivenCause { id: law.id().to_owned(), subject, name });
                 continue;
             }
             if !knows(&self.effects, &cause.id) {
@@ -267,6 +290,7 @@ impl Diagnoser {
         tracer: &Arc<dyn SceneTracer>,
         observer: &dyn Observer,
     ) -> Result<Prepared, Error> {
+        self.check_laws(room)?;
         let mut baseline = Baseline::new(room, held, &self.config, tracer, observer)?;
         let used = baseline.observations.fitted.clone();
         let mut cases = candidates::cases(&self.effects, baseline.survey());

@@ -61,8 +61,42 @@ fn read_file(path: &Path) -> Result<Vec<Law>, Error> {
         let error = OutOfRange { field: "length (bytes)", value: bytes as f64, range: "at most 1 MiB" };
         return Err(Cause::from(error).in_file(path, "laws").into());
     }
-    let text = std::fs::read_to_string(path).map_err(io)?;
-    let file: LawFile = toml::from_str(&text)
+    parse(path, &std::fs::read_to_string(path).map_err(io)?)
+}
+
+fn parse(path: &Path, text: &str) -> Result<Vec<Law>, Error> {
+    let file: LawFile = toml::from_str(text)
         .map_err(|source| Error::Model { path: path.to_owned(), source: Box::new(source) })?;
     Ok(file.laws)
+}
+
+/// The files that come with this crate.
+const SHIPPED: [(&str, &str); 10] = [
+    ("air_absorption.toml", include_str!("../../laws/air_absorption.toml")),
+    ("background_noise.toml", include_str!("../../laws/background_noise.toml")),
+    ("coupled_volume.toml", include_str!("../../laws/coupled_volume.toml")),
+    ("gain_drift.toml", include_str!("../../laws/gain_drift.toml")),
+    ("loudspeaker_response.toml", include_str!("../../laws/loudspeaker_response.toml")),
+    ("receiver_directivity.toml", include_str!("../../laws/receiver_directivity.toml")),
+    ("sampling_clock.toml", include_str!("../../laws/sampling_clock.toml")),
+    ("sound_speed.toml", include_str!("../../laws/sound_speed.toml")),
+    ("source_directivity.toml", include_str!("../../laws/source_directivity.toml")),
+    ("time_zero.toml", include_str!("../../laws/time_zero.toml")),
+];
+
+/// The laws that come with this crate, in `laws/*.toml`: what effects of the catalogue do, as formulas to start from. None is weighed unless it
+/// is asked for; each file says how it differs from the effect whose name it has.
+///
+/// ```
+/// let laws = sabine_diagnose::shipped_laws()?;
+/// let air = laws.iter().find(|law| law.id() == "air_attenuation").unwrap();
+/// assert_eq!(air.printed(), "-a * length_m * (frequency_hz / f)^n");
+/// # Ok::<(), sabine_diagnose::Error>(())
+/// ```
+///
+/// # Errors
+/// [`Error::Model`] naming the file: none of them gives one.
+pub fn shipped_laws() -> Result<Vec<Law>, Error> {
+    let all = SHIPPED.iter().map(|(name, text)| parse(Path::new(name), text));
+    Ok(all.collect::<Result<Vec<_>, _>>()?.concat())
 }

@@ -1,5 +1,6 @@
 //! Traced paths between one source and one receiver, and the energies that they predict.
 
+pub(crate) mod class_sums;
 mod gathering;
 mod isolated_reflections;
 

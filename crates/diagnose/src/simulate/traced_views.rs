@@ -5,6 +5,7 @@ use crate::observe::band_pulse::BandPulse;
 use crate::simulate::band_state::BandState;
 use crate::simulate::simulation::Simulation;
 use crate::simulate::traced_pair::TracedPair;
+use crate::simulate::traced_pair::class_sums::ClassedPaths;
 use crate::survey::{Survey, SurveyedResponse};
 use rayon::prelude::*;
 use sabine_acoustics::{Air, Material};
@@ -169,6 +170,12 @@ impl<'a> TracedPairView<'a> {
         let sums = self.bin_energies(band, energies);
         let floor = NOTHING * sums.iter().copied().fold(0.0, f64::max).max(1e-30);
         sums.iter().zip(self.ln_energy(band)).map(|(s, ln)| s.max(floor).ln() - ln).collect()
+    }
+
+    /// Energies of the paths (one each) in the bins of a band by class of path, and what these paths have in the mean.
+    pub(crate) fn class_sums(&self, band: usize, energies: &[f32], paths: &ClassedPaths) -> Vec<Vec<f64>> {
+        let into = (self.state(band).bins, &self.room.pulses[band]);
+        self.pair.class_sums(energies, paths, into, self.room.simulation.traced_s)
     }
 
     /// What laws know of it, at the places and in the air that were found.

@@ -116,10 +116,18 @@ fn where_no_law_is_at_work_none_is_named() {
 fn laws_that_cannot_be_weighed_say_why() {
     let (_folder, room) = room(&[]);
     let said = |law: Law| diagnose(&room, vec![law]).unwrap_err().to_string();
-    let late =
-        Law::new("late", LawTarget::Delay, None, "d", [("d", LawParameter::new(1.0, [0.0, 2.0], "ms"))])
-            .unwrap();
-    assert_eq!(said(late), "law `late`: a law of target `delay` is rendered, not weighed as a cause");
+    let late = Law::new(
+        "late",
+        LawTarget::Delay,
+        None,
+        "d * reflections",
+        [("d", LawParameter::new(1.0, [0.0, 2.0], "ms"))],
+    )
+    .unwrap();
+    assert_eq!(
+        said(late),
+        "law `late`: `reflections` is not known of the arrivals that are compared: a law of delay with it is rendered, not weighed as a cause"
+    );
     let known = law("scattering", LawTarget::Path, None, "a", "dB");
     assert_eq!(said(known), "law `scattering`: an effect, or another law, has this identifier");
     let nothing =

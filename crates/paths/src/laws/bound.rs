@@ -38,6 +38,11 @@ impl LawSite {
         Self { recording_order: Some(order), ..self }
     }
 
+    /// A variable of pair and response by its name: `distance_m`, `receiver_x_m`, `temperature_c` ...
+    pub fn variable(&self, name: &str) -> Option<f64> {
+        self.value(Variable::of_name(name)?)
+    }
+
     /// A variable of pair and response.
     fn value(&self, variable: Variable) -> Option<f64> {
         let (source, receiver) = (self.source.position_m, self.receiver.position_m);

@@ -225,7 +225,7 @@ impl fmt::Display for LawFault {
             Self::UnknownUnit { parameter, unit } => {
                 write!(
                     f,
-                    "parameters.{parameter}.unit: `{unit}` is no unit; known are 1, dB, m, cm, mm, km, s, ms, us, Hz, kHz, deg, rad, C, %, and their powers, products and quotients: dB/m, s^2"
+                    "parameters.{parameter}.unit: `{unit}` is no unit; known are 1, ppm, dB, m, cm, mm, km, s, ms, us, Hz, kHz, deg, rad, C, %, and their powers, products and quotients: dB/m, s^2"
                 )
             }
             other => other.fmt_of_table(f),

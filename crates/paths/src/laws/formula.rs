@@ -125,13 +125,14 @@ pub(crate) struct Formula {
 }
 
 impl Formula {
-    /// Whether the whole goes in proportion to a parameter: as far as its form shows it, without reordering.
-    pub fn is_proportional_to(&self, parameter: Index) -> bool {
+    /// Whether the whole goes in proportion to some parameters together: twice each of them is twice the whole, as far as its form shows it,
+    /// without reordering.
+    pub fn is_proportional_to(&self, parameters: &[Index]) -> bool {
         let mut grows: Vec<Growth> = Vec::with_capacity(self.ops.len());
         for &op in &self.ops {
             let of = |index: Index| grows[usize::from(index)];
             grows.push(match op {
-                Op::Parameter(index) if index == parameter => Growth::Proportional,
+                Op::Parameter(index) if parameters.contains(&index) => Growth::Proportional,
                 Op::Number(_) | Op::Parameter(_) | Op::Variable(_) | Op::Hits(_) => Growth::Constant,
                 Op::Unary(Unary::Negate, a) => of(a),
                 Op::Unary(_, a) => of(a).through(),
@@ -145,6 +146,22 @@ impl Formula {
             });
         }
         grows.last() == Some(&Growth::Proportional)
+    }
+
+    /// Whether all that a parameter does is to say where steps over the frequency stand: `above(frequency_hz, f0)`.
+    pub fn is_edge_of_bands(&self, parameter: Index) -> bool {
+        let is = |index: Index| self.ops[usize::from(index)] == Op::Parameter(parameter);
+        let is_frequency = |index: Index| self.ops[usize::from(index)] == Op::Variable(Variable::Frequency);
+        let uses = |op: &Op| match *op {
+            Op::Unary(_, a) => is(a),
+            Op::Binary(Binary::Above | Binary::Below, a, b) if is_frequency(a) && is(b) => false,
+            Op::Binary(_, a, b) => is(a) || is(b),
+            Op::Resonance(of) => of.into_iter().any(is),
+            _ => false,
+        };
+        self.ops.contains(&Op::Parameter(parameter))
+            && !self.ops.last().is_some_and(|op| *op == Op::Parameter(parameter))
+            && !self.ops.iter().any(uses)
     }
 
     /// The formula as text that reads as the same formula.

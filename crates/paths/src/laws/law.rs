@@ -12,6 +12,8 @@ use std::collections::BTreeMap;
 
 /// Longest identifier.
 const MAX_ID: usize = 64;
+/// Most parameters with an interval among which those are looked for in proportion to which a law goes.
+const MAX_TOGETHER: usize = 10;
 
 /// A parameter of a law: its value, the interval that it lies in (a 90 % interval where it was fitted) and its unit.
 #[derive(Clone, Debug, PartialEq)]
@@ -216,8 +218,46 @@ impl Law {
     /// # Ok::<(), sabine_paths::laws::LawError>(())
     /// ```
     pub fn amplitude(&self) -> Option<&str> {
-        let index = (0..self.names.len()).find(|&i| self.formula.is_proportional_to(i as u16))?;
+        let index = (0..self.names.len()).find(|&i| self.formula.is_proportional_to(&[i as u16]))?;
         Some(&self.names[index])
+    }
+
+    /// The parameters that say together how strong the law is: [`Law::amplitude`] where there is one, else the fewest that have an interval
+    /// and in proportion to which, taken together, the whole law goes. None where no such are seen.
+    ///
+    /// ```
+    /// use sabine_paths::laws::{Law, LawParameter, LawTarget};
+    /// let db = |value| LawParameter::new(value, [-6.0, 6.0], "dB");
+    /// let f = LawParameter::new(1.0, [1.0, 1.0], "kHz");
+    /// let law = Law::new("tilt", LawTarget::Path, None, "a + b * ln(frequency_hz / f)", [("a", db(1.0)), ("b", db(0.0)), ("f", f)])?;
+    /// assert_eq!(law.amplitudes(), ["a", "b"]);
+    /// # Ok::<(), sabine_paths::laws::LawError>(())
+    /// ```
+    pub fn amplitudes(&self) -> Vec<&str> {
+        if let Some(one) = self.amplitude() {
+            return vec![one];
+        }
+        let has_interval = |i: &usize| self.parameters[*i].low < self.parameters[*i].high;
+        let open: Vec<u16> = (0..self.names.len()).filter(has_interval).map(|i| i as u16).collect();
+        // Few have more: a set of these would be looked for too long.
+        if open.len() > MAX_TOGETHER {
+            return Vec::new();
+        }
+        let mut sets: Vec<Vec<u16>> = (0..1u32 << open.len())
+            .map(|bits| {
+                open.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, p)| *p).collect()
+            })
+            .collect();
+        sets.sort_by_key(Vec::len);
+        let found = sets.into_iter().find(|set| self.formula.is_proportional_to(set));
+        found.unwrap_or_default().iter().map(|i| self.names[usize::from(*i)].as_str()).collect()
+    }
+
+    /// Whether all that a parameter does is to say where steps over the frequency stand, as `f0` in `above(frequency_hz, f0)`: between the
+    /// centres of two bands it changes nothing.
+    pub fn is_edge_of_bands(&self, parameter: &str) -> bool {
+        let index = self.names.iter().position(|name| name == parameter);
+        index.is_some_and(|i| self.formula.is_edge_of_bands(i as u16))
     }
 
     /// The same law times a pure number, which becomes a parameter of this name.
@@ -348,8 +388,13 @@ impl Law {
         self.parameters[index].value * self.units[index].scale
     }
 
+    /// Base units in the unit of a parameter.
+    pub(crate) fn scale(&self, index: usize) -> f64 {
+        self.units[index].scale
+    }
+
     /// From base units to the unit of the target.
-    fn factor(&self) -> f64 {
+    pub(crate) fn factor(&self) -> f64 {
         if self.target == LawTarget::Delay { 1e3 } else { 1.0 }
     }
 

@@ -55,6 +55,7 @@ mod reflections;
 mod table;
 mod target;
 mod unit;
+mod values;
 mod variable;
 
 pub(crate) use applied::{AddedEnergy, PathLaws, delays_s};
@@ -65,3 +66,4 @@ pub use error::{LawError, LawFault, Place};
 pub use law::{Law, LawParameter};
 pub use target::LawTarget;
 pub use unit::Unit;
+pub use values::{LawVariable, PathVariable};

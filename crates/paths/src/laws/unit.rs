@@ -96,6 +96,11 @@ impl Unit {
         })
     }
 
+    /// How many of the base units dB, m, s, deg, C and % (and their powers) it is: 1000 for `kHz`, 0.01 for `cm`.
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+
     /// The unit as it was written.
     pub fn text(&self) -> &str {
         &self.text
@@ -155,6 +160,7 @@ fn named(name: &str) -> Option<(Dimension, f64)> {
     Some(match name {
         "1" => (Dimension::PURE, 1.0),
         "rad" => (Dimension::PURE, 1.0),
+        "ppm" => (Dimension::PURE, 1e-6),
         "dB" => (Unit::DECIBEL, 1.0),
         "m" => (Unit::METRE, 1.0),
         "cm" => (Unit::METRE, 1e-2),
@@ -188,6 +194,7 @@ mod tests {
             ("dB m^-1 kHz^-2", 1e-6, "dB m^-1 s^2"),
             ("Hz*s", 1.0, "a pure number"),
             ("rad", 1.0, "a pure number"),
+            ("ppm", 1e-6, "a pure number"),
         ] {
             let unit = Unit::parse(text).unwrap_or_else(|| panic!("{text}"));
             assert!((unit.scale / scale - 1.0).abs() < 1e-12, "{text}: {}", unit.scale);

@@ -91,6 +91,7 @@ impl Hidden {
             | Self::GainDrift { .. }
             | Self::Dropouts { .. }
             | Self::GrazingAbsorption { .. }
+            | Self::SeatDip { .. }
             | Self::ForeignChirp { .. } => {}
         }
         truth.effects.push(self.clone());
@@ -267,6 +268,18 @@ fn check(truth: &Truth, effect: &Hidden) -> Result<(), Error> {
                 40.0,
                 "between 0 and 40 dB",
             )?)
+        }
+        Hidden::SeatDip { material, db, f0_hz, q } => {
+            exists("material", *material, truth.materials.len())?;
+            OutOfRange::check("depth of the seat dip (dB)", *db, 0.0, 40.0, "between 0 and 40 dB")?;
+            OutOfRange::check(
+                "frequency of the seat dip (Hz)",
+                *f0_hz,
+                20.0,
+                2e4,
+                "between 20 Hz and 20 kHz",
+            )?;
+            Ok(OutOfRange::check("quality of the seat dip", *q, 0.05, 20.0, "between 0.05 and 20")?)
         }
         Hidden::ForeignChirp { start_s, length_s, from_hz, to_hz, level_db } => {
             OutOfRange::check("beginning (s)", *start_s, 0.0, 100.0, "between 0 and 100 s")?;

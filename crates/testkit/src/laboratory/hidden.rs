@@ -189,6 +189,18 @@ pub enum Hidden {
         /// The first nominal octave centre in Hz.
         from_hz: f64,
     },
+    /// Outside the catalogue: the seat dip. A material takes `db (1 - cos)^2` at each meeting, cos being that of the angle to the normal, times
+    /// what a resonator of this frequency and quality takes.
+    SeatDip {
+        /// Index of the material.
+        material: usize,
+        /// What it takes at grazing incidence and resonance in dB, 0 to 40.
+        db: f64,
+        /// Frequency of the resonance in Hz, 20 to 20000.
+        f0_hz: f64,
+        /// Its quality, 0.05 to 20.
+        q: f64,
+    },
     /// Outside the catalogue: a sweep that is none of the measurement's, in every response.
     ForeignChirp {
         /// Its beginning in seconds from the first sample.
@@ -314,6 +326,7 @@ impl Hidden {
             Self::Dropouts { .. } => "dropouts",
             Self::ForeignChirp { .. } => "foreign_chirp",
             Self::GrazingAbsorption { .. } => "grazing_absorption",
+            Self::SeatDip { .. } => "seat_dip",
         }
     }
 }

@@ -23,7 +23,12 @@ impl ReflectionByAngle {
     /// None unless an effect of this kind is at work.
     pub(crate) fn of(truth: &Truth) -> Option<Self> {
         let by_angle = |e: &&Hidden| {
-            matches!(e, Hidden::AngleDependentAbsorption { .. } | Hidden::GrazingAbsorption { .. })
+            matches!(
+                e,
+                Hidden::AngleDependentAbsorption { .. }
+                    | Hidden::GrazingAbsorption { .. }
+                    | Hidden::SeatDip { .. }
+            )
         };
         let effects: Vec<&Hidden> = truth.effects.iter().filter(by_angle).collect();
         let face = |band: usize, face: usize| {
@@ -58,6 +63,15 @@ fn add(truth: &Truth, effect: &Hidden, (band, face): (usize, usize), by_angle: &
         {
             let off = |cosine: f64| -db * (1.0 - cosine).powi(2) * std::f64::consts::LN_10 / 10.0;
             by_angle.iter_mut().zip(cosines).for_each(|(sum, cosine)| *sum += off(cosine));
+        }
+        Hidden::SeatDip { material, db, f0_hz, q } if *material == own => {
+            // Power that a driven resonator takes: f^2 g^2 / (f^2 g^2 + (f^2 - f0^2)^2), its width g being f0 / q.
+            let (f, width) = (truth.bands_hz[band], f0_hz / q);
+            let taken = (f * width).powi(2) / ((f * width).powi(2) + (f * f - f0_hz * f0_hz).powi(2));
+            let depth = db * taken * std::f64::consts::LN_10 / 10.0;
+            by_angle.iter_mut().zip(cosines).for_each(|(sum, cosine)| {
+                *sum -= depth * (1.0 - 2.0 * cosine + cosine * cosine);
+            });
         }
         _ => {}
     }

@@ -118,6 +118,13 @@ fn draw(id: &str, strength: f64, lab: &Laboratory, seed: u64, r: &mut Pcg64Mcg) 
             db: strength * (5.0 + 3.0 * unit(r)),
             from_hz: if r.random::<bool>() { 1000.0 } else { 2000.0 },
         },
+        // The floor, as rows of seats do, but higher and deeper than most.
+        "seat_dip" => Hidden::SeatDip {
+            material: truth.faces[4],
+            db: strength * (15.0 + 8.0 * unit(r)),
+            f0_hz: 500.0 * 2f64.powf(1.5 * unit(r)),
+            q: 0.5,
+        },
         "foreign_chirp" => foreign_chirp(r, truth, decay_s, strength),
         _ => return Err(Error::UnknownId { id: id.to_owned() }),
     })

@@ -82,7 +82,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if !arguments.effects.is_empty() {
         diagnoser = diagnoser.with_only(&arguments.effects)?;
     }
-    diagnoser = diagnoser.with_laws(laws)?;
+    let file = arguments.laws.as_deref();
+    diagnoser = diagnoser.with_laws(laws).map_err(|error| naming_laws(error.into(), file))?;
     if arguments.discover {
         diagnoser = diagnoser.discovering();
     }
