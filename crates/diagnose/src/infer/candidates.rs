@@ -126,7 +126,7 @@ mod tests {
         let [decays, arrivals] =
             [Observable::Decay, Observable::Arrivals].map(|part| cases_of(&candidates, &chosen, part).len());
         let both = candidates.iter().filter(|c| c.case.observable() == Observable::Channels).count();
-        let neither = candidates.iter().filter(|c| c.case.observable() == Observable::PreArrival).count();
+        let neither = candidates.iter().filter(|c| c.case.observable().is_by_itself()).count();
         assert!(both > 0 && decays + arrivals - both + neither == candidates.len());
     }
 }

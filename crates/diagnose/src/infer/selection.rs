@@ -10,7 +10,7 @@ use crate::infer::candidates::{CatalogueCase, EffectScore};
 use crate::infer::ray_dependence::MoreWithHalf;
 use crate::infer::search::{Search, State};
 use sabine_acoustics::Observer;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Expansions about the fit with one cause more, at most.
 const ROUNDS: usize = 4;
@@ -88,7 +88,11 @@ pub(crate) fn select(
     observer: &dyn Observer,
 ) -> Result<Selection, Error> {
     let most = named.chosen.len() + baseline.config.most_causes;
+    let stands = |&c: &usize| cases[c].case.early_sound_term().is_some();
     while named.chosen.len() < most {
+        if !named.chosen.iter().any(stands) {
+            baseline.early_sound = OnceLock::new();
+        }
         baseline.prepare_rest(cases)?;
         let (ranked, rivals, interchangeable, threshold) = {
             let search = Search::new(baseline, cases, effects, used.to_vec()).knowing(arrival_fits);
@@ -161,6 +165,9 @@ fn put_to_work(
 ) -> Result<(), Error> {
     for change in &expand_about_fit(baseline, cases, effects, chosen, fits)? {
         baseline.retrace(change, cases, chosen)?;
+        if matches!(change, ModelChange::Object(_)) {
+            fits.1.forget();
+        }
     }
     let of_decays: Vec<&Case> = chosen
         .iter()

@@ -4,6 +4,7 @@ use crate::effect::info::discriminating_measurement;
 use crate::effect::{Effect, Observable};
 use crate::error::Error;
 use crate::extend::extension;
+use crate::extend::model_change::ModelChange;
 use crate::infer::baseline::Baseline;
 use crate::infer::candidates::EffectScore;
 use crate::infer::confirmation::{Confirmation, Doubt};
@@ -119,7 +120,7 @@ fn causes(
                 .iter()
                 .filter_map(|&other| search.candidates[other].case.subject.clone())
                 .collect(),
-            explanation: effects[own.effect].info().explanation.into_owned(),
+            explanation: explanation(&*effects[own.effect], &extension::changes(search, state, candidate)),
             probability: found.probability(candidate),
             nats: without(search, state, candidate)?,
             more_nats_with_half_the_rays: found
@@ -133,6 +134,15 @@ fn causes(
         })
     };
     state.chosen.iter().enumerate().map(one).collect()
+}
+
+/// What is the matter, and what a person who goes and looks will find where.
+fn explanation(effect: &dyn Effect, changes: &[ModelChange]) -> String {
+    let objects = changes.iter().filter_map(|change| match change {
+        ModelChange::Object(object) => Some(object.to_string()),
+        _ => None,
+    });
+    std::iter::once(effect.info().explanation.into_owned()).chain(objects).collect::<Vec<_>>().join(" ")
 }
 
 fn is_slight(gain: &HeldOutGain) -> bool {
