@@ -49,7 +49,7 @@ impl Effect for MissingObject {
             "An object that the model lacks",
             "Something like a box stands in the room and is missing from the model: a cupboard, a sofa, a rack.",
         )
-        .decided_by(10, NextMeasurement::ObjectsRemoved)
+        .decided_by(12, NextMeasurement::ObjectsRemoved)
     }
 
     fn cases(&self, survey: &Survey) -> Vec<Case> {

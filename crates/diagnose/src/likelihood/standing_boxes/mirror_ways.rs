@@ -198,7 +198,7 @@ mod tests {
     fn reflections_are_those_that_the_tracer_finds_in_a_mesh_with_the_box() {
         let hard = Material::uniform(Bands::T60, 0.1, 0.0).unwrap();
         let room = Scene::shoebox([6.0, 5.0, 2.8], std::array::from_fn(|_| hard.clone())).unwrap();
-        let one = StandingBox::new([2.6, 2.3, 0.0], [1.9, 0.8, 1.1], 20.0, 0.1);
+        let one = StandingBox::new([2.6, 2.3, 0.0], [1.9, 0.8, 1.5], 20.0, 0.1);
         let with = one.added_to(&room, 0).unwrap();
         let walls = [
             ([0.0; 3], [1.0, 0.0, 0.0]),
@@ -215,11 +215,14 @@ mod tests {
         let config = TracerConfig { rays: 1000, image_order: 2, ..TracerConfig::default() };
         let tracer = PathTracer::new(config).unwrap();
         let mut seen = 0;
-        for (source, receiver) in [
-            ([0.8, 1.1, 1.4], [4.9, 1.0, 1.3]),
-            ([1.0, 4.2, 1.2], [2.9, 4.4, 1.7]),
-            ([4.2, 0.9, 1.8], [0.9, 3.6, 1.0]),
-        ] {
+        // Places over the room, none in the box nor near a wall.
+        let place = |i: usize| -> [f64; 3] {
+            let share = |k: usize| 0.1 + 0.8 * ((i as f64 * [0.618, 0.755, 0.569][k]) % 1.0);
+            [6.0 * share(0), 5.0 * share(1), 2.8 * share(2)]
+        };
+        let free: Vec<[f64; 3]> = (1..40).map(place).filter(|p| !solid.holds(*p, 0.2)).collect();
+        for ends in free.chunks_exact(2).take(12) {
+            let [source, receiver] = [ends[0], ends[1]];
             let lengths = |scene: &Scene| -> Vec<f64> {
                 let places = (Source::omni("s", source).unwrap(), Receiver::omni("r", receiver).unwrap());
                 let prepared = tracer.prepare(scene).unwrap();

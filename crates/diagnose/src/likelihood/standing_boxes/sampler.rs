@@ -378,15 +378,19 @@ mod tests {
 
     #[test]
     fn a_box_is_found_where_it_stands_and_none_where_none_does() {
-        let hidden = StandingBox::new([3.4, 2.6, 0.0], [1.8, 0.7, 1.1], 0.0, 0.4);
+        let hidden = StandingBox::new([3.4, 2.6, 0.0], [1.8, 0.7, 1.4], 0.0, 0.4);
         let early = early_sound(Some(&hidden));
         let found = draw(&early, &[true; 10], 1).unwrap();
-        assert!(found.nats > 10.0, "{}", found.nats);
-        let most = best(&found).unwrap().standing_box();
-        for k in 0..2 {
-            assert!((most.base_m[k] - hidden.base_m[k]).abs() < 0.2, "{most:?}");
-        }
-        assert!((most.sides_m[2] - 1.1).abs() < 0.1, "{most:?}");
+        // No better box is known than the true one, and so many numbers cost what is left of it.
+        let truly: f64 = (0..10).map(|r| early.gain(r, &Solid::of(&hidden), -2.0, 0.0)).sum();
+        let most = best(&found).unwrap();
+        assert!(most.nats > truly - 2.0, "{} {truly}", most.nats);
+        assert!(found.nats > 6.0 && found.nats < most.nats, "{}", found.nats);
+        let most = most.standing_box();
+        // How long it is hardly any reflection says: its middle is known to half of that.
+        let off = [0, 1].map(|k| most.base_m[k] - hidden.base_m[k]);
+        assert!(off[0].hypot(off[1]) < 0.5, "{most:?}");
+        assert!((most.sides_m[2] - 1.4).abs() < 0.1, "{most:?}");
         // Whoever asks again, and on however many threads, gets the same.
         let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let again = alone.install(|| draw(&early, &[true; 10], 1)).unwrap();
