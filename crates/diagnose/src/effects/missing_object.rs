@@ -21,6 +21,11 @@ use crate::survey::Survey;
 /// microphone that stands elsewhere (`position_error`), where the box hides its direct sound; directional receivers and sources, which weaken
 /// what comes from, or leaves in, some directions at every place. Objects that hang, are round, or let sound through are none of its cases.
 ///
+/// A box before a wall hides what a hole in it swallows, and is weighed on more of the early sound than the hole is: reflections of all orders,
+/// levels of direct sounds, peaks. Decays speak for a hole and not for an object. So it yields to `open_patch`: where decays and single
+/// reflections make a hole worth a name, the hole is named, and no object beside it. If the hole does not stand at positions left out, the search
+/// goes on without it, and an object may be named.
+///
 /// Source: shadows: Z. Maekawa, Applied Acoustics 1, 1968; U. J. Kurze, G. S. Anderson, Applied Acoustics 4, 1971. Evidence: P. Del Moral,
 /// A. Doucet, A. Jasra, J. R. Statist. Soc. B 68, 2006.
 #[derive(Clone, Copy, Debug, Default)]
@@ -50,6 +55,7 @@ impl Effect for MissingObject {
             "Something like a box stands in the room and is missing from the model: a cupboard, a sofa, a rack.",
         )
         .decided_by(12, NextMeasurement::ObjectsRemoved)
+        .yielding_to(&["open_patch"])
     }
 
     fn cases(&self, survey: &Survey) -> Vec<Case> {

@@ -109,8 +109,8 @@ mod tests {
             assert!(a.explanation.ends_with('.') && !a.title.ends_with('.'), "{}", a.id);
             assert!(a.id.chars().all(|c| c.is_ascii_lowercase() || c == '_'), "{}", a.id);
             assert!(infos[..i].iter().all(|b| a.id != b.id && a.title != b.title), "{}", a.id);
-            for (other, _) in a.against {
-                assert!(infos.iter().any(|b| b.id == *other), "{} against {other}", a.id);
+            for other in a.against.iter().map(|(other, _)| other).chain(a.yields_to) {
+                assert!(infos.iter().any(|b| b.id == *other && b.id != a.id), "{} and {other}", a.id);
             }
         }
     }

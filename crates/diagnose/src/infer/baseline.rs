@@ -447,7 +447,7 @@ mod tests {
             let mut case = Case::decay(Vec::new(), Counted(Arc::clone(count)));
             // Slots have gaps: cases that refused to be prepared are gone.
             case.slot = Some(2 * effect + 1);
-            CatalogueCase { effect, id: "counted".into(), case }
+            CatalogueCase { effect, id: "counted".into(), yields_to: &[], case }
         };
         let cases: Vec<CatalogueCase> = counts.iter().enumerate().map(one).collect();
         let mut baseline =

@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::extend::extension;
 use crate::extend::model_change::ModelChange;
 use crate::infer::baseline::Baseline;
-use crate::infer::candidates::EffectScore;
+use crate::infer::candidates::{Candidate, EffectScore};
 use crate::infer::confirmation::{Confirmation, Doubt};
 use crate::infer::cross_validation::decay_curves;
 use crate::infer::isolability::isolability;
@@ -192,8 +192,10 @@ fn beyond_limit<'c>(search: &Search<'_>, state: &State, candidates: &'c [Candida
     if state.chosen.len() < search.baseline.config.most_causes {
         return Vec::new();
     }
+    let chosen: Vec<&Candidate<'_>> = state.chosen.iter().map(|&c| &search.candidates[c]).collect();
+    let yields = |id: &str| search.candidates.iter().any(|c| c.id == id && c.yields_to_any(&chosen));
     let worth = |c: &&CandidateScore| c.nats_beside_causes.is_some_and(|nats| nats >= search.threshold());
-    candidates.iter().filter(worth).map(|c| c.effect.as_str()).collect()
+    candidates.iter().filter(worth).filter(|c| !yields(&c.effect)).map(|c| c.effect.as_str()).collect()
 }
 
 /// How far single responses drift at most, in dB, and in which octave.
