@@ -11,8 +11,8 @@ pub use case::Case;
 pub use fitted_case::FittedCase;
 pub use info::EffectInfo;
 pub use term::{
-    AddedReflection, ArrivalTerm, AuxiliaryEvidence, ChannelChange, DecayTerm, EarlySoundTerm,
-    PreArrivalTerm, ReflectionEvidence, ReflectionTerm, Term,
+    AddedReflection, ArrivalTerm, AuxiliaryEvidence, ChannelChange, DecayTerm, PreArrivalTerm,
+    ReflectionEvidence, ReflectionTerm, Term,
 };
 
 use crate::survey::Survey;
@@ -137,16 +137,9 @@ pub(crate) enum Observable {
     Channels,
     /// What comes before the direct sound.
     PreArrival,
-    /// The direct sound, single reflections and peaks, all at once.
-    EarlySound,
 }
 
 impl Observable {
-    /// Whether no fit of decays or of arrivals has parameters of a case that bears on this: it is weighed by itself.
-    pub(crate) fn is_by_itself(self) -> bool {
-        matches!(self, Self::PreArrival | Self::EarlySound)
-    }
-
     /// Whether a case that bears on this takes part in the fit of decays or of arrivals.
     pub(crate) fn concerns(self, fit: Self) -> bool {
         self == fit || self == Self::Channels

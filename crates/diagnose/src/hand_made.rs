@@ -186,7 +186,6 @@ impl Tables {
             level_sd: self.level_sd,
             drift_sd: self.drift_sd,
             seconds: BTreeMap::new(),
-            early_sound: std::sync::OnceLock::new(),
             stale: BTreeSet::new(),
         }
     }

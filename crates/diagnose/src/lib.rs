@@ -93,9 +93,8 @@ pub use effect::info::discriminating_measurement;
 pub use effect::next_measurement::NextMeasurement;
 pub use effect::reflection_gate::ReflectionGate;
 pub use effect::{
-    AddedReflection, ArrivalTerm, AuxiliaryEvidence, Case, ChannelChange, DecayTerm, EarlySoundTerm, Effect,
-    EffectInfo, FittedCase, Nuisance, Parameter, PreArrivalTerm, ReflectionEvidence, ReflectionTerm, Stage,
-    Term,
+    AddedReflection, ArrivalTerm, AuxiliaryEvidence, Case, ChannelChange, DecayTerm, Effect, EffectInfo,
+    FittedCase, Nuisance, Parameter, PreArrivalTerm, ReflectionEvidence, ReflectionTerm, Stage, Term,
 };
 pub use effects::*;
 pub use error::Error;
@@ -106,11 +105,9 @@ pub use extend::extended_room::ExtendedRoom;
 pub use extend::law_file::{read_laws, shipped_laws};
 pub use extend::model_change::ModelChange;
 pub use extend::moved_mesh::DisplacementError;
-pub use extend::standing_box::StandingBox;
 pub use extend::uncertainty::Uncertainty;
 pub use found_parameter::FoundParameter;
 pub use likelihood::multilateration::{UnassignedPeak, UnassignedPeaks};
-pub use likelihood::standing_boxes::EarlySound;
 pub use observe::pre_arrival::PreArrival;
 pub use plan::config::PlanConfig;
 pub use plan::cost::CostTable;

@@ -1,9 +1,7 @@
 //! An effect with its subject, as data.
 
 use crate::effect::fitted_case::FittedCase;
-use crate::effect::term::{
-    ArrivalTerm, ChannelChange, DecayTerm, EarlySoundTerm, PreArrivalTerm, ReflectionTerm, Term,
-};
+use crate::effect::term::{ArrivalTerm, ChannelChange, DecayTerm, PreArrivalTerm, ReflectionTerm, Term};
 use crate::effect::{Nuisance, Observable, Parameter, Stage};
 use crate::extend::model_change::ModelChange;
 use std::fmt;
@@ -88,11 +86,6 @@ impl Case {
         Self::new(parameters, Term::PreArrival(Box::new(term)))
     }
 
-    /// Stands in the way of the early sound, and reflects it.
-    pub fn early_sound(term: impl EarlySoundTerm + 'static) -> Self {
-        Self::new(Vec::new(), Term::EarlySound(Box::new(term)))
-    }
-
     /// Relaxes one prior and does nothing else; more with [`Case::relaxing`].
     pub fn prior(nuisance: Nuisance, sd: f64) -> Self {
         Self::new(Vec::new(), Term::PriorOnly).relaxing(nuisance, sd)
@@ -145,7 +138,6 @@ impl Case {
             Term::Arrivals(_) | Term::Reflection(_) => Observable::Arrivals,
             Term::Channels(_) => Observable::Channels,
             Term::PreArrival(_) => Observable::PreArrival,
-            Term::EarlySound(_) => Observable::EarlySound,
             // Those of the fit that holds what it relaxes.
             Term::PriorOnly => match self.relaxes.first() {
                 Some((Nuisance::SourcePosition(_) | Nuisance::ReceiverPosition(_), _)) => {
@@ -170,10 +162,6 @@ impl Case {
 
     pub(crate) fn channel_change(&self) -> Option<ChannelChange> {
         if let Term::Channels(change) = self.term { Some(change) } else { None }
-    }
-
-    pub(crate) fn early_sound_term(&self) -> Option<&dyn EarlySoundTerm> {
-        if let Term::EarlySound(term) = &self.term { Some(&**term) } else { None }
     }
 
     pub(crate) fn pre_arrival_term(&self) -> Option<&dyn PreArrivalTerm> {

@@ -16,9 +16,6 @@ pub struct EffectInfo {
     pub against: &'static [(&'static str, NextMeasurement)],
     /// The measurement that tells it apart from all others, with a rank: of two effects the one with the lower rank decides.
     pub next_measurement: Option<(u8, NextMeasurement)>,
-    /// Effects, by their identifiers, that come before it: it is not named where one of them is named, or is worth a name by what is weighed
-    /// for that one alone.
-    pub yields_to: &'static [&'static str],
 }
 
 impl EffectInfo {
@@ -29,7 +26,7 @@ impl EffectInfo {
         explanation: impl Into<Cow<'static, str>>,
     ) -> Self {
         let (id, title, explanation) = (id.into(), title.into(), explanation.into());
-        Self { id, title, explanation, against: &[], next_measurement: None, yields_to: &[] }
+        Self { id, title, explanation, against: &[], next_measurement: None }
     }
 
     /// The same, with measurements that tell it apart from single other effects.
@@ -42,13 +39,6 @@ impl EffectInfo {
     #[must_use]
     pub fn decided_by(self, rank: u8, measurement: NextMeasurement) -> Self {
         Self { next_measurement: Some((rank, measurement)), ..self }
-    }
-
-    /// The same, yielding to other effects. For an effect that is weighed on data which bear on the others as well, but are not weighed for
-    /// them: its evidence is no measure of theirs, and beside them it would count the same data twice.
-    #[must_use]
-    pub fn yielding_to(self, others: &'static [&'static str]) -> Self {
-        Self { yields_to: others, ..self }
     }
 }
 

@@ -4,7 +4,6 @@ use crate::effect::reflection_gate::ReflectionGate;
 use crate::extend::displaced_surface::DisplacedSurface;
 use crate::found_parameter::FoundParameter;
 use crate::likelihood::multilateration::UnassignedPeaks;
-use crate::likelihood::standing_boxes::EarlySound;
 use crate::observe::pre_arrival::PreArrival;
 use crate::simulate::tables::{Tables, Unprepared};
 use crate::simulate::traced_views::TracedRoomView;
@@ -24,8 +23,6 @@ pub enum Term {
     Channels(ChannelChange),
     /// Shows before the direct sound.
     PreArrival(Box<dyn PreArrivalTerm>),
-    /// Stands in the way of the early sound, and reflects it.
-    EarlySound(Box<dyn EarlySoundTerm>),
     /// Nothing but what the relaxed priors allow.
     PriorOnly,
 }
@@ -77,11 +74,6 @@ pub trait DecayTerm: Send + Sync {
 pub trait ReflectionEvidence {
     /// What they say for it, given its parameters (value and standard deviation) from the fit of the decays.
     fn weigh(&self, own: &[(f64, f64)], gates: &[ReflectionGate]) -> Option<AuxiliaryEvidence>;
-
-    /// The only surface (index into [`Survey::planes`]) whose reflections it explains, where there is one.
-    fn plane(&self) -> Option<usize> {
-        None
-    }
 }
 
 /// A change of arrival times.
@@ -109,12 +101,6 @@ pub trait ReflectionTerm: Send + Sync {
 pub trait PreArrivalTerm: Send + Sync {
     /// What the responses that count (a flag for each) say for it, its parameters included.
     fn weigh(&self, responses: &PreArrival, used: &[bool]) -> Option<AuxiliaryEvidence>;
-}
-
-/// Something that stands in the way of the direct sound and of reflections, and reflects itself.
-pub trait EarlySoundTerm: Send + Sync {
-    /// What the responses that count (a flag for each) say for it, its parameters included.
-    fn weigh(&self, early: &EarlySound, used: &[bool]) -> Option<AuxiliaryEvidence>;
 }
 
 /// A change of channels; responses are indices.

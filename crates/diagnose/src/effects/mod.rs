@@ -10,7 +10,6 @@ mod coupled_volume;
 mod edge_diffraction;
 mod extra_reflector;
 mod law_effect;
-mod missing_object;
 mod nonlinear_distortion;
 mod open_patch;
 mod position_error;
@@ -38,7 +37,6 @@ pub use coupled_volume::CoupledVolume;
 pub use edge_diffraction::MissingDiffraction;
 pub use extra_reflector::ExtraReflector;
 pub use law_effect::LawEffect;
-pub use missing_object::MissingObject;
 pub use nonlinear_distortion::NonlinearDistortion;
 pub use open_patch::OpenPatch;
 pub use position_error::PositionError;
@@ -85,7 +83,6 @@ pub fn catalogue() -> Vec<Box<dyn Effect>> {
         Box::new(ChannelResponse),
         Box::new(CoherentReflections),
         Box::new(SurfaceDisplacement),
-        Box::new(MissingObject),
     ]
 }
 
@@ -109,8 +106,8 @@ mod tests {
             assert!(a.explanation.ends_with('.') && !a.title.ends_with('.'), "{}", a.id);
             assert!(a.id.chars().all(|c| c.is_ascii_lowercase() || c == '_'), "{}", a.id);
             assert!(infos[..i].iter().all(|b| a.id != b.id && a.title != b.title), "{}", a.id);
-            for other in a.against.iter().map(|(other, _)| other).chain(a.yields_to) {
-                assert!(infos.iter().any(|b| b.id == *other && b.id != a.id), "{} and {other}", a.id);
+            for (other, _) in a.against {
+                assert!(infos.iter().any(|b| b.id == *other), "{} against {other}", a.id);
             }
         }
     }

@@ -112,10 +112,6 @@ impl DecayTerm for OneWall {
 }
 
 impl ReflectionEvidence for OneWall {
-    fn plane(&self) -> Option<usize> {
-        Some(self.index)
-    }
-
     fn weigh(&self, own: &[(f64, f64)], gates: &[ReflectionGate]) -> Option<AuxiliaryEvidence> {
         let here: Vec<([f64; 2], f64, f64)> = gates
             .iter()

@@ -1,7 +1,6 @@
 //! What the changes of a model make of a room, taken together.
 
 use crate::extend::displaced_surface::DisplacedSurface;
-use crate::extend::standing_box::StandingBox;
 use sabine_paths::laws::Law;
 use sabine_scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -67,8 +66,6 @@ pub struct AppliedChanges {
     pub coherent_reflections: bool,
     /// Flat surfaces that the mesh lacks.
     pub sheets: Vec<ThinPanel>,
-    /// Box-shaped obstacles that the mesh lacks.
-    pub objects: Vec<StandingBox>,
     /// Formulas that change what paths carry, with the 90 % intervals of their parameters.
     pub laws: Vec<Law>,
 }

@@ -127,7 +127,6 @@ impl AppliedChanges {
         if !self.surfaces.is_empty() {
             check_places(room.scene(), &moved, &built.sources, &built.receivers)?;
         }
-        self.check_objects(&built.sources, &built.receivers).map_err(in_model)?;
         Ok(built)
     }
 
@@ -208,10 +207,7 @@ impl AppliedChanges {
     }
 
     fn scene(&self, stated: &Scene, moved: &Scene, materials: Vec<Material>) -> Result<Scene, Cause> {
-        let sheets = self.with_sheets(moved.with_materials(materials)?)?;
-        let scene = self.objects.iter().zip(1..).try_fold(sheets, |scene, (object, number)| {
-            object.added_as(&scene, format!("object_{number}"))
-        })?;
+        let scene = self.with_sheets(moved.with_materials(materials)?)?;
         let Some(change) = &self.dimensions else { return Ok(scene) };
         change.applied(stated, &scene)
     }

@@ -89,7 +89,7 @@ fn fitted_case<'s>(search: &'s Search<'_>, state: &'s State, candidate: usize) -
     let (baseline, case) = (search.baseline, search.candidates[candidate].case);
     let survey = baseline.survey();
     let (values, intervals): (&[f64], _) = match case.observable() {
-        Observable::Channels | Observable::PreArrival | Observable::EarlySound => (&[], Vec::new()),
+        Observable::Channels | Observable::PreArrival => (&[], Vec::new()),
         Observable::Decay | Observable::Arrivals => {
             let (maximum, first) = place_of(search, state, candidate);
             let places = case.parameters.iter().zip(first..);

@@ -12,5 +12,4 @@ mod model_checks;
 pub(crate) mod moved_mesh;
 mod number_slopes;
 pub(crate) mod recording_chain;
-pub(crate) mod standing_box;
 pub(crate) mod uncertainty;

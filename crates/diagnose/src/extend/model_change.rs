@@ -2,7 +2,6 @@
 
 use crate::extend::applied_changes::{AppliedChanges, CoupledDecay, Dimensions, GainOverTime, ThinPanel};
 use crate::extend::displaced_surface::{DisplacedSurface, put};
-use crate::extend::standing_box::StandingBox;
 use sabine_paths::laws::Law;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -61,8 +60,6 @@ pub enum ModelChange {
     /// A flat surface that the mesh lacks.
     #[serde(rename = "sheet")]
     Panel(ThinPanel),
-    /// A box-shaped obstacle that the mesh lacks.
-    Object(StandingBox),
     /// Sound is diffracted at the edges of the mesh.
     Diffraction,
     /// Specular reflections add as pressures.
@@ -107,11 +104,7 @@ impl ModelChange {
     pub(crate) fn moves_paths(&self) -> bool {
         matches!(
             self,
-            Self::Position { .. }
-                | Self::Temperature(_)
-                | Self::Dimensions(_)
-                | Self::SurfaceDisplacement(_)
-                | Self::Object(_)
+            Self::Position { .. } | Self::Temperature(_) | Self::Dimensions(_) | Self::SurfaceDisplacement(_)
         )
     }
 }
@@ -140,7 +133,6 @@ impl AppliedChanges {
             ModelChange::Dimensions(dimensions) => self.dimensions = Some(dimensions),
             ModelChange::SurfaceDisplacement(surface) => put(&mut self.surfaces, surface),
             ModelChange::Panel(panel) => self.sheets.push(panel),
-            ModelChange::Object(object) => self.objects.push(object),
             ModelChange::Diffraction => self.diffraction = true,
             ModelChange::CoherentReflections => self.coherent_reflections = true,
             ModelChange::Law(law) => {

@@ -2,10 +2,9 @@
 
 use crate::extend::applied_changes::{AppliedChanges, Dimensions};
 use crate::extend::laws_of_pairs::check_laws;
-use crate::extend::standing_box::StandingBox;
 use crate::survey::planes::dot;
 use sabine_acoustics::{Bands, Error as Cause, OutOfRange};
-use sabine_scene::{MeasuredRoom, Receiver, Source};
+use sabine_scene::MeasuredRoom;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A field and what is wrong with it.
@@ -84,7 +83,6 @@ impl AppliedChanges {
             check.each("sheet.corners_m", corners, (-1e5, 1e5), "a finite coordinate")?;
             check.each("sheet.absorption", &[sheet.absorption], (0.0, 1.0), "between 0 and 1")?;
         }
-        self.check_objects_alone(check)?;
         self.check_gain_over_time(check)?;
         for (field, values, limits, range) in [
             (
@@ -109,32 +107,6 @@ impl AppliedChanges {
             ("dimensions.shift_m", of_dimensions(|d| d.shift_m), (-100.0, 100.0), "within 100 m"),
         ] {
             check.each(field, &values, limits, range)?;
-        }
-        Ok(())
-    }
-
-    fn check_objects_alone(&self, check: &Checks) -> Result<(), Fault> {
-        for object in &self.objects {
-            check.each("object.base_m", &object.base_m, (-1e5, 1e5), "a finite coordinate")?;
-            check.each("object.sides_m", &object.sides_m, StandingBox::SIDES_M, "between 0.05 and 20 m")?;
-            check.each("object.yaw_deg", &[object.yaw_deg], (-360.0, 360.0), "within 360 degrees")?;
-            check.each("object.absorption", &[object.absorption], (0.0, 1.0), "between 0 and 1")?;
-        }
-        Ok(())
-    }
-
-    /// No source or receiver stands in an object.
-    pub(super) fn check_objects(&self, sources: &[Source], receivers: &[Receiver]) -> Result<(), Fault> {
-        let sources = sources.iter().map(|s| (&s.id, s.position_m));
-        let places: Vec<(&String, [f64; 3])> =
-            sources.chain(receivers.iter().map(|r| (&r.id, r.position_m))).collect();
-        for object in &self.objects {
-            if let Some((id, place)) = places.iter().find(|(_, place)| object.holds(*place)) {
-                let range = "a box that holds no source and no receiver";
-                let value = place[2] - object.base_m[2];
-                let cause = OutOfRange { field: "height of a place in it", value, range };
-                return Err((format!("object.base_m, {id}"), cause.into()));
-            }
         }
         Ok(())
     }

@@ -15,8 +15,7 @@ type Asked = (Vec<usize>, Vec<bool>);
 const MOST_ELEMENTS: usize = 8_000_000;
 
 /// Fits of arrival times by their cases (candidates, in order) and the responses that were used. While a diagnosis runs nothing changes that
-/// they rest on: what was measured, the cases, and what the room as stated predicts. Causes that are named re-trace decays alone; an object that
-/// joins the mesh is in what arrives, too, and fits are forgotten then.
+/// they rest on: what was measured, the cases, and what the room as stated predicts. Causes that are named re-trace decays alone.
 #[derive(Default)]
 pub(crate) struct ArrivalFits {
     known: Mutex<Known>,
@@ -30,11 +29,6 @@ struct Known {
 }
 
 impl ArrivalFits {
-    /// Forgets all fits: what arrives in the room as stated has changed.
-    pub fn forget(&self) {
-        *self.known.lock().unwrap_or_else(PoisonError::into_inner) = Known::default();
-    }
-
     /// The fit of these cases to these responses, made now if it is not known.
     pub fn of<E>(
         &self,

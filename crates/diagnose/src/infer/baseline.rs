@@ -10,7 +10,6 @@ use crate::likelihood::decay::{self, BinResidual, EnergyData, EnergyModel, WarmS
 use crate::likelihood::discrepancy::free_discrepancy;
 use crate::likelihood::laplace::{LaplaceFit, Prior};
 use crate::likelihood::parameters::{ArrivalLayout, DecayLayout};
-use crate::likelihood::standing_boxes::EarlySound;
 use crate::observe::observations::Observations;
 use crate::observe::observed_response::Measured;
 use crate::simulate::scene_tracer::SceneTracer;
@@ -24,7 +23,7 @@ use sabine_acoustics::{Observer, report};
 use sabine_scene::{MaterialPrior, MeasuredRoom};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::LN_10;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 use web_time::Instant;
 
 /// Rounds of expansion and fit of the baseline.
@@ -51,8 +50,6 @@ pub(crate) struct Baseline {
     /// energy), by band.
     pub drift_sd: Vec<f64>,
     pub seconds: BTreeMap<&'static str, f64>,
-    /// The early sound beside causes that stand in its way or add to it, once one has asked; read again until one is named.
-    pub early_sound: OnceLock<Option<EarlySound>>,
     /// Slots whose tables are of an expansion before.
     pub stale: BTreeSet<usize>,
 }
@@ -86,7 +83,6 @@ impl Baseline {
             observations,
             simulation,
             seconds: BTreeMap::from([("trace", started.elapsed().as_secs_f64())]),
-            early_sound: OnceLock::new(),
             stale: BTreeSet::new(),
         };
         baseline.simulation.expand(&baseline.observations, false)?;
@@ -169,12 +165,7 @@ impl Baseline {
         chosen: &[usize],
     ) -> Result<(), Error> {
         match self.simulation.apply(change, &self.observations.survey) {
-            Ok(true) => {
-                if matches!(change, ModelChange::Object(_)) {
-                    self.look_past_objects()?;
-                }
-                self.expand(cases, chosen)
-            }
+            Ok(true) => self.expand(cases, chosen),
             Ok(false) => Ok(()),
             Err(Error::Displacement(reason)) => {
                 self.observations.notes.push(format!(
@@ -185,17 +176,6 @@ impl Baseline {
             }
             Err(other) => Err(other),
         }
-    }
-
-    /// An object hides direct sounds: the time axes of such responses, and what arrives, are others. Where something else has moved paths
-    /// before, arrivals stay those of the room as stated, to which places that were found refer.
-    fn look_past_objects(&mut self) -> Result<(), Error> {
-        let in_sight: Vec<bool> = self.simulation.pairs.iter().map(TracedPair::has_direct).collect();
-        self.observations.align_again(&in_sight, &self.simulation.direct_s);
-        if self.simulation.is_as_stated(&self.observations.survey) {
-            self.simulation.predict_arrivals(&mut self.observations.survey)?;
-        }
-        Ok(())
     }
 
     /// Predicts energies again from the traced paths, and the tables of some cases (indices); those of all others wait for
@@ -447,7 +427,7 @@ mod tests {
             let mut case = Case::decay(Vec::new(), Counted(Arc::clone(count)));
             // Slots have gaps: cases that refused to be prepared are gone.
             case.slot = Some(2 * effect + 1);
-            CatalogueCase { effect, id: "counted".into(), yields_to: &[], case }
+            CatalogueCase { effect, id: "counted".into(), case }
         };
         let cases: Vec<CatalogueCase> = counts.iter().enumerate().map(one).collect();
         let mut baseline =

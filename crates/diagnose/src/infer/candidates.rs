@@ -8,15 +8,7 @@ use std::borrow::Cow;
 pub(crate) struct Candidate<'a> {
     pub effect: usize,
     pub id: &'a str,
-    yields_to: &'static [&'static str],
     pub case: &'a Case,
-}
-
-impl Candidate<'_> {
-    /// Whether the effect of one of these comes before its own.
-    pub fn yields_to_any(&self, others: &[&Candidate<'_>]) -> bool {
-        others.iter().any(|other| self.yields_to.contains(&other.id))
-    }
 }
 
 /// A case with the number and identifier of its effect.
@@ -24,8 +16,6 @@ impl Candidate<'_> {
 pub(crate) struct CatalogueCase {
     pub effect: usize,
     pub id: Cow<'static, str>,
-    /// Identifiers of the effects that come before it.
-    pub yields_to: &'static [&'static str],
     pub case: Case,
 }
 
@@ -33,10 +23,10 @@ pub(crate) struct CatalogueCase {
 pub(crate) fn cases(effects: &[Box<dyn Effect>], survey: &Survey) -> Vec<CatalogueCase> {
     let mut all: Vec<CatalogueCase> = Vec::new();
     for (effect, own) in effects.iter().enumerate() {
-        let (id, yields_to) = (own.id(), own.info().yields_to);
+        let id = own.id();
         for mut case in own.cases(survey) {
             case.slot = Some(all.len());
-            all.push(CatalogueCase { effect, id: id.clone(), yields_to, case });
+            all.push(CatalogueCase { effect, id: id.clone(), case });
         }
     }
     all
@@ -44,15 +34,7 @@ pub(crate) fn cases(effects: &[Box<dyn Effect>], survey: &Survey) -> Vec<Catalog
 
 /// The cases as candidates.
 pub(crate) fn candidates(cases: &[CatalogueCase]) -> Vec<Candidate<'_>> {
-    cases
-        .iter()
-        .map(|CatalogueCase { effect, id, yields_to, case }| Candidate {
-            effect: *effect,
-            id,
-            yields_to,
-            case,
-        })
-        .collect()
+    cases.iter().map(|own| Candidate { effect: own.effect, id: &own.id, case: &own.case }).collect()
 }
 
 /// The chosen cases that take part in one fit, in their order.
@@ -144,7 +126,7 @@ mod tests {
         let [decays, arrivals] =
             [Observable::Decay, Observable::Arrivals].map(|part| cases_of(&candidates, &chosen, part).len());
         let both = candidates.iter().filter(|c| c.case.observable() == Observable::Channels).count();
-        let neither = candidates.iter().filter(|c| c.case.observable().is_by_itself()).count();
+        let neither = candidates.iter().filter(|c| c.case.observable() == Observable::PreArrival).count();
         assert!(both > 0 && decays + arrivals - both + neither == candidates.len());
     }
 }

@@ -18,8 +18,6 @@ use web_time::Instant;
 const UNNAMED_MARGIN_NATS: f64 = 5.0;
 /// A cause helps if it brings the error of decay curves at positions left out below this share of what it was.
 const MAX_RMSE_RATIO: f64 = 0.97;
-/// What all groups of positions but one must say for a cause of the early sound, in nats: odds of 20 to 1.
-const LEAST_WITHOUT_BEST_NATS: f64 = 3.0;
 /// What octaves above the Schroeder frequency must say for a cause, in nats.
 const LEAST_ABOVE_MODES_NATS: f64 = 1.0;
 /// Dispersion from which nothing is named: measured variance over that expected, causes and smooth discrepancy taken out.
@@ -247,13 +245,7 @@ fn least_confirmed(
         // Likelier bins under decays that lie farther off: the cause stands for something else.
         let farther = MAX_RMSE_RATIO * after > before;
         let gains = gain.low > 0.0 || predicted.gains_everywhere[place];
-        // What stands in the way of a few paths says nothing of most positions: their gains scatter as no interval expects. It may not rest
-        // on one group.
-        let by_itself = search.candidates[state.chosen[place]].case.observable() == Observable::EarlySound;
-        let rests_on_several =
-            by_itself && predicted.gains_without_best[place] > LEAST_WITHOUT_BEST_NATS && !farther;
         (gains && !farther)
-            || rests_on_several
             || (gain.nats_per_bin > 0.0 && nearer)
             || (rests_on_tables[place] && gain.high > 0.0 && !farther)
     };
@@ -310,7 +302,6 @@ mod tests {
             let predicted = Predicted {
                 gains: vec![gain.clone()],
                 gains_everywhere: vec![true],
-                gains_without_best: vec![1.0],
                 diffuse_rmse_db: vec![diffuse_rmse_db],
                 ..Predicted::default()
             };

@@ -84,8 +84,6 @@ pub(crate) struct Predicted {
     pub gains: Vec<HeldOutGain>,
     /// Whether every group of positions that was left out gains by each cause.
     pub gains_everywhere: Vec<bool>,
-    /// What all groups but the one that gains most gain by each cause, in nats.
-    pub gains_without_best: Vec<f64>,
     /// Error of decay curves at positions left out without and with each cause, in dB, in the octaves above the Schroeder frequency; in all
     /// where none lies above it.
     pub diffuse_rmse_db: Vec<[f64; 2]>,
@@ -268,16 +266,11 @@ fn summary(baseline: &Baseline, causes: usize, folds: &Folds, splits: &[SplitGai
             [before, after.collect()].map(|compared| Errors::of(&compared).db_rmse)
         })
         .collect();
-    let gain_without_best = |i: usize| {
-        let gains = || splits.iter().map(|s| s.each[i]);
-        gains().sum::<f64>() - gains().fold(0.0, f64::max)
-    };
     let curves = |s: &SplitGain| decay_curves(baseline, &s.predicted[0], &s.predicted[1], true);
     Predicted {
         held_out: Some(held_out),
         gains,
         diffuse_rmse_db,
-        gains_without_best: (0..causes).map(gain_without_best).collect(),
         gains_everywhere: (0..causes).map(|i| splits.iter().all(|s| s.each[i] > 0.0)).collect(),
         decays: splits.iter().flat_map(curves).collect(),
     }

@@ -5,7 +5,6 @@ use crate::effect::{AuxiliaryEvidence, Case, Observable, ReflectionEvidence};
 use crate::found_parameter::FoundParameter;
 use crate::infer::baseline::Baseline;
 use crate::infer::candidates::{Candidate, cases_of};
-use crate::infer::early_sound;
 use crate::likelihood::arrivals;
 use crate::likelihood::laplace::LaplaceFit;
 
@@ -18,7 +17,7 @@ pub(crate) struct Fitted<'a> {
 }
 
 /// What single reflections say for a case, where they weigh it.
-pub(crate) fn reflection_evidence(case: &Case) -> Option<&dyn ReflectionEvidence> {
+fn reflection_evidence(case: &Case) -> Option<&dyn ReflectionEvidence> {
     case.decay_term()?.reflection_evidence()
 }
 
@@ -29,7 +28,15 @@ fn gates(
     chosen: &[usize],
     fitted: Fitted<'_>,
 ) -> Vec<ReflectionGate> {
-    let (cases, values) = values_of(candidates, chosen, fitted);
+    let cases = cases_of(candidates, chosen, Observable::Decay);
+    let values: Vec<Vec<f64>> = cases
+        .iter()
+        .zip(fitted.energy_firsts)
+        .map(|(case, &first)| {
+            let count = case.parameters.len();
+            fitted.energy.values[first..first + count].to_vec()
+        })
+        .collect();
     // What is weighed by the gates themselves must not act on them beforehand.
     let (cases, values): (Vec<&Case>, Vec<Vec<f64>>) =
         cases.into_iter().zip(values).filter(|(case, _)| reflection_evidence(case).is_none()).unzip();
@@ -47,25 +54,7 @@ fn gates(
     )
 }
 
-/// The chosen cases that bear on decays, with their fitted values.
-pub(crate) fn values_of<'a>(
-    candidates: &[Candidate<'a>],
-    chosen: &[usize],
-    fitted: Fitted<'_>,
-) -> (Vec<&'a Case>, Vec<Vec<f64>>) {
-    let cases = cases_of(candidates, chosen, Observable::Decay);
-    let own = |(case, &first): (&&Case, &usize)| {
-        fitted.energy.values[first..first + case.parameters.len()].to_vec()
-    };
-    let values = cases.iter().zip(fitted.energy_firsts).map(own).collect();
-    (cases, values)
-}
-
-pub(crate) fn shifts(
-    baseline: &Baseline,
-    model: &arrivals::ArrivalModel<'_>,
-    values: &[f64],
-) -> Vec<Vec<f64>> {
+fn shifts(baseline: &Baseline, model: &arrivals::ArrivalModel<'_>, values: &[f64]) -> Vec<Vec<f64>> {
     baseline
         .simulation
         .isolated_reflections
@@ -89,13 +78,7 @@ pub(crate) fn own(
         let term = candidates[c].case.pre_arrival_term()?;
         Some((c, term.weigh(&baseline.observations.pre_arrival, used)?))
     };
-    let early_sound = |c: usize| {
-        let term = candidates[c].case.early_sound_term()?;
-        let read = || early_sound::read(baseline, (candidates, fit_used), chosen, fitted);
-        Some((c, term.weigh(baseline.early_sound.get_or_init(read).as_ref()?, used)?))
-    };
-    let alone = |c: usize| pre_arrival(c).or_else(|| early_sound(c));
-    let mut found: Vec<(usize, AuxiliaryEvidence)> = chosen.iter().copied().filter_map(alone).collect();
+    let mut found: Vec<(usize, AuxiliaryEvidence)> = chosen.iter().copied().filter_map(pre_arrival).collect();
     let weighing: Vec<usize> =
         chosen.iter().copied().filter(|&c| reflection_evidence(candidates[c].case).is_some()).collect();
     if weighing.is_empty() {

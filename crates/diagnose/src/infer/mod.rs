@@ -6,7 +6,6 @@ pub(crate) mod candidates;
 pub(crate) mod confirmation;
 pub(crate) mod cross_validation;
 pub(crate) mod direct_evidence;
-pub(crate) mod early_sound;
 pub(crate) mod isolability;
 pub(crate) mod lack_of_fit;
 pub(crate) mod prediction;

@@ -6,11 +6,11 @@ use crate::extend::extension::changes;
 use crate::extend::model_change::ModelChange;
 use crate::infer::arrival_fits::ArrivalFits;
 use crate::infer::baseline::{self, Baseline};
-use crate::infer::candidates::{Candidate, CatalogueCase, EffectScore};
+use crate::infer::candidates::{CatalogueCase, EffectScore};
 use crate::infer::ray_dependence::MoreWithHalf;
 use crate::infer::search::{Search, State};
 use sabine_acoustics::Observer;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 /// Expansions about the fit with one cause more, at most.
 const ROUNDS: usize = 4;
@@ -24,7 +24,7 @@ pub(crate) struct Selection {
     pub rivals: Vec<String>,
     /// All effects beside the baseline, and beside the causes that were given.
     pub first: Vec<EffectScore>,
-    /// Causes at the end of the search, and all other effects beside them, where none of these was to be named.
+    /// Causes at the end of the search, and all other effects beside them, where none of these was worth a name.
     pub last: Option<(Vec<usize>, Vec<EffectScore>)>,
     /// Effects of these candidates are named no more: they did not help at positions left out.
     pub without: Vec<usize>,
@@ -88,13 +88,9 @@ pub(crate) fn select(
     observer: &dyn Observer,
 ) -> Result<Selection, Error> {
     let most = named.chosen.len() + baseline.config.most_causes;
-    let stands = |&c: &usize| cases[c].case.early_sound_term().is_some();
     while named.chosen.len() < most {
-        if !named.chosen.iter().any(stands) {
-            baseline.early_sound = OnceLock::new();
-        }
         baseline.prepare_rest(cases)?;
-        let (ranked, yielding, rivals, interchangeable, threshold) = {
+        let (ranked, rivals, interchangeable, threshold) = {
             let search = Search::new(baseline, cases, effects, used.to_vec()).knowing(arrival_fits);
             let base = search.state(&[], None)?;
             let state = search.state(&named.chosen, Some(&base))?;
@@ -112,7 +108,6 @@ pub(crate) fn select(
                 })
                 .collect();
             let threshold = search.threshold();
-            let yielding = take_what_yields(&search.candidates, &named.chosen, threshold, &mut ranked);
             put_first_what_moves_paths(&search, &state, &mut ranked)?;
             let named_now = ranked.first().is_some_and(|best| best.nats >= threshold);
             let (mut rivals, mut interchangeable) = (Vec::new(), Vec::new());
@@ -120,14 +115,14 @@ pub(crate) fn select(
                 (ranked[0], interchangeable) = search.best_case(&state, &scores, &ranked[0])?;
                 rivals = search.rivals(&state, &ranked)?;
             }
-            (ranked, yielding, rivals, interchangeable, threshold)
+            (ranked, rivals, interchangeable, threshold)
         };
         if named.first.is_empty() {
-            named.first = [&ranked[..], &yielding].concat();
+            named.first.clone_from(&ranked);
             named.first.sort_by(|a, b| b.nats.total_cmp(&a.nats));
         }
         let Some(best) = ranked.first().filter(|b| b.nats >= threshold) else {
-            named.last = Some((named.chosen.clone(), [ranked, yielding].concat()));
+            named.last = Some((named.chosen.clone(), ranked));
             break;
         };
         let strongest = best.nats.max(0.0);
@@ -156,19 +151,6 @@ pub(crate) fn select(
     Ok(named)
 }
 
-/// Takes out the effects that yield to one that is named, or that is worth a name itself: what speaks for them is not weighed for it.
-fn take_what_yields(
-    candidates: &[Candidate<'_>],
-    chosen: &[usize],
-    threshold: f64,
-    ranked: &mut Vec<EffectScore>,
-) -> Vec<EffectScore> {
-    let worth_a_name = ranked.iter().filter(|r| r.nats >= threshold).map(|r| r.best);
-    let others: Vec<&Candidate<'_>> =
-        chosen.iter().copied().chain(worth_a_name).map(|c| &candidates[c]).collect();
-    ranked.extract_if(.., |r| candidates[r.best].yields_to_any(&others)).collect()
-}
-
 /// Takes the cause named last into paths, expansion and scatter.
 fn put_to_work(
     baseline: &mut Baseline,
@@ -179,9 +161,6 @@ fn put_to_work(
 ) -> Result<(), Error> {
     for change in &expand_about_fit(baseline, cases, effects, chosen, fits)? {
         baseline.retrace(change, cases, chosen)?;
-        if matches!(change, ModelChange::Object(_)) {
-            fits.1.forget();
-        }
     }
     let of_decays: Vec<&Case> = chosen
         .iter()
@@ -262,10 +241,10 @@ fn put_first_what_moves_paths(
 mod tests {
     use super::*;
     use crate::config::DiagnoseConfig;
-    use crate::effect::{Effect, Nuisance};
+    use crate::effect::Effect;
     use crate::effects::{PositionError, SurfaceAbsorption, TimeZeroOffset};
     use crate::hand_made::Tables;
-    use crate::infer::candidates::{candidates, cases};
+    use crate::infer::candidates::cases;
     use sabine_scene::{Levels, TimeZero};
 
     #[test]
@@ -281,34 +260,6 @@ mod tests {
         let mut without_first = all();
         without_first.drop(4);
         assert!(without_first.chosen == [7] && without_first.rivals == ["a", "b"]);
-    }
-
-    #[test]
-    fn what_yields_is_passed_over_beside_a_name_and_beside_what_is_worth_one_and_nowhere_else() {
-        let case = |(effect, id, yields_to): (usize, &'static str, &'static [&'static str])| CatalogueCase {
-            effect,
-            id: id.into(),
-            yields_to,
-            case: Case::prior(Nuisance::ResponseGain(0), 1.0),
-        };
-        let cases: Vec<CatalogueCase> =
-            [(0, "box", &["hole"][..]), (1, "hole", &[]), (2, "wall", &[])].into_iter().map(case).collect();
-        let left = |chosen: &[usize], nats: &[(usize, f64)]| {
-            let score = |&(best, nats): &(usize, f64)| {
-                let id = cases[best].id.to_string();
-                EffectScore { effect: best, id, best, nats, d_prime: 1.0 }
-            };
-            let mut ranked: Vec<EffectScore> = nats.iter().map(score).collect();
-            let yielding = take_what_yields(&candidates(&cases), chosen, 6.0, &mut ranked);
-            assert_eq!(ranked.len() + yielding.len(), nats.len());
-            ranked.iter().map(|r| r.best).collect::<Vec<_>>()
-        };
-        // By its own evidence, however far it lies behind.
-        assert_eq!(left(&[], &[(0, 40.0), (2, 8.0), (1, 6.5)]), [2, 1]);
-        assert_eq!(left(&[], &[(0, 40.0), (2, 8.0), (1, 5.5)]), [0, 2, 1]);
-        // What is named is among the candidates no more.
-        assert_eq!(left(&[1], &[(0, 40.0), (2, 8.0)]), [2]);
-        assert_eq!(left(&[2], &[(0, 40.0)]), [0]);
     }
 
     /// Names among few effects in rooms made by hand.

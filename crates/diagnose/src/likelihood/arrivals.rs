@@ -4,7 +4,6 @@
 //! (a mixture of normal distributions about the predicted times and an even background).
 
 pub(crate) mod expansion;
-pub(crate) mod peak_partners;
 mod unassigned_peaks;
 
 use crate::effect::Case;
@@ -21,15 +20,15 @@ use sabine_scene::TimeZero;
 /// How well the time of a direct sound can be read at [`READ_HZ`]: a third of a sample. Slower recordings are read worse.
 const DIRECT_SD_S: f64 = 2.5e-5;
 /// The same of a reflection, whose neighbours pull at its peak.
-pub(crate) const REFLECTION_SD_S: f64 = 5e-5;
+const REFLECTION_SD_S: f64 = 5e-5;
 /// Sample rate from which times are read as well as that.
 const READ_HZ: f64 = 16e3;
 /// Share of peaks that belong to no predicted reflection.
 const STRAY_SHARE: f64 = 0.4;
 /// Share of all peaks' worth that one peak has in which a surface that the mesh lacks is seen: two of three responses show it.
-pub(crate) const SEEN_SHARE: f64 = 0.65;
+const SEEN_SHARE: f64 = 0.65;
 /// Height of such a peak about what reflectance and distance give: its neighbours, and colour, in dB.
-pub(crate) const HEIGHT_SD_DB: f64 = 2.5;
+const HEIGHT_SD_DB: f64 = 2.5;
 /// Share of direct sounds whose time was misread.
 const MISREAD_SHARE: f64 = 0.02;
 /// Times at which the fit starts to look for partners of a peak, and how it narrows.
@@ -83,7 +82,7 @@ struct Moved {
     steps: Vec<[Vec<Mirror>; 2]>,
 }
 
-pub(crate) fn normal(residual: f64, sd: f64) -> f64 {
+fn normal(residual: f64, sd: f64) -> f64 {
     let z = residual / sd;
     // Most peaks are far from most reflections; beside the even background their density is less than the last bit.
     if z.abs() > FAR_SD { 0.0 } else { (-0.5 * z * z).exp() / (sd * std::f64::consts::TAU.sqrt()) }
@@ -279,7 +278,14 @@ impl<'a> ArrivalModel<'a> {
                 (i, rest * (1.0 - STRAY_SHARE) * amplitudes[i] / amplitude * density)
             }));
             // Heights of other peaks say nothing: anything down to the floor is as probable.
-            let added: Vec<f64> = more.iter().map(|m| each * m.density(*peak, *height_db, sd)).collect();
+            let added: Vec<f64> = more
+                .iter()
+                .map(|m| {
+                    each * normal(peak - m.time_s, sd)
+                        * normal(height_db - m.level_db, HEIGHT_SD_DB)
+                        * PEAK_FLOOR_DB
+                })
+                .collect();
             let stray = rest * STRAY_SHARE / PEAKS_S;
             let total =
                 partners.iter().map(|(_, density)| density).sum::<f64>() + added.iter().sum::<f64>() + stray;

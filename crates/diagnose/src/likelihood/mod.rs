@@ -9,4 +9,3 @@ pub(crate) mod multilateration;
 pub(crate) mod parameters;
 pub(crate) mod polarity;
 pub(crate) mod reflection_gates;
-pub(crate) mod standing_boxes;

@@ -13,9 +13,6 @@ use sabine_scene::{MeasuredRoom, Receiver, Source, TimeZero};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
-/// First sounds that come so much earlier or later than others come straight, in seconds.
-const ODD_S: f64 = 3e-4;
-
 /// The measured responses of a room, and what the room file says of them.
 pub(crate) struct Observations {
     pub survey: Survey,
@@ -27,9 +24,8 @@ pub(crate) struct Observations {
     pub pulses: Vec<BandPulse>,
     /// What was noticed while reading.
     pub notes: Vec<String>,
-    /// Samples, until the time axes of shadowed responses are set; then those of responses in sight whose first sound comes when no direct
-    /// sound would.
-    samples: Vec<Option<ImpulseResponse>>,
+    /// Samples, until the time axes of shadowed responses are set.
+    samples: Vec<ImpulseResponse>,
     pulses_by_rate: BTreeMap<u32, Vec<BandPulse>>,
 }
 
@@ -94,7 +90,7 @@ impl Observations {
         }
         let (source, receiver) = (&room.sources()[entry.source], &room.receivers()[entry.receiver]);
         let name = format!("{}-{}", source.id, receiver.id);
-        if let Some(twin) = self.samples.iter().position(|other| other.as_ref() == Some(&response)) {
+        if let Some(twin) = self.samples.iter().position(|other| *other == response) {
             self.notes.push(format!(
                 "The response {name} is a copy of {}: they count as two measurements, but are one.",
                 self.survey.responses[twin].name
@@ -113,7 +109,7 @@ impl Observations {
                     recorded_at: entry.recorded_at,
                 });
                 self.measured.push(found);
-                self.samples.push(Some(response));
+                self.samples.push(response);
             }
             Err(reason) => self.notes.push(format!("The response {name} is left out: {reason}.")),
         }
@@ -124,52 +120,32 @@ impl Observations {
     /// whether that is the direct sound). Their first sound is weak and easily missed: their axis begins when the first path should come,
     /// by the times of the direct sounds of others.
     pub fn align(&mut self, in_sight: &[bool], direct_s: &[f64]) {
-        let late_s = self.align_shadowed(in_sight, direct_s);
-        self.forget_samples(in_sight, direct_s, late_s);
+        self.align_shadowed(in_sight, direct_s);
+        self.samples.clear();
         let lead_ins = self.measured.iter_mut().map(|m| std::mem::take(&mut m.lead_in));
         self.pre_arrival = PreArrival { responses: lead_ins.collect() };
     }
 
-    /// The same again, once something was found that blocks direct lines.
-    pub fn align_again(&mut self, in_sight: &[bool], direct_s: &[f64]) {
-        if self.samples.iter().any(Option::is_some) {
-            self.align_shadowed(in_sight, direct_s);
-        }
-    }
-
-    /// Keeps the samples of those responses alone that might have to be read again: their first sound is none that comes straight.
-    fn forget_samples(&mut self, in_sight: &[bool], direct_s: &[f64], late_s: Option<f64>) {
-        for (i, samples) in self.samples.iter_mut().enumerate() {
-            let off = |late_s: f64| (self.measured[i].direct_s - direct_s[i] - late_s).abs() > ODD_S;
-            if !in_sight[i] || !late_s.is_some_and(off) {
-                *samples = None;
-            }
-        }
-    }
-
-    /// Gives how much later than by their ways the direct sounds come, where that is known.
-    fn align_shadowed(&mut self, in_sight: &[bool], direct_s: &[f64]) -> Option<f64> {
+    fn align_shadowed(&mut self, in_sight: &[bool], direct_s: &[f64]) {
         let time_zero = self.survey.measurement.time_zero;
         if time_zero == TimeZero::PerResponse {
-            return None;
+            return;
         }
         let seen = (0..in_sight.len()).filter(|&p| in_sight[p]);
         let late_s: Vec<f64> = seen.map(|p| self.measured[p].direct_s - direct_s[p]).collect();
         if late_s.is_empty() && time_zero != TimeZero::Emission {
-            return None;
+            return;
         }
         let late_s = median(late_s);
         for i in (0..in_sight.len()).filter(|&p| !in_sight[p]) {
             let begin_s = direct_s[i] + late_s;
-            let Some(samples) = self.samples.get(i).and_then(Option::as_ref) else { continue };
-            let pulses = &self.pulses_by_rate[&samples.sample_rate_hz()];
-            if let Ok(found) = Measured::read(samples, self.survey.bands, pulses, begin_s) {
+            let pulses = &self.pulses_by_rate[&self.samples[i].sample_rate_hz()];
+            if let Ok(found) = Measured::read(&self.samples[i], self.survey.bands, pulses, begin_s) {
                 self.survey.responses[i].direct_s = begin_s;
                 // What comes first has another shape than a direct sound: its sign says nothing.
                 self.measured[i] = Measured { pulse: Vec::new(), ..found };
             }
         }
-        Some(late_s)
     }
 }
 

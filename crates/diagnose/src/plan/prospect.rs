@@ -16,7 +16,7 @@ use crate::simulate::simulation::Simulation;
 use crate::survey::SurveyedResponse;
 use sabine_scene::{DiffuseRoom, MeasuredRoom};
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 /// Decays are followed for so much longer than a diffuse field would take: few rooms are diffuse.
 const LONGER: f64 = 1.6;
@@ -149,7 +149,6 @@ impl<'a> Setting<'a> {
             observations,
             simulation,
             seconds: BTreeMap::new(),
-            early_sound: OnceLock::new(),
             stale: BTreeSet::new(),
         };
         baseline.prepare(cases)?;

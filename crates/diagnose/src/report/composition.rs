@@ -4,9 +4,8 @@ use crate::effect::info::discriminating_measurement;
 use crate::effect::{Effect, Observable};
 use crate::error::Error;
 use crate::extend::extension;
-use crate::extend::model_change::ModelChange;
 use crate::infer::baseline::Baseline;
-use crate::infer::candidates::{Candidate, EffectScore};
+use crate::infer::candidates::EffectScore;
 use crate::infer::confirmation::{Confirmation, Doubt};
 use crate::infer::cross_validation::decay_curves;
 use crate::infer::isolability::isolability;
@@ -120,7 +119,7 @@ fn causes(
                 .iter()
                 .filter_map(|&other| search.candidates[other].case.subject.clone())
                 .collect(),
-            explanation: explanation(&*effects[own.effect], &extension::changes(search, state, candidate)),
+            explanation: effects[own.effect].info().explanation.into_owned(),
             probability: found.probability(candidate),
             nats: without(search, state, candidate)?,
             more_nats_with_half_the_rays: found
@@ -134,15 +133,6 @@ fn causes(
         })
     };
     state.chosen.iter().enumerate().map(one).collect()
-}
-
-/// What is the matter, and what a person who goes and looks will find where.
-fn explanation(effect: &dyn Effect, changes: &[ModelChange]) -> String {
-    let objects = changes.iter().filter_map(|change| match change {
-        ModelChange::Object(object) => Some(object.to_string()),
-        _ => None,
-    });
-    std::iter::once(effect.info().explanation.into_owned()).chain(objects).collect::<Vec<_>>().join(" ")
 }
 
 fn is_slight(gain: &HeldOutGain) -> bool {
@@ -192,10 +182,8 @@ fn beyond_limit<'c>(search: &Search<'_>, state: &State, candidates: &'c [Candida
     if state.chosen.len() < search.baseline.config.most_causes {
         return Vec::new();
     }
-    let chosen: Vec<&Candidate<'_>> = state.chosen.iter().map(|&c| &search.candidates[c]).collect();
-    let yields = |id: &str| search.candidates.iter().any(|c| c.id == id && c.yields_to_any(&chosen));
     let worth = |c: &&CandidateScore| c.nats_beside_causes.is_some_and(|nats| nats >= search.threshold());
-    candidates.iter().filter(worth).filter(|c| !yields(&c.effect)).map(|c| c.effect.as_str()).collect()
+    candidates.iter().filter(worth).map(|c| c.effect.as_str()).collect()
 }
 
 /// How far single responses drift at most, in dB, and in which octave.

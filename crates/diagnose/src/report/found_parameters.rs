@@ -19,7 +19,7 @@ pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -
         found.push(FoundParameter { name, value, low, high, unit: unit.to_owned() });
     };
     let own = state.own.iter().find(|(c, _)| *c == candidate);
-    if case.observable().is_by_itself() {
+    if case.observable() == Observable::PreArrival {
         return own.map(|(_, own)| own.parameters.clone()).unwrap_or_default();
     }
     let (maximum, first) = place_of(search, state, candidate);
@@ -59,7 +59,7 @@ pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -
 /// Fitted parameters of a chosen candidate that stand at the end of their range though the data speak of them, each with its value.
 pub(crate) fn at_bounds(search: &Search<'_>, state: &State, candidate: usize) -> Vec<String> {
     let case = search.candidates[candidate].case;
-    if case.observable().is_by_itself() {
+    if case.observable() == Observable::PreArrival {
         return Vec::new();
     }
     let (maximum, first) = place_of(search, state, candidate);

@@ -7,7 +7,6 @@ use crate::error::Error;
 use crate::extend::applied_changes::Dimensions;
 use crate::extend::displaced_surface::DisplacedSurface;
 use crate::extend::moved_mesh::find_ranges;
-use crate::extend::standing_box::StandingBox;
 use crate::observe::observations::Observations;
 use crate::observe::observed_response::PEAKS_S;
 use crate::simulate::band_state::BandState;
@@ -71,8 +70,6 @@ pub(crate) struct Simulation {
     dimensions: Option<Dimensions>,
     /// Surfaces that were found to stand elsewhere, by their number.
     pub displaced: Vec<(usize, DisplacedSurface)>,
-    /// Boxes that were found to stand in the room.
-    objects: Vec<StandingBox>,
     /// The surfaces of the mesh as stated.
     surfaces: Arc<Surfaces>,
     /// Which of them the paths meet in the mesh as it is traced.
@@ -131,7 +128,6 @@ impl Simulation {
             resized: None,
             dimensions: None,
             displaced: Vec::new(),
-            objects: Vec::new(),
             tracer: Arc::clone(tracer),
             prepared,
             edges,
@@ -268,7 +264,6 @@ impl Simulation {
             resized: None,
             dimensions: None,
             displaced: Vec::new(),
-            objects: Vec::new(),
             edges: None,
             sources: survey.sources.iter().map(source).collect::<Result<_, _>>()?,
             receivers: survey.receivers.iter().map(receiver).collect::<Result<_, _>>()?,

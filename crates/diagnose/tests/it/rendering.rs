@@ -97,56 +97,6 @@ fn a_sheet_reflects_where_its_image_says() {
     assert_eq!((found(&room), found(&stated)), (1, 0));
 }
 
-/// A box between talker and microphone, by its file: they see each other no more; what is wrong with it is told by field.
-#[test]
-fn an_object_stands_in_the_way_and_comes_out_of_its_file() {
-    let stated = fixture();
-    let [talker, microphone] = [stated.sources()[0].position_m, stated.receivers()[0].position_m];
-    let middle: [f64; 2] = std::array::from_fn(|k| 0.5 * (talker[k] + microphone[k]));
-    let object = |height: f64, yaw: f64, absorption: f64| {
-        format!(
-            "object = {{ base_m = [{:?}, {:?}, 0.0], sides_m = [0.4, 0.4, {height:?}], yaw_deg = {yaw:?}, absorption = {absorption:?} }}",
-            middle[0], middle[1]
-        )
-    };
-    let text = object(2.0, 30.0, 0.2);
-    let room = extended(&text).measured_room(&stated).unwrap();
-    assert_eq!(room.scene().triangles().len(), stated.scene().triangles().len() + 12);
-    let tracer =
-        PathTracer::new(TracerConfig { rays: 500, duration_s: 0.1, ..TracerConfig::default() }).unwrap();
-    let sees = |room: &MeasuredRoom| {
-        let (source, receiver) = (&room.sources()[0], &room.receivers()[0]);
-        let paths = tracer.trace(room.scene(), source, receiver, &room.air(), &()).unwrap();
-        (0..paths.len()).any(|i| paths.is_direct(i))
-    };
-    assert!(sees(&stated) && !sees(&room));
-    let (_folder, path) = in_file(&text);
-    let model = ExtendedModel::read(&path).unwrap();
-    model.write(&path).unwrap();
-    assert_eq!(ExtendedModel::read(&path).unwrap(), model);
-    for (text, field) in [
-        (object(25.0, 0.0, 0.2), "object.sides_m"),
-        (object(-1.0, 0.0, 0.2), "object.sides_m"),
-        (object(1.0, 720.0, 0.2), "object.yaw_deg"),
-        (object(1.0, 0.0, 1.2), "object.absorption"),
-        (object(f64::NAN, 0.0, 0.2).replace("NaN", "nan"), "object.sides_m"),
-        (text.replace("base_m = [", "base_m = [1e9, "), "base_m"),
-    ] {
-        let (_folder, path) = in_file(&text);
-        let error = ExtendedModel::read(&path).unwrap_err().to_string();
-        assert!(error.contains(field) && error.contains("extended_model.toml"), "{error}");
-    }
-    // On the talker's place.
-    let on_talker = text.replacen(
-        &format!("{:?}, {:?}", middle[0], middle[1]),
-        &format!("{:?}, {:?}", talker[0], talker[1]),
-        1,
-    );
-    let (_folder, path) = in_file(&on_talker);
-    let error = ExtendedModel::read(path).unwrap().room(&stated).unwrap_err().to_string();
-    assert!(error.contains("object.base_m") && error.contains("talker"), "{error}");
-}
-
 #[test]
 fn a_model_that_changes_nothing_changes_nothing() {
     let (_, response) = room_of_fixture();

@@ -135,8 +135,6 @@ struct Truth {
     /// Receiver or material that is not as stated.
     subject: Option<String>,
     wall: Option<MovedWall>,
-    /// Lowest and highest corner of the object that the mesh lacks.
-    object: Option<[Vec3; 2]>,
 }
 
 /// A wall that stands elsewhere.
@@ -234,11 +232,6 @@ impl PolyhedralRoom {
     /// The wall that stands elsewhere.
     pub fn moved_wall(&self) -> Option<MovedWall> {
         self.truth.wall
-    }
-
-    /// Lowest and highest corner, in metres, of the object that the mesh lacks; its sides are along the axes.
-    pub fn object(&self) -> Option<[[f64; 3]; 2]> {
-        self.truth.object
     }
 
     /// True absorption by octave of each material of [`PolyhedralRoom::scene`].

@@ -64,8 +64,7 @@ impl Planted {
     /// The effect that a diagnosis is to name, where its catalogue has one.
     pub fn effect(self) -> Option<&'static str> {
         match self {
-            Self::Nothing => None,
-            Self::Object => Some("missing_object"),
+            Self::Nothing | Self::Object => None,
             Self::Position => Some("position_error"),
             Self::Surface => Some("surface_absorption"),
             Self::Temperature => Some("sound_speed"),

@@ -103,11 +103,6 @@ impl Shape {
         self.obstacles.push([[x, y, FEET_M], [x + sides[0], y + sides[1], FEET_M + sides[2]]]);
     }
 
-    /// Lowest and highest corner of what was put into it last.
-    pub fn last_obstacle(&self) -> Option<[Vec3; 2]> {
-        self.obstacles.last().copied()
-    }
-
     /// The number of walls.
     pub fn walls(&self) -> usize {
         self.plan.len()

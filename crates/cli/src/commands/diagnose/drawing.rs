@@ -31,9 +31,8 @@ const ADDED: &str = "fill=\"#d55e00\" fill-opacity=\"0.3\"";
 pub fn has_a_place(model: &ExtendedModel) -> bool {
     let model = model.applied();
     let axes = model.axis.is_empty() && model.receiver_axis.is_empty();
-    let added = model.sheets.is_empty() && model.objects.is_empty();
-    let places = model.position_m.is_empty() && model.surfaces.is_empty();
-    !(axes && places && added && model.dimensions.is_none())
+    let places = model.position_m.is_empty() && model.surfaces.is_empty() && model.sheets.is_empty();
+    !(axes && places && model.dimensions.is_none())
 }
 
 /// One view: the axes of the room that go to the right and up, and where it lies in the drawing.
@@ -139,7 +138,7 @@ struct Lines {
     kept: Vec<[Point; 2]>,
     gone: Vec<[Point; 2]>,
     found: Vec<[Point; 2]>,
-    /// Triangles of materials that the mesh as stated does not have: panels, holes and objects.
+    /// Triangles of materials that the mesh as stated does not have: panels and holes.
     added: Vec<[Point; 3]>,
 }
 
@@ -258,7 +257,7 @@ fn keys(lines: &Lines, placed: &[Placed<'_>]) -> Vec<(String, &'static str)> {
         (true, marks, "source, microphone"),
         (moves, line(GONE), "the mesh as stated, where it stands elsewhere"),
         (!lines.found.is_empty() && moves, line(FOUND), "the mesh as found"),
-        (!lines.added.is_empty(), sheet, "a surface or an object that the mesh lacks, or a hole"),
+        (!lines.added.is_empty(), sheet, "a surface that the mesh lacks, or a hole"),
         (placed.iter().any(Placed::is_moved), line(FOUND), "from where it is stated to where it was found"),
         (placed.iter().any(|p| p.axis.is_some()), line(FOUND), "axis of a directional source or microphone"),
     ]
@@ -308,12 +307,7 @@ mod tests {
         assert!(is_along([[0.0; 3], [1.0, 0.0, 0.0]], [[1.5, 0.0, 0.0], [0.2, 0.0, 0.0]]));
         assert!(!is_along([[0.0; 3], [1.0, 0.0, 0.0]], [[1.5, 0.0, 0.0], [1.2, 0.0, 0.0]]));
         assert!(!is_along([[0.0; 3], [1.0, 0.0, 0.0]], [[0.0; 3], [1.0, 0.01, 0.0]]));
-        for part in [
-            "the mesh as stated",
-            "the mesh as found",
-            "a surface or an object that the mesh lacks",
-            &source.id,
-        ] {
+        for part in ["the mesh as stated", "the mesh as found", "a surface that the mesh lacks", &source.id] {
             assert!(drawn.contains(part), "{part}");
         }
         assert!(!drawn.contains("NaN") && !drawn.contains("inf"));

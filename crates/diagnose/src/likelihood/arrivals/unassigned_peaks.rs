@@ -1,9 +1,6 @@
 //! Reflections that the mesh does not have: what effects add, where peaks point, and the fit from there.
 
-use super::{
-    ArrivalData, ArrivalModel, At, HEIGHT_SD_DB, PEAK_FLOOR_DB, PEAKS_S, REFLECTION_SD_S, STRAY_SHARE,
-    WIDTHS_S, at_fit, normal,
-};
+use super::{ArrivalData, ArrivalModel, At, PEAKS_S, REFLECTION_SD_S, STRAY_SHARE, WIDTHS_S, at_fit, normal};
 use crate::effect::{Case, FittedCase, Nuisance};
 use crate::error::Error;
 use crate::extend::model_change::ModelChange;
@@ -27,13 +24,6 @@ pub(super) struct AddedArrival {
     pub slopes: Vec<(usize, f64)>,
     pub level_db: f64,
     pub level_slopes: Vec<(usize, f64)>,
-}
-
-impl AddedArrival {
-    /// Density of a peak that is its own over that of a stray's height.
-    pub fn density(&self, time_s: f64, height_db: f64, sd_s: f64) -> f64 {
-        normal(time_s - self.time_s, sd_s) * normal(height_db - self.level_db, HEIGHT_SD_DB) * PEAK_FLOOR_DB
-    }
 }
 
 impl<'a> ArrivalModel<'a> {

@@ -1,4 +1,4 @@
-//! Re-tracing after a position, the air, the dimensions or a surface change, or an object joins, and with other rays.
+//! Re-tracing after a position, the air, the dimensions or a surface change, and with other rays.
 
 use super::Simulation;
 use crate::effect::Nuisance;
@@ -7,7 +7,6 @@ use crate::extend::applied_changes::Dimensions;
 use crate::extend::displaced_surface::DisplacedSurface;
 use crate::extend::model_change::ModelChange;
 use crate::extend::moved_mesh::{DisplacementError, check_places, displaced_among};
-use crate::extend::standing_box::StandingBox;
 use crate::simulate::edges::Edges;
 use crate::simulate::met_surfaces::MetSurfaces;
 use crate::simulate::scene_tracer::SceneTracer;
@@ -50,14 +49,6 @@ impl Simulation {
                 displaced.push((number.ok_or_else(unknown)?, surface.clone()));
                 self.reshape(self.dimensions.clone(), displaced, survey)?;
             }
-            ModelChange::Object(object) => {
-                self.objects.push(object.clone());
-                let made = self.reshape(self.dimensions.clone(), self.displaced.clone(), survey);
-                if made.is_err() {
-                    self.objects.pop();
-                }
-                made?;
-            }
             _ => return Ok(false),
         }
         Ok(true)
@@ -75,13 +66,9 @@ impl Simulation {
         if !all.is_empty() {
             check_places(&self.scene, &moved, &self.sources, &self.receivers)?;
         }
-        let with = self
-            .objects
-            .iter()
-            .try_fold(moved, |scene, object| object.added_to(&scene, self.most_like(object)))?;
         let resized = match &dimensions {
-            Some(dimensions) => dimensions.applied(&self.scene, &with)?,
-            None => with,
+            Some(dimensions) => dimensions.applied(&self.scene, &moved)?,
+            None => moved,
         };
         self.met = Arc::new(MetSurfaces::new(&resized, &self.surfaces)?);
         self.prepared = self.tracer.prepare(&resized, self.traced_until_s)?;
@@ -89,28 +76,6 @@ impl Simulation {
         self.resized = Some(resized);
         (self.dimensions, self.displaced) = (dimensions, numbered);
         (0..self.sources.len()).try_for_each(|source| self.retrace(Nuisance::SourcePosition(source), survey))
-    }
-
-    /// The material of the room that absorbs most nearly as an object does: what is fitted are the materials of the room.
-    fn most_like(&self, object: &StandingBox) -> u32 {
-        let off = |absorption: &Vec<f64>| {
-            (absorption.iter().sum::<f64>() / absorption.len() as f64 - object.absorption).abs()
-        };
-        let nearest = (0..self.absorption.len())
-            .min_by(|&a, &b| off(&self.absorption[a]).total_cmp(&off(&self.absorption[b])));
-        nearest.unwrap_or(0) as u32
-    }
-
-    /// Whether all paths are those of the room as stated, but for objects in it.
-    pub fn is_as_stated(&self, survey: &Survey) -> bool {
-        let stands = |own: [f64; 3], stated: [f64; 3]| own == stated;
-        let sources = self.sources.iter().zip(&survey.sources);
-        let receivers = self.receivers.iter().zip(&survey.receivers);
-        self.dimensions.is_none()
-            && self.displaced.is_empty()
-            && self.warmer_k == 0.0
-            && sources.into_iter().all(|(own, stated)| stands(own.position_m, stated.position_m))
-            && receivers.into_iter().all(|(own, stated)| stands(own.position_m, stated.position_m))
     }
 
     /// The same room as it stands, traced by another tracer; nothing is expanded yet.
@@ -141,7 +106,6 @@ impl Simulation {
             resized: self.resized.clone(),
             dimensions: self.dimensions.clone(),
             displaced: self.displaced.clone(),
-            objects: self.objects.clone(),
             surfaces: Arc::clone(&self.surfaces),
             met: Arc::clone(&self.met),
             tracer: Arc::clone(tracer),

@@ -1,7 +1,7 @@
 //! One room of the second laboratory, diagnosed blind.
 
 use crate::AnyError;
-use sabine::diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, StandingBox, Verdict};
+use sabine::diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, Verdict};
 use sabine_testkit::{Planted, PolyhedralConfig, PolyhedralRoom, Polyhedron};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -10,15 +10,6 @@ use std::time::Instant;
 
 /// A wall is found where it is this near to the truth, in metres.
 const WALL_M: f64 = 0.03;
-
-/// An object is found where its middle is this near to the truth in plan, in metres.
-const OBJECT_M: f64 = 0.5;
-
-/// How far the middle of an object is from that of the box between two corners, in plan, in metres.
-fn off_m(object: &StandingBox, [low, high]: [[f64; 3]; 2]) -> f64 {
-    let off = [0, 1].map(|k| object.base_m[k] - 0.5 * (low[k] + high[k]));
-    off[0].hypot(off[1])
-}
 
 /// What is to be diagnosed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -176,14 +167,6 @@ impl Task {
         let found = Diagnoser::new(config)?.diagnose(&room, &[], &())?;
         let seconds = started.elapsed().as_secs_f64();
         let (outcome, false_names) = self.outcome(&found, &laboratory);
-        if let Some([low, high]) = laboratory.object() {
-            let middle = [0, 1].map(|k| 0.5 * (low[k] + high[k]));
-            let sides: [f64; 3] = std::array::from_fn(|k| high[k] - low[k]);
-            eprintln!("  an object of {sides:.2?} m at {middle:.2?} m");
-            for object in &found.model.applied().objects {
-                eprintln!("  found {:.2} m off: {object}", off_m(object, [low, high]));
-            }
-        }
         if outcome != Outcome::Right {
             eprintln!("  hidden: {planted} {}", laboratory.subject().unwrap_or_default());
             found.notes.iter().for_each(|note| eprintln!("  {note}"));
@@ -219,15 +202,12 @@ impl Task {
                     cause.subject.iter().chain(&cause.other_subjects).any(|s| s.contains(wanted))
                 })
         };
-        let found_it = match (laboratory.moved_wall(), laboratory.object()) {
-            (Some(wall), _) => found.model.applied().surfaces.iter().any(|s| {
+        let found_it = match laboratory.moved_wall() {
+            Some(wall) => found.model.applied().surfaces.iter().any(|s| {
                 let along = |p: [f64; 3]| (0..3).map(|k| wall.normal[k] * p[k]).sum::<f64>();
                 along(s.normal).abs() > 0.999 && (along(s.point_m) - along(wall.point_m)).abs() < WALL_M
             }),
-            (None, Some(object)) => {
-                found.model.applied().objects.iter().any(|one| off_m(one, object) < OBJECT_M)
-            }
-            (None, None) => found.causes.iter().any(rightly),
+            None => found.causes.iter().any(rightly),
         };
         let mut false_names: Vec<String> = found
             .causes
@@ -245,8 +225,12 @@ impl Task {
             _ if in_set => Outcome::Set,
             _ if found_it => Outcome::Extra,
             _ if !false_names.is_empty() => Outcome::Wrong,
+            Verdict::Unexplained if self.planted == Planted::Object => Outcome::Right,
+            _ if self.planted == Planted::Object && found.causes.iter().any(|c| c.effect == "scattering") => {
+                Outcome::Right
+            }
             Verdict::Unexplained => Outcome::Unexplained,
-            _ if due => Outcome::Missed,
+            _ if due || self.planted == Planted::Object => Outcome::Missed,
             _ => Outcome::Right,
         };
         (outcome, false_names)
