@@ -28,29 +28,6 @@ pub(crate) fn deviations(batches: &[f64], energy: f64) -> impl Iterator<Item = f
     batches.iter().map(move |b| (b - mean) * unbiased / energy)
 }
 
-/// Gives the tracer's chance in each bin of a response at least the mean over all responses. What rays scatter is known from what they found: a
-/// response that missed the few that carry much finds too little energy, and too little scatter with it, and most responses miss them.
-pub(crate) fn pool(responses: &mut [Vec<BandState>]) {
-    let batches = usize::from(PathSet::BATCHES);
-    for band in 0..responses.first().map_or(0, Vec::len) {
-        let bins = responses.iter().map(|r| r[band].monte_carlo.len()).min().unwrap_or(0);
-        for bin in 0..bins {
-            let mean =
-                responses.iter().map(|r| r[band].monte_carlo[bin]).sum::<f64>() / responses.len() as f64;
-            for response in responses.iter_mut() {
-                let state = &mut response[band];
-                let own = state.monte_carlo[bin];
-                if own > 0.0 && own < mean {
-                    let factor = (mean / own).sqrt() as f32;
-                    let deviations = &mut state.batch_deviations[bin * batches..(bin + 1) * batches];
-                    deviations.iter_mut().for_each(|d| *d *= factor);
-                    state.monte_carlo[bin] = mean;
-                }
-            }
-        }
-    }
-}
-
 /// Energies that rays find are right on average, their logarithms are not: by half their relative variance they lie below, and where
 /// the bin's own scatter counts as the measurement's, whose mean is that of energies, by half of it once more. Rays that come to the
 /// same late bins by rare ways would make a second decay of it.
@@ -131,32 +108,5 @@ mod tests {
         }
         // The same ray is behind both bands.
         assert!(states[0].modes.of(30)[0] * states[1].modes.of(30)[0] > 0.0);
-    }
-
-    #[test]
-    fn a_response_knows_no_better_than_others_what_rays_miss() {
-        let batches = usize::from(PathSet::BATCHES);
-        let bands = Bands::octaves(500.0, 1000.0).unwrap();
-        let response = |sd: f32| -> Vec<BandState> {
-            let mut state = BandState::by_hand(Bins::new(bands, 0), 3, 1, 0.0);
-            let sign = |batch: usize| if batch.is_multiple_of(2) { sd } else { -sd };
-            state.batch_deviations = (0..3 * batches).map(|i| sign(i % batches)).collect();
-            state.monte_carlo = vec![batches as f64 * f64::from(sd * sd); 3];
-            vec![state]
-        };
-        let mut responses = [response(0.02), response(0.1), response(0.02), response(0.0)];
-        pool(&mut responses);
-        let variance = |r: &Vec<BandState>| r[0].monte_carlo[1];
-        let of_batches = |r: &Vec<BandState>| -> f64 {
-            r[0].batch_deviations[batches..2 * batches].iter().map(|d| f64::from(d * d)).sum()
-        };
-        let mean = 32.0 * (2.0 * 0.02f64.powi(2) + 0.1f64.powi(2)) / 4.0;
-        for poor in [0, 2] {
-            assert!((variance(&responses[poor]) / mean - 1.0).abs() < 1e-6, "{responses:?}");
-            assert!((of_batches(&responses[poor]) / mean - 1.0).abs() < 1e-5);
-        }
-        // What scatters more than the mean keeps it, and where no ray was drawn nothing scatters.
-        assert!((variance(&responses[1]) / 0.32 - 1.0).abs() < 1e-6);
-        assert_eq!((variance(&responses[3]), of_batches(&responses[3])), (0.0, 0.0));
     }
 }

@@ -176,7 +176,6 @@ impl Simulation {
             self.states.iter().map(|s| s.iter().map(|b| range_end(b, self.range_db)).collect()).collect();
         self.compared_s =
             (0..observations.survey.bands.len()).map(|b| compared_s(&self.states, &self.ends, b)).collect();
-        monte_carlo_modes::pool(&mut self.states);
         self.states.par_iter_mut().zip(&self.ends).for_each(|(s, ends)| monte_carlo_modes::find(s, ends));
         self.reference = (0..observations.survey.bands.len())
             .map(|band| {
