@@ -172,7 +172,7 @@ impl<'a> TracedPairView<'a> {
         sums.iter().zip(self.ln_energy(band)).map(|(s, ln)| s.max(floor).ln() - ln).collect()
     }
 
-    /// Energies of the paths (one each) in the bins of a band by class of path, and what these paths have in the mean.
+    /// Energies of the paths (one each) in the bins of a band by class of path, and the mean of what these paths have.
     pub(crate) fn class_sums(&self, band: usize, energies: &[f32], paths: &ClassedPaths) -> Vec<Vec<f64>> {
         let into = (self.state(band).bins, &self.room.pulses[band]);
         self.pair.class_sums(energies, paths, into, self.room.simulation.traced_s)

@@ -1,4 +1,4 @@
-//! Paths that a law treats alike: classes within which its variables differ little.
+//! Classes of paths within which the variables of a law differ little.
 
 use crate::error::Error;
 use crate::simulate::traced_pair::class_sums::ClassedPaths;
@@ -13,7 +13,7 @@ pub(super) const COSINES: usize = 12;
 const SLICES: usize = 32;
 /// Classes of each variable, by how many there are.
 const CLASSES: [usize; 4] = [12, 6, 4, 3];
-/// Variables by which paths are told apart; others are known in the mean.
+/// Variables by which paths are told apart; of others the mean is known.
 const MAX_RANKED: usize = 5;
 /// Classes of paths by what a law of reflections takes from them.
 const CLASSES_BY_LEVEL: usize = 10;

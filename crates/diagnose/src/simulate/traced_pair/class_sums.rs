@@ -1,4 +1,4 @@
-//! Energy of each bin by class of path, and what its paths have in the mean.
+//! Energy of each bin by class of path, and the mean of what its paths have.
 
 use super::{CELL_S, TracedPair};
 use crate::observe::band_pulse::BandPulse;
