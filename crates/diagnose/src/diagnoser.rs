@@ -100,9 +100,10 @@ impl Diagnoser {
         self.effects.push(Box::new(effect));
     }
 
-    /// That the names of all laws are found between every source and receiver of a room: those of delay and of added sound are not applied to
+    /// That all edges of bands of laws can be weighed, and that the names of all laws are found between every source and receiver of a room: those of delay and of added sound are not applied to
     /// traced paths, where they would be.
     fn check_laws(&self, room: &MeasuredRoom) -> Result<(), Error> {
+        self.laws.iter().try_for_each(|law| LawEffect::check_edges(law, room.bands()))?;
         for response in room.responses() {
             let (source, receiver) = (&room.sources()[response.source], &room.receivers()[response.receiver]);
             let site = LawSite::new(room.scene(), source, receiver, &room.air());

@@ -4,7 +4,7 @@ use sabine_acoustics::Bands;
 use sabine_paths::laws::{Law, LawError, LawParameter, Unit};
 
 /// Most combinations of edges that are told apart.
-const MAX_COMBINATIONS: usize = 64;
+pub(super) const MAX_COMBINATIONS: usize = 64;
 
 /// A law with each edge of bands ([`Law::is_edge_of_bands`]) in one place, and what that is in words.
 pub(super) struct PlacedEdges {
@@ -13,15 +13,35 @@ pub(super) struct PlacedEdges {
     pub words: String,
 }
 
-/// The law with its edges in every place that the bands tell apart, and at most so many of them: the first ones.
-pub(super) fn placed(law: &Law, bands: Bands) -> Vec<PlacedEdges> {
+/// Names of the edges of bands in a law that have an interval.
+fn open_edges(law: &Law) -> Vec<String> {
     let is_open = |(name, p): &(&str, &LawParameter)| p.low < p.high && law.is_edge_of_bands(name);
-    let edges: Vec<String> = law.parameters().filter(is_open).map(|(name, _)| name.to_owned()).collect();
+    law.parameters().filter(is_open).map(|(name, _)| name.to_owned()).collect()
+}
+
+/// The interval of an edge, cut where a band has its centre.
+fn cut(own: &LawParameter, bands: Bands) -> Vec<f64> {
+    let per_unit = Unit::parse(&own.unit).map_or(1.0, |unit| unit.scale());
+    let mut ends = vec![own.low];
+    ends.extend(bands.iter_hz().map(|hz| hz / per_unit).filter(|f| *f > own.low && *f < own.high));
+    ends.push(own.high);
+    ends
+}
+
+/// That no more combinations of places are to be told apart than can be: how many there are.
+pub(super) fn check(law: &Law, bands: Bands) -> Result<(), usize> {
+    let edges = open_edges(law);
+    let own = law.parameters().filter(|(name, _)| edges.iter().any(|edge| edge == name));
+    let count = own.map(|(_, p)| cut(p, bands).len() - 1).fold(1, usize::saturating_mul);
+    if count > MAX_COMBINATIONS { Err(count) } else { Ok(()) }
+}
+
+/// The law with its edges in every place that the bands tell apart.
+pub(super) fn placed(law: &Law, bands: Bands) -> Vec<PlacedEdges> {
     let mut all = vec![PlacedEdges { law: law.clone(), words: String::new() }];
-    for edge in &edges {
+    for edge in &open_edges(law) {
         all = all.iter().flat_map(|one| one.with(edge, bands)).collect();
     }
-    all.truncate(MAX_COMBINATIONS);
     all
 }
 
@@ -32,10 +52,7 @@ impl PlacedEdges {
         else {
             return Vec::new();
         };
-        let per_unit = Unit::parse(&own.unit).map_or(1.0, |unit| unit.scale());
-        let mut ends = vec![own.low];
-        ends.extend(bands.iter_hz().map(|hz| hz / per_unit).filter(|f| *f > own.low && *f < own.high));
-        ends.push(own.high);
+        let ends = cut(own, bands);
         let several = ends.len() > 2;
         let one = |ends: &[f64]| -> Result<Self, LawError> {
             let [low, high] = [ends[0], ends[1]];
@@ -89,5 +106,22 @@ mod tests {
         assert_eq!(above(&all[2].law), [false, false, false, true, true]);
         assert_eq!(places(&law(0.6, 0.7, 0.9)), [(0.7, String::new())]);
         assert_eq!(places(&law(0.7, 0.7, 0.7)), [(0.7, String::new())]);
+    }
+
+    #[test]
+    fn too_many_combinations_are_counted_and_not_made() {
+        let bands = Bands::octaves(125.0, 8000.0).unwrap();
+        let edges = |count: usize| {
+            let parameter = |i: usize| (format!("f{i}"), LawParameter::new(1.0, [0.1, 9.0], "kHz"));
+            let names: Vec<(String, LawParameter)> = (0..count).map(parameter).collect();
+            let formula: Vec<String> =
+                names.iter().map(|(name, _)| format!("above(frequency_hz, {name})")).collect();
+            let a = ("a".to_owned(), LawParameter::new(1.0, [0.0, 2.0], "dB"));
+            let formula = format!("-a * ({})", formula.join(" + "));
+            Law::new("x", LawTarget::Path, None, &formula, names.into_iter().chain([a])).unwrap()
+        };
+        // Seven octaves cut an interval into eight.
+        assert_eq!((check(&edges(1), bands), check(&edges(2), bands)), (Ok(()), Ok(())));
+        assert_eq!(check(&edges(3), bands), Err(512));
     }
 }

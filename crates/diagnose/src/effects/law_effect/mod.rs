@@ -17,6 +17,7 @@ use crate::survey::Survey;
 use added_law::AddedLaw;
 use delay_law::{DelayLaw, is_untold};
 use free_parameters::{FittedLaw, MAX_FREE};
+use sabine_acoustics::Bands;
 use sabine_paths::laws::{Law, LawParameter, LawTarget};
 use sketched_law::SketchedLaw;
 use tabulated_law::TabulatedLaw;
@@ -98,6 +99,17 @@ impl LawEffect {
             return Err(refused(format!("the interval of `{name}` is zero alone: nothing is left to fit")));
         }
         Ok(Self { law })
+    }
+
+    /// That the edges of a law have no more places between these bands than can be weighed.
+    pub(crate) fn check_edges(law: &Law, bands: Bands) -> Result<(), Error> {
+        edges::check(law, bands).map_err(|count| Error::LawNotWeighed {
+            id: law.id().to_owned(),
+            reason: format!(
+                "its edges of bands have {count} combinations of places, and at most {} are weighed: narrow their intervals",
+                edges::MAX_COMBINATIONS
+            ),
+        })
     }
 
     /// Takes a law whose edges of bands stay where they are.
