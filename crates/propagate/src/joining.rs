@@ -11,8 +11,23 @@ use std::f64::consts::PI;
 const EYE_LEVEL_M: f64 = 0.01;
 
 impl Tracing<'_> {
-    /// Joins the two rays of a pair along lines between points where both are scattered.
+    /// Joins the two rays of a pair, on all their ways, along lines between points where both are scattered.
     pub fn join(
+        &self,
+        out: &mut [Walk],
+        back: &mut [Walk],
+        batch: u8,
+        random: &mut impl Rng,
+        paths: &mut PathSet,
+    ) {
+        for out in out {
+            for back in back.iter_mut() {
+                self.join_walks(out, back, batch, random, paths);
+            }
+        }
+    }
+
+    fn join_walks(
         &self,
         out: &mut Walk,
         back: &mut Walk,
@@ -58,7 +73,7 @@ impl Tracing<'_> {
                 let spread = share / used.lines * 4.0 * product / (PI * distance_m * distance_m);
                 let mixture = a.mixture_on(&self.scene.probabilities);
                 let log_density = mixture.joint_log_density(&b.mixture_on(&self.scene.probabilities));
-                let log_weight = log_share + spread.ln() - log_density;
+                let log_weight = log_share + spread.ln() - log_density + a.log_rays + b.log_rays;
                 let (out_depth, back_depth) = (a.depth, b.depth);
                 let (chain, tail) = (out.chain(out_depth, paths), back.chain(back_depth, paths));
                 let (departure, arrival) = (out.heading, back.heading);
@@ -81,7 +96,9 @@ impl Tracing<'_> {
         let mut waiting = Vec::new();
         for (walk, ray) in back.iter().zip(0u32..) {
             for (arrival, at) in walk.arrivals.iter().zip(0u32..) {
-                waiting.push((walk.hero, arrival.patch, ray, at));
+                if arrival.incoming.is_some() {
+                    waiting.push((walk.hero, arrival.patch, ray, at));
+                }
             }
         }
         waiting.sort_unstable();
@@ -116,7 +133,8 @@ impl Tracing<'_> {
                     // 16 pi for each pair of rays and over the area; a ray meets all its rivals.
                     let spread = share * 4.0 / (used.meetings * area_m2);
                     let log_density = a.mixture_on(&self.scene.probabilities).joint_log_density(&b.mixture);
-                    let log_weight = log_share + spread.ln() - log_density;
+                    let log_rays = a.log_rays + b.incoming.unwrap_or(f64::NEG_INFINITY);
+                    let log_weight = log_share + spread.ln() - log_density + log_rays;
                     let (out_depth, back_depth) = (a.depth, b.depth - 1);
                     let (chain, tail) = (walk.chain(out_depth, paths), other.chain(back_depth, paths));
                     let (departure, arrival) = (walk.heading, other.heading);

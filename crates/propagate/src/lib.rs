@@ -143,6 +143,7 @@ mod triangle_pack;
 mod vector;
 mod walk;
 pub mod wave;
+mod weight_window;
 mod wide_node;
 
 pub use ambisonic_renderer::AmbisonicRenderer;

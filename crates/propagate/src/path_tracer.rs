@@ -44,6 +44,10 @@ pub struct TracerConfig {
     /// [`TracerConfig::image_order`],
     /// 1 cm to 10 m; it shrinks to the distance of the nearest surface.
     pub receiver_radius_m: f64,
+    /// Splits rays that carry much with the scene's materials, and ends by Russian roulette most of those that carry little
+    /// (a weight window): as many rays are left where the decay is 60 dB down as at its begin, in the same time. Paths hold for
+    /// any absorption either way; far from the scene's own they scatter as without.
+    pub weight_window: bool,
     /// Adds the ways around one edge where the direct line is blocked ([`DiffractingEdges`](crate::DiffractingEdges)), so that a
     /// screen casts a shadow and not a black hole.
     pub diffraction: bool,
@@ -65,6 +69,7 @@ impl Default for TracerConfig {
             image_order: 3,
             cuboid_paths: 0,
             receiver_radius_m: 0.5,
+            weight_window: true,
             diffraction: false,
             merge_coplanar: true,
             allow_leaks: false,
@@ -100,8 +105,9 @@ impl TracerConfig {
 ///
 /// The ways that apply to one path share it by the balance heuristic. At each surface a ray is reflected specularly **or**
 /// by Lambert's law, at random with the scattering coefficient. A ray draws for one set of scattering coefficients; the
-/// balance heuristic makes its paths serve all octaves without bias. Rays end by length, never by energy, so that the paths
-/// hold for any absorption.
+/// balance heuristic makes its paths serve all octaves without bias. With [`TracerConfig::weight_window`], rays are split where
+/// they carry much with the scene's absorption and play Russian roulette where they carry little; paths hold for any
+/// absorption all the same.
 ///
 /// With [`TracerConfig::bidirectional`] off, all rays start at the source and neither join nor meet.
 ///

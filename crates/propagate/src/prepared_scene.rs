@@ -5,6 +5,7 @@ use crate::edge_diffraction::DiffractingEdges;
 use crate::event_mixture::EventProbabilities;
 use crate::mesh_scene::MeshScene;
 use crate::patches::Patches;
+use crate::weight_window::{KeptEnergy, MAX_BANDS, PilotScene, WeightWindow, ln_kept};
 use crate::{Error, MeshReport, TracerConfig};
 use sabine_scene::{NamedMaterial, Scene};
 use std::fmt;
@@ -28,6 +29,9 @@ pub struct PreparedScene {
     pub(crate) surface_m2: f64,
     /// Share of the reflections that scatter, over the surfaces and bands.
     pub(crate) mean_scattering: f64,
+    /// What the weight window knows of the materials.
+    pub(crate) ln_kept: KeptEnergy,
+    bands: usize,
 }
 
 impl PreparedScene {
@@ -45,12 +49,28 @@ impl PreparedScene {
             edges: config.diffraction.then(|| DiffractingEdges::find(scene, &mesh)),
             cuboid: Cuboid::find(&mesh.surfaces),
             probabilities,
+            ln_kept: ln_kept(scene.materials().iter().map(|m| &m.material)),
+            bands: scene.materials().first().map_or(1, |m| m.material.bands().len()).clamp(1, MAX_BANDS),
             materials: scene.materials().len(),
             named: scene.materials().to_vec(),
             surface_m2,
             mean_scattering: scattering_m2 / surface_m2,
             mesh,
         })
+    }
+
+    /// What rays from a point carry on average.
+    pub(crate) fn weight_window(
+        &self,
+        from: [f64; 3],
+        max_length_m: f64,
+        rays: usize,
+        seed: u64,
+    ) -> WeightWindow {
+        let scattering = |material| self.probabilities.mean_scattering(material);
+        let (mesh, ln_kept, bands) = (&self.mesh, &self.ln_kept, self.bands);
+        let scene = PilotScene { mesh, ln_kept, bands, scattering: &scattering };
+        WeightWindow::pilot(scene, from, max_length_m, rays, seed)
     }
 
     /// The material (index) of each of the six faces, where the mesh is a cuboid: six whole faces at right angles, each of one material, and

@@ -4,10 +4,11 @@ use crate::TracerConfig;
 use crate::event_mixture::{EventMixture, EventProbabilities};
 use crate::patches::Patch;
 use crate::prepared_scene::PreparedScene;
-use crate::random::{direction, generator};
+use crate::random::{direction, generator, lambert};
 use crate::techniques::{Use, Ways};
-use crate::vector::{Vec3, dot, norm, scale, sub};
-use crate::walk::{Sphere, before_hit, next_hit, reflected, visible};
+use crate::vector::{Vec3, dot, mirror, norm, scale, sub};
+use crate::walk::{Sphere, before_hit, next_hit, visible};
+use crate::weight_window::{Fate, MAX_BANDS, WeightWindow};
 use rand::Rng;
 use sabine_paths::{Contribution, Incidence, PathSet, Reflection};
 use std::f64::consts::PI;
@@ -17,6 +18,9 @@ const SOURCE: usize = 0;
 const RECEIVER: usize = 1;
 /// Pairs of rays that may meet each other, at most: so many are kept in memory by each thread.
 const MOST_PAIRS: usize = 256;
+
+/// Ways on which one ray may go, at most.
+const MOST_WALKS: usize = 64;
 
 /// What all rays of one trace share.
 pub(crate) struct Tracing<'a> {
@@ -29,6 +33,8 @@ pub(crate) struct Tracing<'a> {
     parts: usize,
     /// Specular paths of up to so many reflections are found by others.
     exact_order: usize,
+    /// What rays from each end carry on average.
+    windows: Option<[WeightWindow; 2]>,
     config: &'a TracerConfig,
 }
 
@@ -51,6 +57,10 @@ pub(crate) struct Arrival {
     pub patch: Patch,
     /// Area of wall in the patch, if the ray is scattered there.
     pub area_m2: Option<f64>,
+    /// Logarithm of the number of rays for which this one comes here; none if another does so that goes on otherwise.
+    pub incoming: Option<f64>,
+    /// The same after the reflection.
+    pub log_rays: f64,
 }
 
 impl Arrival {
@@ -69,21 +79,63 @@ impl Arrival {
     }
 }
 
-/// A ray, as far as it was followed.
+/// A ray, as far as it was followed, from the end of the paths or from where it was split off.
 pub(crate) struct Walk {
-    /// Direction in which it began.
+    /// Direction in which it began at the end of the paths.
     pub heading: Vec3,
+    /// Its own reflections.
     pub arrivals: Vec<Arrival>,
     /// Class of octaves whose scattering coefficients it obeys.
     pub hero: usize,
-    /// Chains of the first reflections, as far as a contribution has needed them.
+    /// Reflections before its own.
+    before: usize,
+    /// Chains of those, and of the first of its own, as far as a contribution has needed them.
     chains: Vec<u32>,
+}
+
+/// A ray that is being followed from an end.
+struct Ray {
+    end: usize,
+    batch: u8,
+    walk: Walk,
+    at: Progress,
+    /// By roulette.
+    ended: bool,
+}
+
+/// A surface that a ray has met.
+struct Met {
+    /// Towards the side from which the ray came.
+    normal: Vec3,
+    material: u32,
+    cosine: f64,
+    /// Of the way to this point.
+    ways: Ways,
+    patch: Patch,
+}
+
+/// Where a ray is.
+#[derive(Clone)]
+struct Progress {
+    origin: Vec3,
+    heading: Vec3,
+    travelled_m: f64,
+    mixture: EventMixture,
+    ways: Ways,
+    ever_scattered: bool,
+    /// Since the last scattering, or the beginning: how far, from which cosine, and whether over a mirror.
+    stretch_m: f64,
+    cosine_out: f64,
+    mirrored: bool,
+    /// Energy that is left, by octave.
+    ln_energy: [f64; MAX_BANDS],
+    log_rays: f64,
 }
 
 impl Walk {
     /// The chain of the first `depth` reflections.
     pub fn chain(&mut self, depth: usize, paths: &mut PathSet) -> u32 {
-        while self.chains.len() <= depth {
+        while self.before + self.chains.len() <= depth {
             let arrival = &self.arrivals[self.chains.len() - 1];
             let scattered = arrival.area_m2.is_some();
             let reflection = if scattered { Reflection::Scattered } else { Reflection::Specular };
@@ -92,7 +144,12 @@ impl Walk {
             let longer = paths.reflect_at(last, arrival.material, reflection, incidence);
             self.chains.push(longer);
         }
-        self.chains[depth]
+        self.chains[depth - self.before]
+    }
+
+    /// Reflections so far.
+    fn depth(&self) -> usize {
+        self.before + self.arrivals.len()
     }
 }
 
@@ -110,9 +167,12 @@ impl<'a> Tracing<'a> {
         let pairs = if config.bidirectional { config.rays.div_ceil(2) } else { config.rays };
         let batches = usize::from(PathSet::BATCHES);
         let parts = batches * pairs.div_ceil(batches * MOST_PAIRS);
+        let window =
+            |end: usize| scene.weight_window(ends_m[end], max_length_m, pairs, config.seed ^ end as u64);
         Self {
             scene,
             max_length_m,
+            windows: config.weight_window.then(|| [window(SOURCE), window(RECEIVER)]),
             ends: [sphere(SOURCE), sphere(RECEIVER)],
             pairs: parts * pairs.div_ceil(parts).next_multiple_of(scene.probabilities.classes()),
             parts,
@@ -143,22 +203,24 @@ impl<'a> Tracing<'a> {
         let mut paths = PathSet::new(self.scene.materials, self.max_length_m);
         let pairs = self.pairs / self.parts;
         let batch = (part % usize::from(PathSet::BATCHES)) as u8;
+        // All walks from each end, and where those of each pair end.
         let mut walks: [Vec<Walk>; 2] = [Vec::new(), Vec::new()];
+        let mut until: Vec<[usize; 2]> = vec![[0; 2]];
         for pair in part * pairs..(part + 1) * pairs {
-            let mut random = generator(self.config.seed, 2 * pair as u64);
             // Both rays of a pair draw for the same class, and all classes get their turns within a part.
             let hero = pair % self.scene.probabilities.classes();
-            walks[SOURCE].push(self.walk(SOURCE, hero, batch, &mut random, &mut paths));
-            if self.config.bidirectional {
-                let mut random = generator(self.config.seed, 2 * pair as u64 + 1);
-                walks[RECEIVER].push(self.walk(RECEIVER, hero, batch, &mut random, &mut paths));
+            for end in 0..self.ends_in_use() {
+                let mut random = generator(self.config.seed, (2 * pair + end) as u64);
+                self.walk((end, hero, batch), &mut random, &mut walks[end], &mut paths);
             }
+            until.push([walks[SOURCE].len(), walks[RECEIVER].len()]);
         }
         if self.config.bidirectional {
             let mut random = generator(!self.config.seed, part as u64);
             let [out, back] = &mut walks;
-            for (out, back) in out.iter_mut().zip(back.iter_mut()) {
-                self.join(out, back, batch, &mut random, &mut paths);
+            for ends in until.windows(2) {
+                let of = |end: usize| ends[0][end]..ends[1][end];
+                self.join(&mut out[of(SOURCE)], &mut back[of(RECEIVER)], batch, &mut random, &mut paths);
             }
             self.meet(out, back, batch, &mut random, &mut paths);
         }
@@ -193,101 +255,245 @@ impl<'a> Tracing<'a> {
         (4.0 * PI / self.pairs as f64).ln()
     }
 
-    /// Follows one ray from an end of the path and adds what it finds at the opposite end.
-    fn walk(&self, end: usize, hero: usize, batch: u8, random: &mut impl Rng, paths: &mut PathSet) -> Walk {
-        let (here, there) = (&self.ends[end], &self.ends[1 - end]);
-        let log_share = self.log_share();
-        let log_volume = there.volume_m3().ln();
-        let mut heading = direction(random);
-        let mut walk = Walk { heading, arrivals: Vec::new(), hero, chains: vec![PathSet::DIRECT] };
-        let mut mixture = EventMixture::new(self.scene.probabilities.classes());
-        let mut ways = Ways::new(here.radius_m);
-        let (mut origin, mut travelled_m) = (here.centre, 0.0);
-        let mut ever_scattered = false;
-        // Since the last scattering, or the beginning: how far, from which cosine, and whether over a mirror.
-        let (mut stretch_m, mut cosine_out, mut mirrored) = (0.0, 1.0, false);
-        loop {
-            let hit = next_hit(&self.scene.mesh, origin, &mut heading, random);
-            let leg_m = hit.map_or(f64::INFINITY, |h| h.distance);
-            let depth = walk.arrivals.len();
-            // Specular paths that image sources have found, and those that a line has found, are not counted again.
-            if mirrored
-                && (ever_scattered || depth > self.exact_order)
-                && let Some((middle_m, chord_m)) = there.chord(origin, heading, leg_m)
-                && travelled_m + middle_m <= self.max_length_m
+    /// Follows one ray from an end of the path, on all ways into which it is split, and adds what it finds at the opposite end.
+    fn walk(
+        &self,
+        (end, hero, batch): (usize, usize, u8),
+        random: &mut impl Rng,
+        walks: &mut Vec<Walk>,
+        paths: &mut PathSet,
+    ) {
+        let here = &self.ends[end];
+        let heading = direction(random);
+        let start = Progress {
+            origin: here.centre,
+            heading,
+            travelled_m: 0.0,
+            mixture: EventMixture::new(self.scene.probabilities.classes()),
+            ways: Ways::new(here.radius_m),
+            ever_scattered: false,
+            stretch_m: 0.0,
+            cosine_out: 1.0,
+            mirrored: false,
+            ln_energy: [0.0; MAX_BANDS],
+            log_rays: 0.0,
+        };
+        let walk = Walk { heading, arrivals: Vec::new(), hero, before: 0, chains: vec![PathSet::DIRECT] };
+        let first = walks.len();
+        let mut waiting = vec![Ray { end, batch, walk, at: start, ended: false }];
+        while let Some(mut ray) = waiting.pop() {
+            while !ray.ended
+                && let Some(met) = self.leg(&mut ray, random, paths)
             {
-                let share = match self.config.bidirectional {
-                    true => ways.share_of_sphere(there.radius_m, self.usage(depth)),
-                    false => 1.0,
-                };
-                let log_weight = log_share + (share * chord_m).ln() - log_volume - mixture.log_density();
-                let length_m = travelled_m + middle_m;
-                let found = Found { length_m, log_weight, direction: scale(heading, -1.0) };
-                push(paths, end, &mut walk, depth, found, batch);
+                let most = MOST_WALKS.saturating_sub(walks.len() - first + waiting.len());
+                self.reflect(&mut ray, &met, most, &mut waiting, random, paths);
             }
-            let Some(hit) = hit else { return walk };
-            travelled_m += hit.distance;
-            if travelled_m >= self.max_length_m {
-                return walk;
-            }
-            stretch_m += hit.distance;
-            let surface = &self.scene.mesh.surfaces.triangles[hit.triangle as usize];
-            let material = surface.material;
-            let scattered = random.random::<f64>() < self.scene.probabilities.scattering(material, hero);
-            let reflection = if scattered { Reflection::Scattered } else { Reflection::Specular };
-            let normal = surface.normal_against(heading);
-            let point = before_hit(origin, heading, hit.distance);
-            let cosine_in = -dot(heading, normal);
-            let mut ways_here = ways;
-            if !mirrored {
-                if ever_scattered {
-                    ways_here.inner_stretch(stretch_m, cosine_out * cosine_in);
-                } else {
-                    ways_here.first_stretch(stretch_m, cosine_in);
-                }
-            }
-            let plane = &self.scene.mesh.surfaces.planes[surface.plane as usize];
-            let patch = self.scene.patches.at(surface.plane, plane, point, heading);
-            let area_m2 = scattered.then(|| self.scene.patches.area_m2(patch));
-            let depth = depth + 1;
-            walk.arrivals.push(Arrival {
-                depth,
-                point,
-                normal,
-                material,
-                cosine: cosine_in.clamp(0.0, 1.0),
-                travelled_m,
-                mixture,
-                ways: ways_here,
-                patch,
-                area_m2,
-            });
-            mixture.apply(&self.scene.probabilities, material, scattered);
-            origin = point;
-            heading = reflected(surface, heading, reflection, random);
-            mirrored = !scattered;
-            let Some(area_m2) = area_m2 else { continue };
-            ways = ways_here;
-            ways.scattered_on(area_m2);
-            ever_scattered = true;
-            (stretch_m, cosine_out) = (0.0, dot(heading, normal));
-            let line = sub(there.centre, point);
-            let distance_m = norm(line);
-            let cosine = dot(line, normal) / distance_m;
-            let length_m = travelled_m + distance_m;
-            if cosine > 0.0 && length_m <= self.max_length_m && visible(&self.scene.mesh, point, there.centre)
-            {
-                let share = match self.config.bidirectional {
-                    true => ways.share_of_line(distance_m, cosine, self.usage(depth)),
-                    false => 1.0,
-                };
-                // Lambert: cos / pi of the power per steradian, thinned by the square of the distance.
-                let log_spread = (share * cosine / (PI * distance_m * distance_m)).ln();
-                let log_weight = log_share + log_spread - mixture.log_density();
-                let found = Found { length_m, log_weight, direction: scale(line, -1.0 / distance_m) };
-                push(paths, end, &mut walk, depth, found, batch);
+            walks.push(ray.walk);
+        }
+    }
+
+    /// Follows a ray to the next surface and adds what it finds at the opposite end on its way. None where it ends.
+    fn leg(&self, ray: &mut Ray, random: &mut impl Rng, paths: &mut PathSet) -> Option<Met> {
+        let Ray { end, batch, walk, at, .. } = ray;
+        let there = &self.ends[1 - *end];
+        let hit = next_hit(&self.scene.mesh, at.origin, &mut at.heading, random);
+        let leg_m = hit.map_or(f64::INFINITY, |h| h.distance);
+        let depth = walk.depth();
+        // Specular paths that image sources have found, and those that a line has found, are not counted again.
+        if at.mirrored
+            && (at.ever_scattered || depth > self.exact_order)
+            && let Some((middle_m, chord_m)) = there.chord(at.origin, at.heading, leg_m)
+            && at.travelled_m + middle_m <= self.max_length_m
+        {
+            let share = match self.config.bidirectional {
+                true => at.ways.share_of_sphere(there.radius_m, self.usage(depth)),
+                false => 1.0,
+            };
+            let log_density = at.mixture.log_density() + there.volume_m3().ln();
+            let log_weight = self.log_share() + (share * chord_m).ln() - log_density + at.log_rays;
+            let length_m = at.travelled_m + middle_m;
+            let found = Found { length_m, log_weight, direction: scale(at.heading, -1.0) };
+            push(paths, *end, walk, depth, found, *batch);
+        }
+        let hit = hit?;
+        at.travelled_m += hit.distance;
+        if at.travelled_m >= self.max_length_m {
+            return None;
+        }
+        at.stretch_m += hit.distance;
+        let surface = &self.scene.mesh.surfaces.triangles[hit.triangle as usize];
+        let normal = surface.normal_against(at.heading);
+        at.origin = before_hit(at.origin, at.heading, hit.distance);
+        let cosine = -dot(at.heading, normal);
+        let mut ways = at.ways;
+        if !at.mirrored {
+            if at.ever_scattered {
+                ways.inner_stretch(at.stretch_m, at.cosine_out * cosine);
+            } else {
+                ways.first_stretch(at.stretch_m, cosine);
             }
         }
+        let plane = &self.scene.mesh.surfaces.planes[surface.plane as usize];
+        let patch = self.scene.patches.at(surface.plane, plane, at.origin, at.heading);
+        let kept = &self.scene.ln_kept[surface.material as usize];
+        at.ln_energy.iter_mut().zip(kept).for_each(|(energy, kept)| *energy += kept);
+        Some(Met { normal, material: surface.material, cosine, ways, patch })
+    }
+
+    /// Mirrors or scatters a ray; one that carries much goes both ways. Then it is split, or ends, as the weight window asks.
+    fn reflect(
+        &self,
+        ray: &mut Ray,
+        met: &Met,
+        most: usize,
+        waiting: &mut Vec<Ray>,
+        random: &mut impl Rng,
+        paths: &mut PathSet,
+    ) {
+        let scattering = self.scene.probabilities.scattering(met.material, ray.walk.hero);
+        let incoming = Some(ray.at.log_rays);
+        let both = scattering > 0.0 && scattering < 1.0 && most > 1;
+        if both && WeightWindow::is_above(self.importance(ray)) {
+            let mut scattered = ray.split_off(paths);
+            scattered.at.log_rays += scattering.ln();
+            // It came here but once.
+            self.scatter(&mut scattered, met, None, random, paths);
+            self.split(&mut scattered, met, most - 1, waiting, random, paths);
+            waiting.push(scattered);
+            ray.at.log_rays += (1.0 - scattering).ln();
+            self.mirror(ray, met, incoming);
+            return;
+        }
+        if random.random::<f64>() < scattering {
+            self.scatter(ray, met, incoming, random, paths);
+        } else {
+            self.mirror(ray, met, incoming);
+        }
+        self.split(ray, met, most, waiting, random, paths);
+    }
+
+    /// What a ray carries, in units of what rays carry on average.
+    fn importance(&self, ray: &Ray) -> f64 {
+        let at = &ray.at;
+        let of = |windows: &[WeightWindow; 2]| windows[ray.end].importance(&at.ln_energy, at.travelled_m);
+        self.windows.as_ref().map_or(1.0, |windows| of(windows) * at.log_rays.exp())
+    }
+
+    /// Splits a ray after a reflection into `most` parts at most, or ends it.
+    fn split(
+        &self,
+        ray: &mut Ray,
+        met: &Met,
+        most: usize,
+        waiting: &mut Vec<Ray>,
+        random: &mut impl Rng,
+        paths: &mut PathSet,
+    ) {
+        match WeightWindow::fate(self.importance(ray)) {
+            // Parts of a ray that was mirrored would go the same way.
+            Fate::Parts(parts) if !ray.at.mirrored => {
+                let parts = parts.min(most).max(1);
+                ray.at.log_rays -= (parts as f64).ln();
+                for _ in 1..parts {
+                    let mut part = ray.split_off(paths);
+                    part.at.set_out(met.normal, random);
+                    waiting.push(part);
+                }
+            }
+            Fate::Parts(_) => {}
+            Fate::Roulette(survival) => {
+                ray.at.log_rays -= survival.ln();
+                ray.ended = random.random::<f64>() >= survival;
+            }
+        }
+    }
+
+    /// Goes on from a surface as from a mirror.
+    fn mirror(&self, ray: &mut Ray, met: &Met, incoming: Option<f64>) {
+        ray.arrive(met, incoming, None);
+        let at = &mut ray.at;
+        at.mixture.apply(&self.scene.probabilities, met.material, false);
+        at.mirrored = true;
+        at.heading = mirror(at.heading, met.normal);
+    }
+
+    /// Goes on from a surface that scatters, and adds the line from there to the opposite end.
+    fn scatter(
+        &self,
+        ray: &mut Ray,
+        met: &Met,
+        incoming: Option<f64>,
+        random: &mut impl Rng,
+        paths: &mut PathSet,
+    ) {
+        let area_m2 = self.scene.patches.area_m2(met.patch);
+        ray.arrive(met, incoming, Some(area_m2));
+        let Ray { end, batch, walk, at, .. } = ray;
+        at.mixture.apply(&self.scene.probabilities, met.material, true);
+        at.mirrored = false;
+        at.ways = met.ways;
+        at.ways.scattered_on(area_m2);
+        at.ever_scattered = true;
+        at.set_out(met.normal, random);
+        let there = &self.ends[1 - *end];
+        let depth = walk.depth();
+        let line = sub(there.centre, at.origin);
+        let distance_m = norm(line);
+        let cosine = dot(line, met.normal) / distance_m;
+        let length_m = at.travelled_m + distance_m;
+        if cosine > 0.0 && length_m <= self.max_length_m && visible(&self.scene.mesh, at.origin, there.centre)
+        {
+            let share = match self.config.bidirectional {
+                true => at.ways.share_of_line(distance_m, cosine, self.usage(depth)),
+                false => 1.0,
+            };
+            // Lambert: cos / pi of the power per steradian, thinned by the square of the distance.
+            let log_spread = (share * cosine / (PI * distance_m * distance_m)).ln();
+            let log_weight = self.log_share() + log_spread - at.mixture.log_density() + at.log_rays;
+            let found = Found { length_m, log_weight, direction: scale(line, -1.0 / distance_m) };
+            push(paths, *end, walk, depth, found, *batch);
+        }
+    }
+}
+
+impl Ray {
+    /// A ray that goes on from here, its reflections so far being those of this one.
+    fn split_off(&mut self, paths: &mut PathSet) -> Self {
+        let before = self.walk.depth();
+        let chains = vec![self.walk.chain(before, paths)];
+        let Walk { heading, hero, .. } = self.walk;
+        Self {
+            walk: Walk { heading, arrivals: Vec::new(), hero, before, chains },
+            at: self.at.clone(),
+            ..*self
+        }
+    }
+
+    /// Adds a reflection.
+    fn arrive(&mut self, met: &Met, incoming: Option<f64>, area_m2: Option<f64>) {
+        let at = &self.at;
+        self.walk.arrivals.push(Arrival {
+            depth: self.walk.depth() + 1,
+            point: at.origin,
+            normal: met.normal,
+            material: met.material,
+            cosine: met.cosine.clamp(0.0, 1.0),
+            travelled_m: at.travelled_m,
+            mixture: at.mixture,
+            ways: met.ways,
+            patch: met.patch,
+            area_m2,
+            incoming,
+            log_rays: at.log_rays,
+        });
+    }
+}
+
+impl Progress {
+    /// Is scattered on by a surface, by Lambert's law.
+    fn set_out(&mut self, normal: Vec3, random: &mut impl Rng) {
+        self.heading = lambert(random, normal);
+        (self.stretch_m, self.cosine_out) = (0.0, dot(self.heading, normal));
     }
 }
 

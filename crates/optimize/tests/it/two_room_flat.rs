@@ -24,7 +24,7 @@ fn the_reverberation_of_the_flat_is_met() {
     let priors = AbsorptionPrior::of_room(&room, bands);
     let measured = MeasuredDecay::new(&room.load_response(0).unwrap(), bands).unwrap();
     let trace = |seed| -> PathSet {
-        let config = TracerConfig { rays: 20_000, duration_s: 2.0, seed, ..TracerConfig::default() };
+        let config = TracerConfig { rays: 50_000, duration_s: 2.0, seed, ..TracerConfig::default() };
         let (source, receiver) = (&room.sources()[0], &room.receivers()[0]);
         PathTracer::new(config).unwrap().trace(room.scene(), source, receiver, &room.air(), &()).unwrap()
     };

@@ -22,3 +22,4 @@ mod shoebox;
 mod tessellations;
 mod waves;
 mod wedge_oracles;
+mod weight_window;

@@ -1,0 +1,140 @@
+//! Rays that are split and play roulette: right for any absorption, and more precise where surfaces absorb unevenly.
+
+use crate::shoebox::*;
+use sabine_acoustics::*;
+use sabine_paths::*;
+use sabine_propagate::*;
+use sabine_scene::{MeasuredRoom, Scene};
+use std::ops::Range;
+use std::path::Path;
+use std::time::Instant;
+
+fn two_bands() -> Bands {
+    Bands::octaves(500.0, 1000.0).unwrap()
+}
+
+fn material(absorption: [f64; 2], scattering: [f64; 2]) -> Material {
+    let of = |values: [f64; 2]| PerBand::new(two_bands(), values.to_vec()).unwrap();
+    Material::new(of(absorption), of(scattering)).unwrap()
+}
+
+/// A hard room with a carpet and an absorbing ceiling, which scatters little, and not alike in both octaves.
+fn uneven_box() -> Scene {
+    let wall = || material([0.03, 0.04], [0.1, 0.3]);
+    let faces =
+        [wall(), wall(), wall(), wall(), material([0.25, 0.4], [0.1, 0.3]), material([0.5, 0.7], [0.2, 0.3])];
+    Scene::shoebox([7.0, 5.0, 3.2], faces).unwrap()
+}
+
+fn traced(scene: &Scene, weight_window: bool, rays: usize, seed: u64) -> PathSet {
+    let config = TracerConfig { rays, duration_s: 0.9, seed, weight_window, ..Default::default() };
+    let (from, to) = (source([1.5, 1.0, 1.2]), receiver([5.1, 3.2, 1.7]));
+    PathTracer::new(config).unwrap().trace(scene, &from, &to, &Air::default(), &()).unwrap()
+}
+
+/// Energy between two times in milliseconds, and its standard error.
+fn energy(paths: &PathSet, materials: &[Material], band: usize, range: Range<usize>) -> Estimate {
+    let parts = batch_energies(paths, materials, band, Air::default().speed_of_sound_m_s(), 1e-3);
+    let exact: f64 = parts[32][range.clone()].iter().sum();
+    jackknife(&parts[..32], |e| exact + e[range.clone()].iter().sum::<f64>())
+}
+
+const RANGES: [Range<usize>; 6] = [0..30, 30..60, 60..120, 120..240, 240..400, 400..600];
+
+/// The same paths serve the scene's own absorption and quite another: what was split for one is right for the other.
+#[test]
+fn energies_are_those_of_rays_that_are_left_alone_with_any_absorption() {
+    let scene = uneven_box();
+    let own = materials_of(&scene);
+    let swapped: Vec<Material> = own
+        .iter()
+        .enumerate()
+        .map(|(i, m)| {
+            let absorption = if i < 4 { [0.15, 0.12] } else { [0.08, 0.2] };
+            m.with_absorption(PerBand::new(two_bands(), absorption.to_vec()).unwrap()).unwrap()
+        })
+        .collect();
+    let alone = traced(&scene, false, 200_000, 11);
+    let windowed = traced(&scene, true, 100_000, 12);
+    for (name, materials) in [("own", &own), ("other", &swapped)] {
+        for band in 0..2 {
+            for range in RANGES {
+                let [a, b] = [&alone, &windowed].map(|paths| energy(paths, materials, band, range.clone()));
+                let spread = a.standard_error.hypot(b.standard_error);
+                assert!((a.value - b.value).abs() < 4.0 * spread, "{name} {band} {range:?}: {a:?} {b:?}");
+                assert!(spread < 0.2 * a.value, "{name} {band} {range:?}: {a:?} {b:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn late_energy_is_more_precise_with_as_many_rays() {
+    let scene = uneven_box();
+    let own = materials_of(&scene);
+    let [alone, windowed] = [false, true].map(|window| traced(&scene, window, 40_000, 5));
+    // Where the decay is 20 to 50 dB down. A standard error from 32 batches is known to an eighth.
+    for range in [240..400, 400..600] {
+        for band in 0..2 {
+            let [a, b] = [&alone, &windowed].map(|paths| energy(paths, &own, band, range.clone()));
+            let gain = (a.standard_error * b.value / (b.standard_error * a.value)).powi(2);
+            assert!(gain > 3.0, "{band} {range:?}: {gain:.1} {a:?} {b:?}");
+        }
+    }
+    // They are not paid for with more paths.
+    assert!(windowed.len() < 2 * alone.len(), "{} {}", windowed.len(), alone.len());
+}
+
+/// Prints what the weight window does to time and precision: variance times time without it over that with it.
+#[test]
+#[ignore = "figures for docs/validation/propagate.md"]
+fn precision_in_the_same_time() {
+    let rooms = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/rooms"));
+    let even =
+        Scene::shoebox([7.0, 5.0, 3.2], std::array::from_fn(|_| material([0.1; 2], [0.3; 2]))).unwrap();
+    let mut scenes = vec![("box, even".to_owned(), even, [[1.5, 1.0, 1.2], [5.1, 3.2, 1.7]])];
+    scenes.push(("box, uneven".to_owned(), uneven_box(), [[1.5, 1.0, 1.2], [5.1, 3.2, 1.7]]));
+    for name in ["bras_cr2", "bras_cr3", "bras_cr4"] {
+        let Ok(room) = MeasuredRoom::read(rooms.join(name)) else { continue };
+        let ends = [room.sources()[0].position_m, room.receivers()[0].position_m];
+        scenes.push((name.to_owned(), room.scene().clone(), ends));
+    }
+    println!(
+        "| room | ms | level (dB) | time without (s) | with (s) | variance, without over with | in the same time |"
+    );
+    for (name, scene, [from, to]) in scenes {
+        let materials = materials_of(&scene);
+        let bands = materials[0].bands();
+        let band = bands.iter_hz().position(|hz| hz == 1000.0).unwrap();
+        let run = |weight_window: bool| {
+            let config =
+                TracerConfig { rays: 20_000, duration_s: 2.0, seed: 3, weight_window, ..Default::default() };
+            let tracer = PathTracer::new(config).unwrap();
+            let prepared = tracer.prepare(&scene).unwrap();
+            let trace = || {
+                let (from, to) = (source(from), receiver(to));
+                tracer.trace_prepared(&prepared, &from, &to, &Air::default(), &()).unwrap()
+            };
+            let mut seconds: Vec<f64> = (0..5)
+                .map(|_| {
+                    let started = Instant::now();
+                    trace();
+                    started.elapsed().as_secs_f64()
+                })
+                .collect();
+            seconds.sort_by(f64::total_cmp);
+            (trace(), seconds[2])
+        };
+        let ((alone, alone_s), (windowed, windowed_s)) = (run(false), run(true));
+        let all = energy(&windowed, &materials, band, 0..1990).value;
+        for range in [50..100, 200..300, 400..600, 800..1000, 1200..1500] {
+            let [a, b] = [&alone, &windowed].map(|paths| energy(paths, &materials, band, range.clone()));
+            let level_db = 10.0 * (b.value / all).log10();
+            let gain = (a.standard_error * b.value / (b.standard_error * a.value)).powi(2);
+            let same_time = gain * alone_s / windowed_s;
+            println!(
+                "| {name} | {range:?} | {level_db:.0} | {alone_s:.2} | {windowed_s:.2} | {gain:.1} | {same_time:.1} |"
+            );
+        }
+    }
+}
