@@ -4,7 +4,7 @@ use super::{Diagnoser, Prepared, Task, Weighed};
 use crate::effect::Effect;
 use crate::effects::UnknownLaw;
 use crate::error::Error;
-use crate::infer::confirmation::{Confirmation, confirm};
+use crate::infer::confirmation::{Confirmation, Doubt, confirm};
 use crate::infer::law_search::shortlist::shortlist;
 use crate::infer::law_search::trial::{Trial, trials};
 use crate::infer::law_search::vault;
@@ -54,6 +54,7 @@ impl Diagnoser {
             }));
             confirmed = weighed.confirmed_without(&fallen, confirmed, (held, effects), observer)?;
         }
+        told.fallen.extend(doubted(&weighed, &confirmed));
         let still = laws_among(&weighed, &confirmed.state.chosen);
         let mut diagnosis = if still.is_empty() && !vault.is_empty() {
             let task = Task { room, held, vault: &[], laws: false, effects: effects - 1 };
@@ -130,6 +131,21 @@ impl Diagnoser {
         weighed.could_be_chance = could_be_chance(&weighed.search(task.effects), &weighed.found.chosen)?;
         Ok(weighed)
     }
+}
+
+/// Laws that were chosen and that did not stand as causes, before any trial as laws.
+fn doubted(weighed: &Weighed, confirmed: &Confirmation) -> Vec<FallenLaw> {
+    let laws = confirmed.dropped.iter().filter(|(candidate, _)| is_law(&weighed.cases[*candidate].id));
+    let one = |(candidate, doubt): &(usize, Doubt)| FallenLaw {
+        formula: weighed.cases[*candidate].case.subject.clone().unwrap_or_default(),
+        reason: match doubt {
+            Doubt::Modes => "octaves below the Schroeder frequency alone speak for it",
+            Doubt::Rays => "it is less probable the more rays are traced",
+            Doubt::Elsewhere => "it does not help to predict positions that are left out in turn",
+        }
+        .to_owned(),
+    };
+    laws.map(one).collect()
 }
 
 /// The laws among chosen candidates.

@@ -30,7 +30,7 @@ pub fn section(page: &mut Page, findings: &Findings) -> Result<(), Failure> {
         if !law.not_told_from.is_empty() {
             let items: String = law.not_told_from.iter().map(|l| format!("<li>{}</li>", escape(l))).collect();
             page.markup(&format!(
-                "<details><summary>{} other formulas do as well at these positions</summary><ul>{items}</ul></details>",
+                "<details><summary>Formulas that do as well at these positions: {}</summary><ul>{items}</ul></details>",
                 law.not_told_from.len()
             ));
         }
