@@ -1,5 +1,7 @@
 //! The whole diagnosis: observe, simulate, infer, confirm, report.
 
+mod discovering;
+
 use crate::config::DiagnoseConfig;
 use crate::effect::Effect;
 use crate::effects::{LawEffect, MissingDiffraction, UnknownLaw, catalogue};
@@ -115,7 +117,9 @@ impl Diagnoser {
         Ok(())
     }
 
-    /// With [`UnknownLaw`] beside its effects: what the misfit goes with, where no listed cause explains it.
+    /// With [`UnknownLaw`] beside its effects: what the misfit goes with, where no listed cause explains it. From six measured receivers on a
+    /// quarter of them, two at least, is set aside first, with all their responses (drawn by [`DiagnoseConfig::seed`]): no fit sees them, and a
+    /// law is only named if it makes them more probable. Where none is named, all of them are diagnosed without the search.
     #[must_use]
     pub fn discovering(mut self) -> Self {
         self.effects.push(Box::new(UnknownLaw));
@@ -188,9 +192,19 @@ impl Diagnoser {
         observer: &dyn Observer,
     ) -> Result<Diagnosis, Error> {
         let held = held_receivers(room, hold_out)?;
-        let effects = self.effects.len();
+        if self.looks_for_laws() {
+            return self.discovered(room, &held, observer);
+        }
+        let task = Task { room, held: &held, vault: &[], laws: false, effects: self.effects.len() };
+        let (weighed, confirmed) = self.found(&task, observer)?;
+        self.composed(&weighed, confirmed, task.effects, observer)
+    }
+
+    /// Searches for causes, and says which of them stand.
+    fn found(&self, task: &Task<'_>, observer: &dyn Observer) -> Result<(Weighed, Confirmation), Error> {
+        let &Task { effects, held, .. } = task;
         let started = Instant::now();
-        let mut weighed = self.weigh(room, &held, &self.tracer, observer)?;
+        let mut weighed = self.weigh(task, &self.tracer, observer)?;
         let mut tracer = Arc::clone(&self.tracer);
         // Where sound is found to bend around an edge, a second look takes the wrong `scattering` away that stands beside it, and leaves the
         // gain at positions left out no interval above zero: half of them hear nothing of the edge. The first answer stays.
@@ -198,13 +212,13 @@ impl Diagnoser {
         let again = weighed.could_be_chance && !weighed.found.chosen.iter().any(bends);
         if let Some(more) = self.tracer.with_more_rays().filter(|_| again) {
             let first_s = started.elapsed().as_secs_f64();
-            weighed = self.weigh(room, &held, &more, observer)?;
+            weighed = self.weigh(task, &more, observer)?;
             weighed.baseline.seconds.insert("with fewer rays first", first_s);
             tracer = more;
         }
         let mut dropped: Vec<(usize, Doubt)> = Vec::new();
         loop {
-            let mut confirmed = weighed.confirmed((&*tracer, &held), effects, observer)?;
+            let mut confirmed = weighed.confirmed((&*tracer, held), effects, observer)?;
             let fallen: Vec<usize> = confirmed.dropped.iter().map(|(candidate, _)| *candidate).collect();
             dropped.append(&mut confirmed.dropped);
             let of_decays = {
@@ -214,7 +228,7 @@ impl Diagnoser {
             let nothing_stands = confirmed.state.chosen.is_empty() && weighed.given.is_empty();
             if fallen.is_empty() || !of_decays || !nothing_stands || dropped.len() > MOST_FALLEN {
                 confirmed.dropped = dropped;
-                return self.composed(&weighed, confirmed, observer);
+                return Ok((weighed, confirmed));
             }
             // What stood in the shadow of names that have fallen is looked for in their absence.
             let mut without = std::mem::take(&mut weighed.found.without);
@@ -230,6 +244,7 @@ impl Diagnoser {
         &self,
         weighed: &Weighed,
         confirmed: Confirmation,
+        effects: usize,
         observer: &dyn Observer,
     ) -> Result<Diagnosis, Error> {
         let stands = |candidate: &usize| confirmed.state.chosen.contains(candidate);
@@ -239,7 +254,7 @@ impl Diagnoser {
                 format!("The model's {} is not at work here: these data do not need it.", cause.name)
             })
             .collect();
-        let search = weighed.search(self.effects.len());
+        let search = weighed.search(effects);
         let (found, dispersion) = (&weighed.found, &weighed.first_dispersion);
         let mut diagnosis = compose(&self.effects, &search, found, confirmed, dispersion, observer)?;
         diagnosis.notes.extend(notes);
@@ -249,12 +264,11 @@ impl Diagnoser {
     /// Traces the room with a tracer and searches for causes.
     fn weigh(
         &self,
-        room: &MeasuredRoom,
-        held: &[usize],
+        task: &Task<'_>,
         tracer: &Arc<dyn SceneTracer>,
         observer: &dyn Observer,
     ) -> Result<Weighed, Error> {
-        let Prepared { baseline, cases, given, used } = self.prepare(room, held, tracer, observer)?;
+        let Prepared { baseline, cases, given, used } = self.prepare(task, tracer, observer)?;
         let weighed = Weighed {
             first_dispersion: baseline.dispersion.clone(),
             baseline,
@@ -265,7 +279,8 @@ impl Diagnoser {
             arrival_fits: Arc::default(),
             could_be_chance: false,
         };
-        weighed.searched(self.effects.len(), Vec::new(), observer)
+        let weighed = weighed.searched(task.effects, Vec::new(), observer)?;
+        if task.laws { self.searched_beside(weighed, task, observer) } else { Ok(weighed) }
     }
 
     /// The model from which the diagnosis starts, its parameters and the absorption fitted anew to a room's responses: nothing is looked for,
@@ -274,9 +289,10 @@ impl Diagnoser {
     /// # Errors
     /// As [`Diagnoser::diagnose`].
     pub fn refit(&self, room: &MeasuredRoom, observer: &dyn Observer) -> Result<ExtendedModel, Error> {
-        let Prepared { mut baseline, cases, given, used } =
-            self.prepare(room, &[], &self.tracer, observer)?;
-        let (effects, arrival_fits) = (self.effects.len(), Arc::default());
+        let effects = self.effects.len();
+        let task = Task { room, held: &[], vault: &[], laws: false, effects };
+        let Prepared { mut baseline, cases, given, used } = self.prepare(&task, &self.tracer, observer)?;
+        let arrival_fits = Arc::default();
         give(&mut baseline, &cases, effects, (&used, &arrival_fits), &given)?;
         let search = Search::new(&baseline, &cases, effects, used).knowing(&arrival_fits);
         let base = search.state(&[], None)?;
@@ -286,13 +302,13 @@ impl Diagnoser {
     /// Traces and fits the baseline, and prepares the cases.
     fn prepare(
         &self,
-        room: &MeasuredRoom,
-        held: &[usize],
+        task: &Task<'_>,
         tracer: &Arc<dyn SceneTracer>,
         observer: &dyn Observer,
     ) -> Result<Prepared, Error> {
-        self.check_laws(room)?;
-        let mut baseline = Baseline::new(room, held, &self.config, tracer, observer)?;
+        self.check_laws(task.room)?;
+        let held = [task.held, task.vault].concat();
+        let mut baseline = Baseline::new(task.room, &held, &self.config, tracer, observer)?;
         let used = baseline.observations.fitted.clone();
         let mut cases = candidates::cases(&self.effects, baseline.survey());
         // What cannot be prepared takes no part.
@@ -307,8 +323,26 @@ impl Diagnoser {
         };
         let given = self.given.iter().map(place).collect::<Result<_, Error>>()?;
         baseline.calibrate_scatter(&[], &used)?;
-        Ok(Prepared { baseline, cases, given, used })
+        let mut prepared = Prepared { baseline, cases, given, used };
+        if task.laws {
+            self.shortlist_laws(&mut prepared, task.effects)?;
+        }
+        Ok(prepared)
     }
+}
+
+/// What a diagnosis is of.
+#[derive(Clone, Copy)]
+struct Task<'a> {
+    room: &'a MeasuredRoom,
+    /// Receivers (indices) that the user holds out.
+    held: &'a [usize],
+    /// Those that the search for laws leaves out.
+    vault: &'a [usize],
+    /// Whether laws are looked for.
+    laws: bool,
+    /// Number of effects, for the correction for how many were tried.
+    effects: usize,
 }
 
 /// What a search starts from.

@@ -22,7 +22,8 @@
 //! reasoning in `docs/explanation/diagnosis.md`.
 //!
 //! # Does not
-//! - see what is not in its [`catalogue`]: then the verdict is [`Verdict::Unexplained`] and the residuals show where it sits.
+//! - see what is not in its [`catalogue`]: then the verdict is [`Verdict::Unexplained`] and the residuals show where it sits, unless
+//!   [`Diagnoser::discovering`] finds a law that it goes with ([`Verdict::Law`]).
 //! - follow sound around more than one edge. Waves are solved for the octaves below the Schroeder frequency alone.
 //! - change scattering, geometry or air to make a fit look better: only what is named changes.
 //! - tell apart what the data cannot: a sampling clock and a temperature scale all times alike, and come out as a set.
@@ -117,8 +118,8 @@ pub use plan::measurement::PlannedMeasurement;
 pub use plan::outcome::{Chosen, Decision, EffectSize, LookAlikes, Plan, Weighing};
 pub use plan::planner::Planner;
 pub use report::diagnosis::{
-    CandidateScore, Cause, DecayCurves, Diagnosis, FitTest, FittedMaterial, HeldOut, HeldOutGain,
-    Isolability, LackOfFit, ResidualCell, Verdict,
+    CandidateScore, Cause, DecayCurves, Diagnosis, FallenLaw, FitTest, FittedMaterial, FoundLaw, HeldOut,
+    HeldOutGain, Isolability, LackOfFit, LawPoint, LawSearch, ResidualCell, Verdict,
 };
 pub use simulate::scene_tracer::{EachScene, PreparedTracer, SceneTracer};
 pub use simulate::tables::{Tables, Unprepared};

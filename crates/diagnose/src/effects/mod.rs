@@ -53,6 +53,7 @@ pub use time_zero::TimeZeroOffset;
 pub use transducer_response::TransducerResponse;
 pub use truncation::Truncation;
 pub use unknown_law::UnknownLaw;
+pub(crate) use unknown_law::{Covariate, Formula, Grammar};
 
 use crate::effect::Effect;
 

@@ -95,6 +95,16 @@ impl Baseline {
         &self.observations.survey
     }
 
+    /// The traced room at the present absorption, for tables.
+    pub fn room_view(&self) -> Result<TracedRoomView<'_>, Error> {
+        Ok(TracedRoomView {
+            survey: &self.observations.survey,
+            simulation: &self.simulation,
+            pulses: &self.observations.pulses,
+            materials: self.simulation.expanded_materials()?,
+        })
+    }
+
     /// Number of pairs, and of responses.
     pub fn pairs(&self) -> usize {
         self.survey().responses.len()
@@ -113,6 +123,14 @@ impl Baseline {
         self.prepare_those(cases, |slot| stale.contains(&slot)).map(|_| ())
     }
 
+    /// Makes room for the tables of so many cases more, which wait for [`Baseline::prepare_rest`]; says which is their first slot.
+    pub fn add_slots(&mut self, count: usize) -> usize {
+        let first = self.simulation.tables.len();
+        self.simulation.tables.extend(std::iter::repeat_with(Tables::default).take(count));
+        self.stale.extend(first..first + count);
+        first
+    }
+
     fn forget_tables(&mut self, cases: &[CatalogueCase]) {
         self.stale = cases.iter().filter_map(|c| c.case.slot).collect();
         let slots = self.stale.last().map_or(0, |last| last + 1);
@@ -126,16 +144,11 @@ impl Baseline {
     ) -> Result<Vec<bool>, Error> {
         let started = Instant::now();
         let mut refused = vec![false; cases.len()];
-        let room = TracedRoomView {
-            survey: &self.observations.survey,
-            simulation: &self.simulation,
-            pulses: &self.observations.pulses,
-            materials: self.simulation.expanded_materials()?,
-        };
-        let (mut found, mut reasons) = (Vec::new(), Vec::new());
+        let room = self.room_view()?;
+        let (mut found, mut reasons, mut fresh) = (Vec::new(), Vec::new(), Vec::new());
         for (own, refused) in cases.iter().zip(&mut refused) {
             let Some(slot) = own.case.slot.filter(|&slot| wanted(slot)) else { continue };
-            self.stale.remove(&slot);
+            fresh.push(slot);
             let Some(term) = own.case.decay_term() else { continue };
             match term.prepare(&room) {
                 Ok(tables) => found.push((slot, tables)),
@@ -146,6 +159,7 @@ impl Baseline {
                 Err(Unprepared::Failed(error)) => return Err(error),
             }
         }
+        fresh.iter().for_each(|slot| _ = self.stale.remove(slot));
         found.into_iter().for_each(|(slot, tables)| self.simulation.tables[slot] = tables);
         for reason in reasons {
             if !self.observations.notes.contains(&reason) {
@@ -427,7 +441,7 @@ mod tests {
             let mut case = Case::decay(Vec::new(), Counted(Arc::clone(count)));
             // Slots have gaps: cases that refused to be prepared are gone.
             case.slot = Some(2 * effect + 1);
-            CatalogueCase { effect, id: "counted".into(), case }
+            CatalogueCase { effect, id: "counted".into(), case, formula: None }
         };
         let cases: Vec<CatalogueCase> = counts.iter().enumerate().map(one).collect();
         let mut baseline =

@@ -1,6 +1,7 @@
 //! The cases that compete to explain the observations.
 
 use crate::effect::{Case, Effect, Observable};
+use crate::effects::Formula;
 use crate::survey::Survey;
 use std::borrow::Cow;
 
@@ -9,6 +10,8 @@ pub(crate) struct Candidate<'a> {
     pub effect: usize,
     pub id: &'a str,
     pub case: &'a Case,
+    /// The formula that it is, for a law that was searched for.
+    pub formula: Option<Formula>,
 }
 
 /// A case with the number and identifier of its effect.
@@ -17,6 +20,8 @@ pub(crate) struct CatalogueCase {
     pub effect: usize,
     pub id: Cow<'static, str>,
     pub case: Case,
+    /// The formula that it is, for a law that was searched for.
+    pub formula: Option<Formula>,
 }
 
 /// All cases of some effects, each with a slot for its tables.
@@ -26,15 +31,27 @@ pub(crate) fn cases(effects: &[Box<dyn Effect>], survey: &Survey) -> Vec<Catalog
         let id = own.id();
         for mut case in own.cases(survey) {
             case.slot = Some(all.len());
-            all.push(CatalogueCase { effect, id: id.clone(), case });
+            all.push(CatalogueCase { effect, id: id.clone(), case, formula: None });
         }
     }
     all
 }
 
 /// The cases as candidates.
-pub(crate) fn candidates(cases: &[CatalogueCase]) -> Vec<Candidate<'_>> {
-    cases.iter().map(|own| Candidate { effect: own.effect, id: &own.id, case: &own.case }).collect()
+pub(crate) fn candidates<'a>(cases: &'a [CatalogueCase]) -> Vec<Candidate<'a>> {
+    let one = |own: &'a CatalogueCase| {
+        let CatalogueCase { effect, id, case, formula } = own;
+        Candidate { effect: *effect, id, case, formula: *formula }
+    };
+    cases.iter().map(one).collect()
+}
+
+/// What a candidate pays for being one of many, in nats: each case of an effect is as probable beforehand as the others, and a formula as
+/// probable as the grammar says.
+pub(crate) fn price(candidates: &[Candidate<'_>], candidate: usize) -> f64 {
+    let own = &candidates[candidate];
+    let count = || candidates.iter().filter(|c| c.effect == own.effect).count() as f64;
+    own.formula.map_or_else(|| count().ln(), |formula| -formula.ln_prior)
 }
 
 /// The chosen cases that take part in one fit, in their order.
@@ -68,19 +85,22 @@ pub(crate) struct EffectScore {
     pub d_prime: f64,
 }
 
-/// Evidence by effect, the strongest first. An effect with many cases pays for their number.
+/// Evidence by effect, the strongest first. An effect with many cases pays for their number, a formula for its length.
 pub(crate) fn by_effect(candidates: &[Candidate<'_>], effects: usize, scores: &[Score]) -> Vec<EffectScore> {
     let mut found: Vec<EffectScore> = Vec::new();
     for effect in 0..effects {
-        let own: Vec<&Score> = scores.iter().filter(|s| candidates[s.candidate].effect == effect).collect();
-        let count = candidates.iter().filter(|c| c.effect == effect).count();
-        let Some(best) = own.iter().max_by(|a, b| a.nats.total_cmp(&b.nats)) else { continue };
-        let sum: f64 = own.iter().map(|s| (s.nats - best.nats).exp()).sum();
+        let own: Vec<(&Score, f64)> = scores
+            .iter()
+            .filter(|s| candidates[s.candidate].effect == effect)
+            .map(|s| (s, s.nats - price(candidates, s.candidate)))
+            .collect();
+        let Some((best, most)) = own.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
+        let sum: f64 = own.iter().map(|(_, nats)| (nats - most).exp()).sum();
         found.push(EffectScore {
             effect,
             id: candidates[best.candidate].id.to_owned(),
             best: best.candidate,
-            nats: best.nats + sum.ln() - (count as f64).ln(),
+            nats: most + sum.ln(),
             d_prime: best.d_prime,
         });
     }

@@ -82,6 +82,8 @@ pub(crate) struct Predicted {
     pub held_out: Option<HeldOut>,
     /// Of each cause.
     pub gains: Vec<HeldOutGain>,
+    /// Of each cause, summed over all bins of the receivers that were left out, in nats.
+    pub gains_nats: Vec<f64>,
     /// Whether every group of positions that was left out gains by each cause.
     pub gains_everywhere: Vec<bool>,
     /// Error of decay curves at positions left out without and with each cause, in dB, in the octaves above the Schroeder frequency; in all
@@ -270,6 +272,7 @@ fn summary(baseline: &Baseline, causes: usize, folds: &Folds, splits: &[SplitGai
     Predicted {
         held_out: Some(held_out),
         gains,
+        gains_nats: (0..causes).map(|i| splits.iter().map(|s| s.each[i]).sum()).collect(),
         diffuse_rmse_db,
         gains_everywhere: (0..causes).map(|i| splits.iter().all(|s| s.each[i] > 0.0)).collect(),
         decays: splits.iter().flat_map(curves).collect(),

@@ -8,6 +8,7 @@ pub(crate) mod cross_validation;
 pub(crate) mod direct_evidence;
 pub(crate) mod isolability;
 pub(crate) mod lack_of_fit;
+pub(crate) mod law_search;
 pub(crate) mod prediction;
 pub(crate) mod ray_dependence;
 pub(crate) mod search;

@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::infer::arrival_fits::{ArrivalFit, ArrivalFits};
 use crate::infer::baseline::Baseline;
 use crate::infer::candidates::{
-    Candidate, CatalogueCase, EffectScore, Score, by_effect, candidates, cases_of,
+    Candidate, CatalogueCase, EffectScore, Score, by_effect, candidates, cases_of, price,
 };
 use crate::infer::direct_evidence;
 use crate::infer::direct_evidence::Fitted;
@@ -231,10 +231,9 @@ impl<'a> Search<'a> {
         self.baseline.config.naming_nats + (self.effects.max(1) as f64).ln()
     }
 
-    /// What a candidate pays for the number of cases of its effect, in nats.
+    /// What a candidate pays for the number of cases of its effect, or for its formula, in nats.
     pub fn price(&self, candidate: usize) -> f64 {
-        let effect = self.candidates[candidate].effect;
-        (self.candidates.iter().filter(|c| c.effect == effect).count() as f64).ln()
+        price(&self.candidates, candidate)
     }
 
     /// Others that explain the same as well: those near in evidence that add nothing beside the best, as the best adds
@@ -291,11 +290,14 @@ impl<'a> Search<'a> {
         for score in near {
             found.push((score, evidence(&[score.candidate])?));
         }
-        found.sort_by(|a, b| b.1.total_cmp(&a.1));
+        // Cases of one price, or formulas, the longer of which pay more.
+        let paid = |(score, nats): &(&Score, f64)| nats - self.price(score.candidate);
+        found.sort_by(|a, b| paid(b).total_cmp(&paid(a)));
         let (&Score { candidate: best, d_prime, .. }, most) = found[0];
         let worth_a_name = self.threshold() + self.price(best);
         let mut as_good = Vec::new();
-        for (other, nats) in found[1..].iter().filter(|(_, nats)| most - nats < RIVAL_NATS) {
+        let top = paid(&found[0]);
+        for (other, nats) in found[1..].iter().filter(|one| top - paid(one) < RIVAL_NATS) {
             let both = evidence(&[best, other.candidate])?;
             if both - most < worth_a_name && both - nats < worth_a_name {
                 as_good.push(other.candidate);

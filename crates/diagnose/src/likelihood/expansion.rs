@@ -26,6 +26,23 @@ impl Expansion {
         self.shared.set_column(place, &moved);
     }
 
+    /// Columns `(datum, column)` over the covariance V of the data: V^-1 X.
+    pub fn over_covariance(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        let weighted = |m: &DMatrix<f64>| {
+            let mut out = m.clone();
+            out.column_iter_mut().for_each(|mut column| column.component_mul_assign(&self.weights));
+            out
+        };
+        let weighted_shared = weighted(&self.shared);
+        let among = DMatrix::identity(self.shared.ncols(), self.shared.ncols())
+            + self.shared.tr_mul(&weighted_shared);
+        let onto = weighted_shared.tr_mul(columns);
+        match among.cholesky() {
+            Some(factor) => weighted(columns) - weighted_shared * factor.solve(&onto),
+            None => DMatrix::from_element(columns.nrows(), columns.ncols(), f64::NAN),
+        }
+    }
+
     /// Products of columns `(datum, column)` over the covariance V of the data: X' V^-1 X (Woodbury 1950: what is shared is taken off
     /// what the data say one by one).
     pub fn products(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
@@ -71,7 +88,8 @@ mod tests {
             + &gain * gain.transpose();
         one.owning(1, 0.8);
         assert!(one.slopes.column(1).amax() == 0.0);
-        let expected = columns.transpose() * covariance.try_inverse().unwrap() * &columns;
-        assert!((one.products(&columns) - expected).amax() < 1e-12);
+        let expected = covariance.try_inverse().unwrap() * &columns;
+        assert!((one.over_covariance(&columns) - &expected).amax() < 1e-12);
+        assert!((one.products(&columns) - columns.transpose() * expected).amax() < 1e-12);
     }
 }

@@ -85,6 +85,8 @@ pub(crate) fn compose(
             tests: lack_after.tests.iter().map(fit_test).collect(),
         },
         causes,
+        laws: Vec::new(),
+        law_search: None,
         would_decide: words_that_decide(effects, &alternatives),
         alternatives,
         candidates,

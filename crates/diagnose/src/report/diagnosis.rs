@@ -15,6 +15,8 @@ pub enum Verdict {
     Adequate,
     /// One or more causes are named.
     Explained,
+    /// A law that no catalogue lists is named, by itself or beside causes that are listed; see [`Diagnosis::laws`].
+    Law,
     /// Several causes explain the misfit alike; see [`Diagnosis::alternatives`] and [`Diagnosis::would_decide`].
     Ambiguous,
     /// Something is wrong that no effect of the catalogue explains.
@@ -26,6 +28,7 @@ impl fmt::Display for Verdict {
         f.write_str(match self {
             Self::Adequate => "adequate",
             Self::Explained => "explained",
+            Self::Law => "law",
             Self::Ambiguous => "ambiguous",
             Self::Unexplained => "unexplained",
         })
@@ -136,6 +139,78 @@ pub struct Cause {
     /// there more probable by less than one nat: what the data resolve, and no ear.
     #[serde(default)]
     pub slight: bool,
+}
+
+/// A law that was searched for, found, and tried at positions that had no say in its choice.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct FoundLaw {
+    /// Identifier, as in the extended model.
+    pub id: String,
+    /// What it acts on: `path`, `reflection` or `recorder`.
+    pub target: String,
+    /// The material, for a law of reflections.
+    #[serde(default)]
+    pub surface: Option<String>,
+    /// The formula as it is rendered, in dB.
+    pub formula: String,
+    /// The same in words.
+    pub words: String,
+    /// Parameters of the formula; ends are those of 90 % intervals, and the value itself where it was not fitted.
+    pub parameters: Vec<FoundParameter>,
+    /// Evidence for it beside the other causes, its parameters integrated out, in nats.
+    pub evidence_nats: f64,
+    /// What it pays for being one formula of many, in nats: minus the logarithm of its probability beforehand.
+    pub prior_nats: f64,
+    /// Probability that the best of all formulas does as well, by simulation, where none is at work.
+    pub family_p: f64,
+    /// Logarithm of how much more probable it makes the responses of the vault, predicted from all others, in nats; `None` without a vault.
+    pub vault_gain_nats: Option<f64>,
+    /// By how much it leads the best sham, in nats; `None` where there is none.
+    #[serde(default)]
+    pub sham_nats: Option<f64>,
+    /// Formulas that do as well here, the best first, 20 at most: within 3 nats, or the same in the bins that were measured.
+    #[serde(default)]
+    pub not_told_from: Vec<String>,
+    /// What is left without it, against its covariate.
+    #[serde(default)]
+    pub points: Vec<LawPoint>,
+}
+
+/// The mean over bins of like values of what a law goes with, in the octaves in which it is at least half as strong as at its strongest.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct LawPoint {
+    /// What the law goes with: the mean over the paths of the bins, by energy; over all their meetings, for a law of reflections.
+    pub covariate: f64,
+    /// Measured over predicted energy in dB, the law left out and all else as fitted beside it.
+    pub left_db: f64,
+    /// Half the width of its 90 % interval, in dB.
+    pub half_width_db: f64,
+    /// What the law says, in dB.
+    pub law_db: f64,
+    /// Whether the bins are of receivers that no fit has seen.
+    pub vault: bool,
+}
+
+/// The search for a law that no catalogue lists.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct LawSearch {
+    /// Receivers, by name, that no fit of the search saw; none where fewer than six are measured.
+    pub vault: Vec<String>,
+    /// Laws that were chosen and did not stand: formula, and why.
+    pub fallen: Vec<FallenLaw>,
+}
+
+/// A law that was chosen and did not stand.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct FallenLaw {
+    /// The formula.
+    pub formula: String,
+    /// Why it is not named, in words.
+    pub reason: String,
 }
 
 /// How much speaks for one effect of the catalogue.
@@ -252,6 +327,10 @@ pub struct Diagnosis {
     pub lack_of_fit: LackOfFit,
     /// Selection causes, in the order in which they were found. For [`Verdict::Ambiguous`] the last one stands for the set.
     pub causes: Vec<Cause>,
+    /// Laws among the causes that no catalogue lists, in the same order.
+    pub laws: Vec<FoundLaw>,
+    /// What became of the search for such laws, where there was one.
+    pub law_search: Option<LawSearch>,
     /// Effects that explain as much as the last cause: the set of which one is at work.
     pub alternatives: Vec<String>,
     /// Measurements that would decide, in plain words.

@@ -1,7 +1,9 @@
 //! A diagnosis as a document: the keys that `docs/versioning.md` promises.
 
 use crate::found_parameter::FoundParameter;
-use crate::report::diagnosis::{Cause, Diagnosis, FittedMaterial, HeldOutGain, ResidualCell};
+use crate::report::diagnosis::{
+    Cause, Diagnosis, FittedMaterial, FoundLaw, HeldOutGain, LawPoint, ResidualCell,
+};
 use serde::ser::{Serialize, SerializeMap, SerializeStruct, Serializer};
 
 /// Pairs as a map, in their order.
@@ -62,6 +64,43 @@ impl<'a> CauseEntry<'a> {
     }
 }
 
+#[derive(serde::Serialize)]
+struct LawEntry<'a> {
+    id: &'a str,
+    target: &'a str,
+    surface: Option<&'a str>,
+    formula: &'a str,
+    words: &'a str,
+    parameters: ByName<'a, ParameterEntry<'a>>,
+    evidence_nats: f64,
+    prior_nats: f64,
+    family_p: f64,
+    vault_gain_nats: Option<f64>,
+    sham_nats: Option<f64>,
+    not_told_from: &'a [String],
+    points: &'a [LawPoint],
+}
+
+impl<'a> LawEntry<'a> {
+    fn of(law: &'a FoundLaw) -> Self {
+        Self {
+            id: &law.id,
+            target: &law.target,
+            surface: law.surface.as_deref(),
+            formula: &law.formula,
+            words: &law.words,
+            parameters: ByName(law.parameters.iter().map(ParameterEntry::of).collect()),
+            evidence_nats: law.evidence_nats,
+            prior_nats: law.prior_nats,
+            family_p: law.family_p,
+            vault_gain_nats: law.vault_gain_nats,
+            sham_nats: law.sham_nats,
+            not_told_from: &law.not_told_from,
+            points: &law.points,
+        }
+    }
+}
+
 /// Parameters, materials and seconds by name, residuals as the mean over all responses. Decay curves are left out, and so is the extended
 /// model, which has a file of its own.
 impl Serialize for Diagnosis {
@@ -69,11 +108,13 @@ impl Serialize for Diagnosis {
         let materials: Vec<(&str, &FittedMaterial)> = self.materials.iter().map(|(n, m)| (&**n, m)).collect();
         let seconds: Vec<(&str, f64)> = self.seconds.iter().map(|(stage, s)| (&**stage, *s)).collect();
         let mean: Vec<&ResidualCell> = self.residuals.iter().filter(|c| c.response.is_none()).collect();
-        let mut document = serializer.serialize_struct("Diagnosis", 14)?;
+        let mut document = serializer.serialize_struct("Diagnosis", 16)?;
         document.serialize_field("bands_hz", &self.bands.iter_hz().collect::<Vec<f64>>())?;
         document.serialize_field("verdict", &self.verdict)?;
         document.serialize_field("lack_of_fit", &self.lack_of_fit)?;
         document.serialize_field("causes", &self.causes.iter().map(CauseEntry::of).collect::<Vec<_>>())?;
+        document.serialize_field("laws", &self.laws.iter().map(LawEntry::of).collect::<Vec<_>>())?;
+        document.serialize_field("law_search", &self.law_search)?;
         document.serialize_field("alternatives", &self.alternatives)?;
         document.serialize_field("would_decide", &self.would_decide)?;
         document.serialize_field("candidates", &self.candidates)?;
@@ -93,7 +134,7 @@ mod tests {
     #![allow(clippy::unwrap_used)] // a panic is how a test fails
     use super::*;
     use crate::extend::extended_model::ExtendedModel;
-    use crate::report::diagnosis::{FitTest, LackOfFit, Verdict};
+    use crate::report::diagnosis::{FitTest, LackOfFit, LawSearch, Verdict};
     use sabine_acoustics::Bands;
 
     #[test]
@@ -142,6 +183,22 @@ mod tests {
                 slight: false,
                 other_subjects: vec!["r3".into()],
             }],
+            laws: vec![FoundLaw {
+                id: "grazing_wall".into(),
+                target: "reflection".into(),
+                surface: Some("wall".into()),
+                formula: "-a".into(),
+                words: "It takes.".into(),
+                parameters: vec![parameter("a")],
+                evidence_nats: 12.0,
+                prior_nats: 5.0,
+                family_p: 0.0025,
+                vault_gain_nats: None,
+                sham_nats: Some(9.0),
+                not_told_from: vec!["-b".into()],
+                points: Vec::new(),
+            }],
+            law_search: Some(LawSearch { vault: vec!["r1".into()], fallen: Vec::new() }),
             alternatives: Vec::new(),
             would_decide: Vec::new(),
             candidates: Vec::new(),
@@ -162,6 +219,10 @@ mod tests {
         let cause = table["causes"][0].as_table().unwrap();
         assert_eq!(cause["parameters"]["latency"]["unit"].as_str(), Some("ms"));
         assert_eq!(cause["parameters"]["latency"]["high"].as_float(), Some(2.0));
+        let law = table["laws"][0].as_table().unwrap();
+        assert_eq!(law["parameters"]["a"]["high"].as_float(), Some(2.0));
+        assert!(law["surface"].as_str() == Some("wall") && !law.contains_key("vault_gain_nats"));
+        assert_eq!(table["law_search"]["vault"][0].as_str(), Some("r1"));
         assert_eq!(table["materials"]["wall"]["absorption"][0].as_float(), Some(0.3));
         assert_eq!(table["seconds"]["trace"].as_float(), Some(0.5));
         assert_eq!(table["residuals"].as_array().unwrap().len(), 1);

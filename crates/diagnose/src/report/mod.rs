@@ -3,6 +3,7 @@
 pub(crate) mod composition;
 pub(crate) mod diagnosis;
 mod document;
+pub(crate) mod found_laws;
 pub(crate) mod found_parameters;
 pub(crate) mod notes;
 mod recording_order;

@@ -101,6 +101,11 @@ impl<'a> TracedPairView<'a> {
         self.room
     }
 
+    /// Its index.
+    pub(crate) fn index(&self) -> usize {
+        self.index
+    }
+
     /// What the survey says of it.
     pub fn response(&self) -> &'a SurveyedResponse {
         &self.room.survey.responses[self.index]

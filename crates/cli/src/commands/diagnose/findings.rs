@@ -1,8 +1,8 @@
 //! What a diagnosis found, as the report shows it and as JSON.
 
 use sabine::diagnose::{
-    CandidateScore, Cause, DecayCurves, Diagnosis, FittedMaterial, HeldOut, Isolability, LackOfFit,
-    ResidualCell, Verdict,
+    CandidateScore, Cause, DecayCurves, Diagnosis, FittedMaterial, FoundLaw, HeldOut, Isolability, LackOfFit,
+    LawSearch, ResidualCell, Verdict,
 };
 use serde::{Deserialize, Serialize};
 
@@ -19,6 +19,10 @@ pub struct Findings {
     pub verdict: Verdict,
     pub lack_of_fit: LackOfFit,
     pub causes: Vec<Cause>,
+    #[serde(default)]
+    pub laws: Vec<FoundLaw>,
+    #[serde(default)]
+    pub law_search: Option<LawSearch>,
     pub alternatives: Vec<String>,
     pub would_decide: Vec<String>,
     pub candidates: Vec<CandidateScore>,
@@ -49,6 +53,8 @@ impl Findings {
             verdict: diagnosis.verdict,
             lack_of_fit: diagnosis.lack_of_fit,
             causes: diagnosis.causes,
+            laws: diagnosis.laws,
+            law_search: diagnosis.law_search,
             alternatives: diagnosis.alternatives,
             would_decide: diagnosis.would_decide,
             candidates: diagnosis.candidates,

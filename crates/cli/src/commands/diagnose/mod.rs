@@ -6,6 +6,7 @@ mod bars;
 mod drawing;
 mod findings;
 mod held_out;
+mod laws;
 mod look_alikes;
 mod report;
 #[cfg(test)]
@@ -167,6 +168,14 @@ fn print_findings(findings: &Findings, out: &Path) {
                 gain.db_rmse_before, gain.db_rmse_after
             );
         }
+    }
+    for law in &findings.laws {
+        println!("law: {}", law.words);
+        println!("  {}", law.formula);
+        let vault = law
+            .vault_gain_nats
+            .map_or(String::new(), |gain| format!(", {gain:.1} nats at positions set aside"));
+        println!("  as good by chance with probability {:.4} at most{vault}", law.family_p);
     }
     if !findings.alternatives.is_empty() {
         println!("one of: {}", findings.alternatives.join(", "));

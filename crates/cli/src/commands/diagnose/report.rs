@@ -7,7 +7,7 @@ use super::words::{
     capital, effect, effect_of, headline, hertz, in_band, interval, meaning, named, number, parameter,
     plan_command, sentence,
 };
-use super::{held_out, look_alikes};
+use super::{held_out, laws, look_alikes};
 use crate::chart::{Chart, Look, Scale, Series};
 use crate::failure::Failure;
 use crate::page::{Page, escape};
@@ -49,6 +49,7 @@ pub fn html(findings: &Findings, drawing: Option<&str>) -> Result<String> {
     page.warnings(&findings.notes);
     next_measurements(&mut page, findings);
     parameters(&mut page, findings)?;
+    laws::section(&mut page, findings)?;
     if let Some(drawing) = drawing {
         page.heading("Where to look in the room");
         page.markup(drawing);

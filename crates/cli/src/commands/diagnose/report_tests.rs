@@ -76,3 +76,40 @@ fn each_verdict_says_what_it_means() {
     assert!(page.contains("none of the known causes explains"));
     assert!(!page.contains("After: with what was found"));
 }
+
+#[test]
+fn a_law_is_told_with_its_trials_and_drawn_through_what_is_left_without_it() {
+    let point = |x: f64, vault: bool| json!({ "covariate": x, "left_db": -4.0 * x, "half_width_db": 0.5, "law_db": -4.0 * x, "vault": vault });
+    let points =
+        [point(0.1, false), point(0.5, false), point(0.9, false), point(0.3, true), point(0.8, true)];
+    let amplitude = json!({ "name": "a", "value": 4.0, "low": 3.0, "high": 5.0, "unit": "dB" });
+    let law = json!({ "id": "grazing_carpet", "target": "reflection", "surface": "carpet", "formula": "-a * (1 - cos_incidence)^2",
+        "words": "Each meeting with <carpet> loses.", "parameters": [amplitude], "evidence_nats": 30.0, "prior_nats": 5.0, "family_p": 0.0025,
+        "vault_gain_nats": 7.25, "sham_nats": 12.0, "not_told_from": ["cos_incidence^2"], "points": points });
+    let search = json!({ "vault": ["r2", "r5"], "fallen": [{ "formula": "-b * x", "reason": "a sham does as well" }] });
+    let page = html(&findings("law", &json!({ "laws": [law], "law_search": search })), None).unwrap();
+    for part in [
+        "A law that no catalogue lists",
+        "Each meeting with &lt;carpet&gt; loses.",
+        "<code>-a * (1 - cos_incidence)^2</code>",
+        "4.0 dB (90 %: 3.0 to 5.0)",
+        "probability 0.0025 at most",
+        "7.2 nats",
+        "12.0 nats",
+        "Formulas that do as well at these positions: 1<",
+        "positions set aside",
+        "A sham does as well.",
+        "to confirm what it finds: r2, r5.",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    // The vault has a colour of its own.
+    let drawn = &page[page.find("The search for a law").unwrap()..];
+    assert!(drawn.contains("#0072B2") && drawn.contains("#D55E00"));
+    let none = html(
+        &findings("adequate", &json!({ "causes": [], "law_search": { "vault": [], "fallen": [] } })),
+        None,
+    )
+    .unwrap();
+    assert!(none.contains("No law that no catalogue lists is named.") && none.contains("six are needed"));
+}

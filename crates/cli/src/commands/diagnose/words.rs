@@ -54,6 +54,7 @@ pub fn headline(findings: &Findings) -> String {
     match findings.verdict {
         Verdict::Adequate => "The simulation explains this measurement.".to_owned(),
         Verdict::Explained => format!("Found: {}.", names.join("; ")),
+        Verdict::Law => format!("A law that no catalogue lists: {}.", names.join("; ")),
         Verdict::Ambiguous => {
             format!(
                 "Something is wrong, and this measurement cannot say which of {} causes it is.",
@@ -86,7 +87,7 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
             "What is left between simulation and measurement is no more than chance leaves in such a measurement ({}). Nothing needs to be added.",
             p_value(fit.p_value)
         )),
-        Verdict::Explained => {
+        Verdict::Explained | Verdict::Law => {
             told.push(if fit.p_value < UNLIKELY {
                 format!("Chance does not explain what was measured ({}).", p_value(fit.p_value))
             } else {
@@ -96,6 +97,7 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
                 )
             });
             told.extend(findings.causes.iter().map(|c| c.explanation.clone()));
+            told.extend(findings.laws.iter().map(|law| law.words.clone()));
             told.push(if fit.p_value_explained >= UNLIKELY {
                 "With that in the model, what is left is no more than chance.".to_owned()
             } else {
@@ -145,7 +147,7 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
     if !failed.is_empty() && fit.p_value_explained < UNLIKELY {
         told.push(format!("What chance does not explain: {}.", failed.join("; ")));
     }
-    if let (Verdict::Unexplained | Verdict::Ambiguous | Verdict::Explained, Some(place)) =
+    if let (Verdict::Unexplained | Verdict::Ambiguous | Verdict::Explained | Verdict::Law, Some(place)) =
         (findings.verdict, worst_place(findings, findings.verdict == Verdict::Unexplained))
     {
         told.push(place);

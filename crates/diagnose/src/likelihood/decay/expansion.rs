@@ -4,6 +4,7 @@ use super::EnergyModel;
 use super::offsets::{BandBins, Directions};
 use super::pair_likelihood::ComparedBand;
 use crate::likelihood::expansion::Expansion;
+use crate::statistics::HUBER_LOG_RATIO;
 use nalgebra::{DMatrix, DVector};
 
 impl EnergyModel<'_> {
@@ -28,6 +29,31 @@ impl EnergyModel<'_> {
             shared: Directions::new(&bins).matrix(count),
             slopes,
         }
+    }
+
+    /// What the bins of a pair, in the order of [`EnergyModel::expansion`], pull at the prediction: the slope of the log-likelihood with the
+    /// logarithm of each predicted energy, levels, drift and the tracer's chance where they are most probable.
+    pub fn pulls(&self, values: &[f64], pair: usize) -> DVector<f64> {
+        let compared = self.compared_bands(values, pair, false);
+        let bins: Vec<BandBins<'_>> = compared.iter().map(ComparedBand::bins).collect();
+        let offsets = Directions::new(&bins).top();
+        let of_band = |(own, offset): (&BandBins<'_>, &Vec<f64>)| -> Vec<f64> {
+            let each = own.ln_ratio.iter().zip(offset).zip(own.shapes);
+            each.map(|((z, offset), shape)| shape * ((z - offset).min(HUBER_LOG_RATIO).exp() - 1.0)).collect()
+        };
+        let all: Vec<f64> = bins.iter().zip(&offsets.of).flat_map(of_band).collect();
+        DVector::from_vec(all)
+    }
+
+    /// The compared bands of a pair and how many bins of each, in the order of [`EnergyModel::expansion`].
+    pub fn rows_of(&self, pair: usize) -> Vec<(usize, usize)> {
+        let bands = 0..self.data.survey.bands.len();
+        bands.filter_map(|band| Some((band, self.compared(pair, band)?.len()))).collect()
+    }
+
+    /// The parameter that is the gain of the response which holds a pair, in dB.
+    pub fn gain_of(&self, pair: usize) -> usize {
+        self.layout.gain(self.assignment[pair])
     }
 
     /// Predicted logarithms of all compared bins of a pair, in the order of [`EnergyModel::expansion`].
@@ -70,6 +96,11 @@ mod tests {
             let size = slopes.information.amax();
             assert!(size > 1.0 && (found - slopes.information).amax() < 1e-9 * size);
             assert_eq!(one.predicted, model.prediction(&values, pair));
+            // What bins pull at the prediction is the slope of the likelihood.
+            let pulled = one.slopes.tr_mul(&model.pulls(&values, pair));
+            assert!((pulled - &slopes.gradient).amax() < 1e-9 * slopes.gradient.amax());
+            let rows: usize = model.rows_of(pair).iter().map(|(_, count)| count).sum();
+            assert_eq!(rows, one.predicted.len());
         }
     }
 }

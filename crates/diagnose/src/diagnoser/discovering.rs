@@ -1,0 +1,195 @@
+//! A diagnosis that looks for laws beside the catalogue.
+
+use super::{Diagnoser, Prepared, Task, Weighed};
+use crate::effect::Effect;
+use crate::effects::UnknownLaw;
+use crate::error::Error;
+use crate::infer::confirmation::{Confirmation, Doubt, confirm};
+use crate::infer::law_search::shortlist::shortlist;
+use crate::infer::law_search::trial::{Trial, trials};
+use crate::infer::law_search::vault;
+use crate::infer::ray_dependence::could_be_chance;
+use crate::infer::search::Search;
+use crate::infer::selection::select;
+use crate::report::diagnosis::{Diagnosis, FallenLaw, LawSearch, Verdict};
+use crate::report::found_laws::{found_law, law_of, reason};
+use sabine_acoustics::Observer;
+use sabine_scene::MeasuredRoom;
+
+/// Whether a candidate is a law that was searched for.
+fn is_law(id: &str) -> bool {
+    id == UnknownLaw.id()
+}
+
+impl Diagnoser {
+    /// Whether it looks for laws.
+    pub(super) fn looks_for_laws(&self) -> bool {
+        self.effects.iter().any(|effect| is_law(&effect.id()))
+    }
+
+    /// Looks for laws beside the catalogue with the vault left out of everything, and opens it for those that were named. Where none stands,
+    /// the answer is that of a diagnosis of all positions that looks for none.
+    pub(super) fn discovered(
+        &self,
+        room: &MeasuredRoom,
+        held: &[usize],
+        observer: &dyn Observer,
+    ) -> Result<Diagnosis, Error> {
+        let measured = room.responses().iter().map(|r| r.receiver).filter(|r| !held.contains(r));
+        let vault = vault::draw(measured, self.config.seed);
+        let names = |receivers: &[usize]| receivers.iter().map(|&r| room.receivers()[r].id.clone()).collect();
+        let mut told = LawSearch { vault: names(&vault), fallen: Vec::new() };
+        let task = Task { room, held, vault: &vault, laws: true, effects: self.effects.len() };
+        let (mut weighed, mut confirmed) = self.found(&task, observer)?;
+        let effects = task.effects;
+        let laws: Vec<usize> = laws_among(&weighed, &confirmed.state.chosen);
+        let tried = trials(&weighed.search(effects), &confirmed.state, &laws, &vault, observer)?;
+        let (standing, fallen): (Vec<Trial>, Vec<Trial>) =
+            tried.into_iter().partition(|trial| trial.fault().is_none());
+        if !fallen.is_empty() {
+            let search = weighed.search(effects);
+            told.fallen.extend(fallen.iter().filter_map(|trial| {
+                let formula = law_of(&search, &confirmed.state, trial.candidate)?.printed();
+                Some(FallenLaw { formula, reason: reason(trial) })
+            }));
+            confirmed = weighed.confirmed_without(&fallen, confirmed, (held, effects), observer)?;
+        }
+        told.fallen.extend(doubted(&weighed, &confirmed));
+        let still = laws_among(&weighed, &confirmed.state.chosen);
+        let mut diagnosis = if still.is_empty() && !vault.is_empty() {
+            let task = Task { room, held, vault: &[], laws: false, effects: effects - 1 };
+            let (weighed, confirmed) = self.found(&task, observer)?;
+            self.composed(&weighed, confirmed, task.effects, observer)?
+        } else {
+            let state = confirmed.state.clone();
+            let mut diagnosis = self.composed(&weighed, confirmed, effects, observer)?;
+            let search = weighed.search(effects);
+            for trial in standing.iter().filter(|trial| state.chosen.contains(&trial.candidate)) {
+                let rest: Vec<usize> =
+                    state.chosen.iter().copied().filter(|&c| c != trial.candidate).collect();
+                let without = search.state(&rest, Some(&state))?;
+                let nats = state.log_evidence() - without.log_evidence();
+                diagnosis.laws.extend(found_law(&search, &state, trial, nats, &vault)?);
+            }
+            diagnosis
+        };
+        if !diagnosis.laws.is_empty() && diagnosis.verdict == Verdict::Explained {
+            diagnosis.verdict = Verdict::Law;
+        }
+        diagnosis.notes.extend(notes(&told, !diagnosis.laws.is_empty()));
+        diagnosis.law_search = Some(told);
+        Ok(diagnosis)
+    }
+}
+
+impl Diagnoser {
+    /// The number of the effect that stands for laws.
+    fn law_effect(&self) -> Option<usize> {
+        self.effects.iter().position(|effect| is_law(&effect.id()))
+    }
+
+    /// Adds the most promising laws beside the baseline to the cases.
+    pub(super) fn shortlist_laws(&self, prepared: &mut Prepared, effects: usize) -> Result<(), Error> {
+        let Some(effect) = self.law_effect() else { return Ok(()) };
+        let Prepared { baseline, cases, used, .. } = prepared;
+        let state = Search::new(baseline, cases, effects, used.clone()).state(&[], None)?;
+        let slot = baseline.simulation.tables.len();
+        let more = shortlist(baseline, cases, &state, used, (effect, &UnknownLaw.id(), slot))?;
+        baseline.add_slots(more.len());
+        cases.extend(more);
+        baseline.prepare_rest(cases)
+    }
+
+    /// Looks for laws again beside what was found, for those that it had in its shadow.
+    pub(super) fn searched_beside(
+        &self,
+        mut weighed: Weighed,
+        task: &Task<'_>,
+        observer: &dyn Observer,
+    ) -> Result<Weighed, Error> {
+        let Some(effect) = self.law_effect() else { return Ok(weighed) };
+        let chosen = weighed.found.chosen.clone();
+        let room_left = chosen.len() < weighed.given.len() + self.config.most_causes;
+        if chosen.is_empty() || !room_left || !weighed.found.rivals.is_empty() {
+            return Ok(weighed);
+        }
+        let state = weighed.search(task.effects).state(&chosen, None)?;
+        let Weighed { baseline, cases, used, found, arrival_fits, given, .. } = &mut weighed;
+        let slot = baseline.simulation.tables.len();
+        let more = shortlist(baseline, cases, &state, used, (effect, &UnknownLaw.id(), slot))?;
+        if more.is_empty() {
+            return Ok(weighed);
+        }
+        baseline.add_slots(more.len());
+        cases.extend(more);
+        let most = baseline.config.most_causes;
+        baseline.config.most_causes = most + given.len() - chosen.len();
+        let named = std::mem::take(found);
+        let again = select(baseline, cases, task.effects, (&used[..], arrival_fits), named, observer);
+        baseline.config.most_causes = most;
+        weighed.found = again?;
+        weighed.could_be_chance = could_be_chance(&weighed.search(task.effects), &weighed.found.chosen)?;
+        Ok(weighed)
+    }
+}
+
+/// Laws that were chosen and that did not stand as causes, before any trial as laws.
+fn doubted(weighed: &Weighed, confirmed: &Confirmation) -> Vec<FallenLaw> {
+    let laws = confirmed.dropped.iter().filter(|(candidate, _)| is_law(&weighed.cases[*candidate].id));
+    let one = |(candidate, doubt): &(usize, Doubt)| FallenLaw {
+        formula: weighed.cases[*candidate].case.subject.clone().unwrap_or_default(),
+        reason: match doubt {
+            Doubt::Modes => "octaves below the Schroeder frequency alone speak for it",
+            Doubt::Rays => "it is less probable the more rays are traced",
+            Doubt::Elsewhere => "it does not help to predict positions that are left out in turn",
+        }
+        .to_owned(),
+    };
+    laws.map(one).collect()
+}
+
+/// The laws among chosen candidates.
+fn laws_among(weighed: &Weighed, chosen: &[usize]) -> Vec<usize> {
+    chosen.iter().copied().filter(|&c| is_law(&weighed.cases[c].id)).collect()
+}
+
+impl Weighed {
+    /// What stands without some laws.
+    fn confirmed_without(
+        &mut self,
+        fallen: &[Trial],
+        before: Confirmation,
+        (held, effects): (&[usize], usize),
+        observer: &dyn Observer,
+    ) -> Result<Confirmation, Error> {
+        let mut found = std::mem::take(&mut self.found);
+        fallen.iter().for_each(|trial| found.drop(trial.candidate));
+        let confirmed = confirm(&self.search(effects), &mut found, held, observer);
+        self.found = found;
+        let mut confirmed = confirmed?;
+        confirmed.dropped.splice(0..0, before.dropped);
+        Ok(confirmed)
+    }
+}
+
+/// What must be said of the search.
+fn notes(told: &LawSearch, named: bool) -> Vec<String> {
+    let mut notes: Vec<String> = told
+        .fallen
+        .iter()
+        .map(|law| format!("A law was found and is not named, for {}: {}.", law.reason, law.formula))
+        .collect();
+    if told.vault.is_empty() {
+        notes.push(
+            "Fewer than six receivers: none could be set aside from the search for laws, and no law is confirmed at positions that had no \
+             say in its choice."
+                .to_owned(),
+        );
+    } else if named {
+        notes.push(format!(
+            "No fit has seen the responses at {}: they were set aside to confirm the law. Figures of everything else are without them, too.",
+            told.vault.join(", ")
+        ));
+    }
+    notes
+}

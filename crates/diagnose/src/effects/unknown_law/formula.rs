@@ -1,0 +1,217 @@
+//! One formula of the grammar, as a case that is fitted.
+
+use super::band_law::{BandLaw, BandTerm};
+use super::covariate::{Covariate, covariates};
+use crate::effect::{Case, DecayTerm, FittedCase, Parameter, Stage};
+use crate::effects::law_effect::tabulated_law::TabulatedLaw;
+use crate::extend::model_change::ModelChange;
+use crate::simulate::tables::{Tables, Unprepared};
+use crate::simulate::traced_views::TracedRoomView;
+use crate::simulate::views::BandView;
+use crate::survey::Survey;
+use sabine_acoustics::Bands;
+use sabine_paths::laws::{Law, LawError, LawParameter, LawTarget};
+
+/// A covariate (index) and how its amplitude goes with the octave.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Formula {
+    pub covariate: usize,
+    pub bands: BandLaw,
+    /// Logarithm of its probability beforehand.
+    pub ln_prior: f64,
+}
+
+/// All formulas of a room: what they may go with, and each covariate with each band law. Their probabilities sum to one.
+pub(crate) struct Grammar {
+    pub covariates: Vec<Covariate>,
+    pub formulas: Vec<Formula>,
+}
+
+impl Grammar {
+    /// The grammar of a room.
+    pub fn of(survey: &Survey) -> Self {
+        let covariates = covariates(survey);
+        let band_laws = BandLaw::all(survey.bands().len());
+        let of_covariate = |(covariate, own): (usize, &Covariate)| {
+            let share = own.share;
+            let one = move |&(bands, of_bands): &(BandLaw, f64)| Formula {
+                covariate,
+                bands,
+                ln_prior: (share * of_bands).ln(),
+            };
+            band_laws.iter().map(one).collect::<Vec<Formula>>()
+        };
+        let formulas = covariates.iter().enumerate().flat_map(of_covariate).collect();
+        Self { covariates, formulas }
+    }
+
+    /// What a formula goes with, in words.
+    pub fn subject(&self, formula: &Formula, survey: &Survey) -> String {
+        let covariate = &self.covariates[formula.covariate];
+        format!("{}{}", covariate.words(), formula.bands.words(survey.bands()))
+    }
+
+    /// A formula as a case.
+    pub fn case(&self, formula: &Formula, survey: &Survey) -> Result<Case, LawError> {
+        let covariate = &self.covariates[formula.covariate];
+        let (least, bands) = (covariate.least_db(), formula.bands);
+        let terms = bands.terms(survey);
+        let parameter = |term: &BandTerm| {
+            let may_fall = least < 0.0 || term.name == "amplitude_per_octave";
+            let low = if may_fall { -term.most_db } else { 0.0 };
+            Parameter::new(term.name, "dB", 0.0, term.sd_db, (low, term.most_db))
+                .typically(0.3 * term.most_db)
+        };
+        let parameters: Vec<Parameter> = terms.iter().map(parameter).collect();
+        let stage = if covariate.target == LawTarget::Recorder { Stage::Recorder } else { Stage::Room };
+        let starts = starts(&parameters);
+        let law = TabulatedLaw::new(covariate.unit_law()?, 0, (least, super::MOST_DB));
+        let found = found(covariate.clone(), bands, survey.bands());
+        let changes = move |fitted: &FittedCase<'_>| {
+            let parameter = |i: usize| LawParameter::new(fitted.values()[i], fitted.interval(i), "dB");
+            let law = found(&(0..fitted.values().len()).map(parameter).collect::<Vec<_>>());
+            law.map_or_else(|_| Vec::new(), |law| vec![ModelChange::Law(Box::new(law))])
+        };
+        Ok(Case::decay(parameters, OverBands { law, shares: terms.into_iter().map(|t| t.shares).collect() })
+            .about(self.subject(formula, survey))
+            .at(stage)
+            .starting(starts)
+            .changing(changes))
+    }
+}
+
+/// Small and large amplitudes, on each side where both are sought.
+fn starts(parameters: &[Parameter]) -> Vec<Vec<f64>> {
+    let at = |first: f64, second: f64| -> Vec<f64> {
+        [first, second].into_iter().take(parameters.len()).collect()
+    };
+    let mut starts = if parameters.len() > 1 {
+        vec![at(1.0, 0.0), at(3.0, 1.0)]
+    } else {
+        let most = parameters[0].bounds.1;
+        vec![at(0.1 * most, 0.0), at(0.4 * most, 0.0)]
+    };
+    if parameters[0].bounds.0 < 0.0 {
+        starts.push(starts[0].iter().map(|x| -x).collect());
+    }
+    starts
+}
+
+/// The law of fitted parameters, in words as well.
+fn found(
+    covariate: Covariate,
+    law: BandLaw,
+    bands: Bands,
+) -> impl Fn(&[LawParameter]) -> Result<Law, LawError> + Send + Sync {
+    move |fitted| {
+        let range = (covariate.least_db(), super::MOST_DB);
+        let (factor, parameters) = law.factor(bands, fitted, range);
+        Ok(covariate.law(&factor, parameters)?.with_words(words(&covariate, law, bands, fitted)))
+    }
+}
+
+/// What a law says, in a sentence.
+fn words(covariate: &Covariate, law: BandLaw, bands: Bands, fitted: &[LawParameter]) -> String {
+    let one = match &covariate.surface {
+        Some(surface) => format!("Each meeting with {surface}"),
+        None if covariate.target == LawTarget::Recorder => "The recording".to_owned(),
+        None => "Each path".to_owned(),
+    };
+    let interval = |p: &LawParameter| format!("[{:.1}, {:.1}]", p.low, p.high);
+    let size = |p: &LawParameter| {
+        let verb = if p.value < 0.0 { "gains" } else { "loses" };
+        format!("{verb} {:.1} dB {}", p.value.abs(), interval(p))
+    };
+    let (amplitude, slope) = match law {
+        BandLaw::Octaves => (String::new(), Some(&fitted[0])),
+        BandLaw::SameAndOctaves => (format!("{} at 1 kHz", size(&fitted[0])), Some(&fitted[1])),
+        _ => (size(&fitted[0]), None),
+    };
+    let slope = slope.map_or(String::new(), |p| {
+        let and = if amplitude.is_empty() { "loses" } else { ", and" };
+        format!("{and} {:.1} dB {} more from octave to octave", p.value, interval(p))
+    });
+    let place = law.words(bands);
+    format!("{one} {amplitude}{slope} where {} is 1, and in proportion elsewhere{place}.", covariate.text())
+}
+
+/// A law whose amplitude goes with the octave.
+struct OverBands {
+    law: TabulatedLaw,
+    /// Share of each parameter in each band, `[parameter][band]`.
+    shares: Vec<Vec<f64>>,
+}
+
+impl OverBands {
+    fn amplitude_db(&self, values: &[f64], view: &BandView<'_>) -> f64 {
+        let (least, most) = self.law.range();
+        let sum: f64 = self.shares.iter().zip(values).map(|(shares, x)| shares[view.band()] * x).sum();
+        sum.clamp(least, most)
+    }
+}
+
+impl DecayTerm for OverBands {
+    fn prepare(&self, room: &TracedRoomView<'_>) -> Result<Tables, Unprepared> {
+        self.law.prepare(room)
+    }
+
+    #[cfg(test)]
+    fn by_hand(&self, bins: usize) -> Option<Box<dyn std::any::Any + Send + Sync>> {
+        Some(self.law.by_hand(bins))
+    }
+
+    fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+        self.law.apply(self.amplitude_db(values, view), view, ln_energy);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)] // a panic is how a test fails
+    use super::*;
+    use crate::hand_made;
+    use sabine_scene::{Levels, TimeZero};
+
+    #[test]
+    fn probabilities_of_all_formulas_sum_to_one() {
+        let survey = hand_made::survey(Levels::Common, TimeZero::Emission);
+        let grammar = Grammar::of(&survey);
+        let sum: f64 = grammar.formulas.iter().map(|f| f.ln_prior.exp()).sum();
+        assert!((sum - 1.0).abs() < 1e-12, "{sum}");
+        for (i, a) in grammar.formulas.iter().enumerate() {
+            let same = |b: &&Formula| (b.covariate, b.bands) == (a.covariate, a.bands);
+            assert!(!grammar.formulas[..i].iter().any(|b| same(&b)), "{a:?}");
+        }
+    }
+
+    /// What is rendered is what was fitted: the formula of each case against what the case does to energies of an octave.
+    #[test]
+    fn every_formula_renders_the_amplitude_that_was_fitted() {
+        let survey = hand_made::survey(Levels::Common, TimeZero::Emission);
+        let grammar = Grammar::of(&survey);
+        for formula in &grammar.formulas {
+            let case = grammar.case(formula, &survey).unwrap();
+            let fitted: Vec<f64> = case.parameters.iter().map(|p| 0.3 * p.bounds.1).collect();
+            let changes = case.model_changes(&FittedCase::of_values(&survey, &fitted));
+            let [ModelChange::Law(law)] = changes.as_slice() else { panic!("{changes:?}") };
+            let covariate = &grammar.covariates[formula.covariate];
+            let variable = |name: &str| match name {
+                "scatterings" | "reflections" => Some(2.0),
+                other => Some(0.4 + 0.01 * other.len() as f64),
+            };
+            let unit = covariate.unit_law().unwrap().value(variable).unwrap();
+            let terms = formula.bands.terms(&survey);
+            for (band, hz) in survey.bands().iter_hz().enumerate() {
+                let sum: f64 = terms.iter().zip(&fitted).map(|(t, x)| t.shares[band] * x).sum();
+                let expected = unit * sum.clamp(covariate.least_db(), crate::effects::unknown_law::MOST_DB);
+                let own = |name: &str| if name == "frequency_hz" { Some(hz) } else { variable(name) };
+                let found = law.value(own).unwrap();
+                assert!(
+                    (found - expected).abs() < 1e-3 * expected.abs().max(0.1),
+                    "{law:?} {hz} {found} {expected}"
+                );
+            }
+            assert!(law.words().ends_with('.') && case.starts.iter().all(|s| s.len() == fitted.len()));
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! All laws of the grammar, and their shams, beside one fit.
+
+use super::columns::{Column, Sham, ShamPlaces, columns};
+use super::family::{by_chance, largest};
+use super::features::Features;
+use super::null_model::NullModel;
+use super::screen::{ReadyTerm, Screen, ScreenPair, ScreenTerm};
+use crate::effect::Case;
+use crate::effects::{Formula, Grammar};
+use crate::infer::baseline::Baseline;
+use crate::likelihood::decay::EnergyModel;
+use crate::likelihood::laplace::{LaplaceFit, Model};
+use crate::survey::Survey;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::f64::consts::LN_10;
+
+/// Logarithm of energy in one decibel.
+const LN_PER_DB: f64 = LN_10 / 10.0;
+/// Measurements without a law that are drawn.
+const DRAWS: usize = 399;
+/// A sham that keeps so much of what it was (cosine, nuisances projected out) is none: what is the same at all positions stays when they are
+/// exchanged. Half of the information is left at 0.7.
+const SHAM_COSINE: f64 = 0.7;
+/// Laws closer than this cannot be told apart (cosine, nuisances projected out).
+const SAME_COSINE: f64 = 0.95;
+/// Laws whose evidence differs by less are not told apart, in nats.
+const SAME_NATS: f64 = 3.0;
+/// Formulas that are compared with each other, the best.
+const MAX_COMPARED: usize = 120;
+
+/// Laws beside a fit.
+pub(crate) struct LawScreen<'a> {
+    grammar: &'a Grammar,
+    screen: Screen,
+    null: NullModel,
+    /// By formula.
+    terms: Vec<ReadyTerm>,
+    /// Shams, each with the formula whose covariate it was.
+    shams: Vec<(Sham, usize, ReadyTerm)>,
+    seed: u64,
+}
+
+/// A sham that does well.
+#[derive(Clone, Debug)]
+pub(crate) struct BestSham {
+    pub words: String,
+    pub nats: f64,
+}
+
+/// Laws that explain the same: the place among the formulas of the one that speaks for them, and the evidence of the best.
+#[derive(Clone, Debug)]
+pub(crate) struct LawClass {
+    pub formula: usize,
+    pub nats: f64,
+}
+
+impl<'a> LawScreen<'a> {
+    /// Beside a fit of the decays under some cases to the responses that are used.
+    pub fn of(
+        baseline: &Baseline,
+        grammar: &'a Grammar,
+        features: &Features,
+        cases: &[&Case],
+        fit: &LaplaceFit,
+        used: &[bool],
+    ) -> Self {
+        let (data, survey) = (baseline.energy_data(), baseline.survey());
+        let model = EnergyModel::new(&data, cases, used);
+        let bands = survey.bands().len();
+        let pairs: Vec<usize> = (0..used.len()).filter(|&p| used[p]).collect();
+        let all = columns(grammar, pairs.len());
+        let seed = baseline.config.seed;
+        let places = ShamPlaces::draw(&pairs, used.len(), survey.materials().len(), seed);
+        let one = |&pair: &usize| {
+            let expansion = model.expansion(&fit.values, pair);
+            let rows = model.rows_of(pair);
+            // What terms behind the paths let through of a change along them.
+            let through = expansion.slopes.column(model.gain_of(pair)) / LN_PER_DB;
+            let mut x = DMatrix::zeros(through.len(), all.len() * bands);
+            let mut first = 0;
+            for &(band, count) in &rows {
+                for (place, column) in all.iter().enumerate() {
+                    let values = column.values((features, grammar, &places), (pair, band, count));
+                    for (bin, value) in values.into_iter().flatten().enumerate() {
+                        x[(first + bin, place * bands + band)] = -LN_PER_DB * value * through[first + bin];
+                    }
+                }
+                first += count;
+            }
+            let counts = rows.iter().map(|(_, count)| *count).collect();
+            let place = (survey.responses()[pair].receiver, counts);
+            (ScreenPair { pulls: model.pulls(&fit.values, pair), expansion, x }, place)
+        };
+        let (screened, places): (Vec<ScreenPair>, Vec<(usize, Vec<usize>)>) =
+            pairs.par_iter().map(one).unzip();
+        let null = NullModel::of(&screened, &places, model.priors().iter().map(|p| p.sd).collect());
+        let screen = Screen::new(bands, screened, &fit.covariance);
+        let (terms, shams) = terms(grammar, survey, &screen, &all);
+        Self { grammar, screen, null, terms, shams, seed }
+    }
+
+    /// Evidence of a formula (by its place), times its probability beforehand, in nats.
+    pub fn nats(&self, formula: usize) -> f64 {
+        self.screen.nats(&self.terms[formula], &self.screen.slopes)
+    }
+
+    /// All formulas, the best first.
+    fn ranked(&self) -> Vec<(usize, f64)> {
+        let mut ranked: Vec<(usize, f64)> = (0..self.terms.len()).map(|f| (f, self.nats(f))).collect();
+        ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
+        ranked
+    }
+
+    fn cosine(&self, a: usize, b: usize) -> f64 {
+        self.screen.cosine(&self.terms[a], &self.terms[b]).abs()
+    }
+
+    /// The best laws that can be told apart, at most `most`. Among those that cannot, the shortest speaks: it was the most probable beforehand.
+    pub fn classes(&self, most: usize) -> Vec<LawClass> {
+        let prior = |formula: usize| self.grammar.formulas[formula].ln_prior;
+        let mut classes: Vec<LawClass> = Vec::new();
+        for (formula, nats) in self.ranked().into_iter().take(MAX_COMPARED) {
+            let own = classes.iter().position(|class| self.cosine(class.formula, formula) > SAME_COSINE);
+            let Some(place) = own else {
+                if classes.len() < most {
+                    classes.push(LawClass { formula, nats });
+                }
+                continue;
+            };
+            let class = &mut classes[place];
+            if class.nats - nats < SAME_NATS && prior(formula) > prior(class.formula) {
+                class.formula = formula;
+            }
+        }
+        classes
+    }
+
+    /// Formulas that the data do not tell from one: as good within 3 nats, or the same in the bins that were measured.
+    pub fn not_told_from(&self, formula: usize) -> Vec<usize> {
+        let own = self.nats(formula);
+        let same = |&(other, nats): &(usize, f64)| {
+            other != formula && (own - nats < SAME_NATS || self.cosine(formula, other) > SAME_COSINE)
+        };
+        self.ranked().into_iter().take(MAX_COMPARED).filter(same).map(|(other, _)| other).collect()
+    }
+
+    /// Probability that the best of the whole family is as good as a formula where no law is at work.
+    pub fn family_p(&self, formula: usize) -> f64 {
+        let columns = self.grammar.covariates.len();
+        let drawn = largest(&self.screen, &self.terms, columns, &self.null, (DRAWS, self.seed ^ 0xFA111));
+        by_chance(self.nats(formula), &drawn)
+    }
+
+    /// The sham that does best.
+    pub fn best_sham(&self, survey: &Survey) -> Option<BestSham> {
+        let best = self
+            .shams
+            .iter()
+            .map(|(sham, formula, term)| (self.screen.nats(term, &self.screen.slopes), *sham, *formula));
+        let (nats, sham, formula) = best.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let words = self.grammar.subject(&self.grammar.formulas[formula], survey);
+        Some(BestSham { words: format!("{words}, {}", sham.words()), nats })
+    }
+}
+
+/// The terms of all formulas, and of those shams that are some.
+fn terms(
+    grammar: &Grammar,
+    survey: &Survey,
+    screen: &Screen,
+    columns: &[Column],
+) -> (Vec<ReadyTerm>, Vec<(Sham, usize, ReadyTerm)>) {
+    let term = |formula: &Formula, column: usize| {
+        let own = formula.bands.terms(survey);
+        ScreenTerm {
+            column,
+            shares: own.iter().map(|t| DVector::from_row_slice(&t.shares)).collect(),
+            sd: own.iter().map(|t| t.sd_db).collect(),
+            takes_only: !grammar.covariates[formula.covariate].both_signs,
+            ln_prior: formula.ln_prior,
+        }
+    };
+    let ready: Vec<ReadyTerm> = grammar.formulas.iter().map(|f| screen.ready(term(f, f.covariate))).collect();
+    let mut shams = Vec::new();
+    for (place, column) in columns.iter().enumerate() {
+        let Some(sham) = column.sham else { continue };
+        for (number, formula) in grammar.formulas.iter().enumerate() {
+            if formula.covariate != column.covariate {
+                continue;
+            }
+            let own = term(formula, place);
+            let direction = own.shares[0].clone();
+            if screen.cosine_of((formula.covariate, &direction), (place, &direction)).abs() < SHAM_COSINE {
+                shams.push((sham, number, screen.ready(own)));
+            }
+        }
+    }
+    (ready, shams)
+}

@@ -1,0 +1,13 @@
+//! The search for a law that no catalogue lists: a grammar of formulas is screened by score tests, the best few are fitted beside the
+//! catalogue, and what is chosen must stand trial.
+
+mod columns;
+mod family;
+mod features;
+mod law_screen;
+mod null_model;
+pub(crate) mod plot;
+mod screen;
+pub(crate) mod shortlist;
+pub(crate) mod trial;
+pub(crate) mod vault;

@@ -1,0 +1,106 @@
+//! What laws that were chosen must stand before they are named.
+
+use super::features::Features;
+use super::law_screen::{BestSham, LawScreen};
+use crate::effect::Observable;
+use crate::effects::Grammar;
+use crate::error::Error;
+use crate::infer::cross_validation::{Folds, predict};
+use crate::infer::search::{Search, State};
+use sabine_acoustics::{Observer, report};
+
+/// What a law must gain at the vault, in nats: it must make positions that had no say in its choice more probable than they are without it.
+/// Nothing more is asked, for the vault is a fourth test beside evidence, the probability of the whole family and shams, and two receivers
+/// leave few nats to weak laws.
+const LEAST_VAULT_NATS: f64 = 0.0;
+/// Probability, by chance, of as good a law anywhere in the family from which on none is named.
+const MAX_FAMILY_P: f64 = 0.01;
+/// A sham that comes as near takes the name away, in nats.
+const SHAM_NATS: f64 = 3.0;
+/// Laws that are listed as not told apart, at most.
+const MAX_LISTED: usize = 20;
+
+/// How a chosen law fared.
+#[derive(Clone, Debug)]
+pub(crate) struct Trial {
+    pub candidate: usize,
+    /// What the screen says for it beside the other causes, in nats.
+    pub nats: f64,
+    /// Probability of as good a law anywhere in the family where none is at work.
+    pub family_p: f64,
+    pub sham: Option<BestSham>,
+    /// What the data do not tell it from, in words.
+    pub not_told_from: Vec<String>,
+    /// Logarithm of how much more probable it makes the responses of the vault, predicted from all others; none without a vault, and where it
+    /// has fallen before.
+    pub vault_gain_nats: Option<f64>,
+}
+
+/// Why a law is not named.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Fault {
+    Chance,
+    Sham,
+    Vault,
+}
+
+impl Trial {
+    /// What speaks against it.
+    pub fn fault(&self) -> Option<Fault> {
+        if self.family_p > MAX_FAMILY_P {
+            Some(Fault::Chance)
+        } else if self.sham.as_ref().is_some_and(|sham| sham.nats > self.nats - SHAM_NATS) {
+            Some(Fault::Sham)
+        } else {
+            self.vault_gain_nats.filter(|gain| *gain <= LEAST_VAULT_NATS).map(|_| Fault::Vault)
+        }
+    }
+}
+
+/// Tries the chosen candidates that are laws, each beside all other causes, and opens the vault for those that stand so far: all parameters
+/// are fitted to the other responses.
+pub(crate) fn trials(
+    search: &Search<'_>,
+    state: &State,
+    laws: &[usize],
+    vault: &[usize],
+    observer: &dyn Observer,
+) -> Result<Vec<Trial>, Error> {
+    if laws.is_empty() {
+        return Ok(Vec::new());
+    }
+    let survey = search.baseline.survey();
+    let grammar = Grammar::of(survey);
+    let features = Features::gather(search.baseline, &grammar)?;
+    let mut found = Vec::new();
+    for (done, &candidate) in laws.iter().enumerate() {
+        report(observer, "trials of laws", done as u64, laws.len() as u64)?;
+        let own = search.candidates[candidate].formula;
+        let Some(formula) = grammar.formulas.iter().position(|f| Some(*f) == own) else { continue };
+        let rest: Vec<usize> = state.chosen.iter().copied().filter(|&c| c != candidate).collect();
+        let without = search.state(&rest, Some(state))?;
+        let cases = search.cases_of(&rest, Observable::Decay);
+        let screen =
+            LawScreen::of(search.baseline, &grammar, &features, &cases, &without.energy, &search.used);
+        let others = screen.not_told_from(formula).into_iter().take(MAX_LISTED);
+        found.push(Trial {
+            candidate,
+            nats: screen.nats(formula),
+            family_p: screen.family_p(formula),
+            sham: screen.best_sham(survey),
+            not_told_from: others.map(|f| grammar.subject(&grammar.formulas[f], survey)).collect(),
+            vault_gain_nats: None,
+        });
+    }
+    if vault.is_empty() || found.iter().all(|trial| trial.fault().is_some()) {
+        return Ok(found);
+    }
+    let responses = &survey.responses;
+    let gains =
+        predict(search, state, &Folds::never_fitted(responses, &search.used, vault), observer)?.gains_nats;
+    for trial in found.iter_mut().filter(|trial| trial.fault().is_none()) {
+        let place = state.chosen.iter().position(|&c| c == trial.candidate);
+        trial.vault_gain_nats = place.and_then(|place| gains.get(place).copied());
+    }
+    Ok(found)
+}
