@@ -43,9 +43,9 @@ pub struct Diagnoser {
     pub(crate) config: DiagnoseConfig,
     pub(crate) effects: Vec<Box<dyn Effect>>,
     tracer: Arc<dyn SceneTracer>,
-    /// Causes that are at work from the beginning.
-    /// The laws among them.
+    /// The laws among the effects.
     laws: Vec<Law>,
+    /// Causes that are at work from the beginning.
     given: Vec<GivenCause>,
 }
 
