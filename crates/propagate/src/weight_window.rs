@@ -182,7 +182,7 @@ impl Walker {
 }
 
 /// Draws as many walkers as there are, each as often as it carries, on average; their energies, of mean one in each octave, become less by
-/// that. One number places all draws (systematic resampling: G. Kitagawa, J. Comput. Graph. Stat. 5, 1996).
+/// that. One number places all draws (systematic resampling: G. Kitagawa, Journal of Computational and Graphical Statistics 5, 1996).
 fn resample(walkers: &mut Vec<Walker>, bands: usize, random: &mut impl Rng) {
     let carried = |w: &Walker| w.energy[..bands].iter().sum::<f64>() / bands as f64;
     let shares: Vec<f64> = walkers.iter().map(carried).collect();
