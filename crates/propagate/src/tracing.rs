@@ -209,9 +209,9 @@ impl<'a> Tracing<'a> {
         for pair in part * pairs..(part + 1) * pairs {
             // Both rays of a pair draw for the same class, and all classes get their turns within a part.
             let hero = pair % self.scene.probabilities.classes();
-            for end in 0..self.ends_in_use() {
+            for (end, walks) in walks.iter_mut().enumerate().take(self.ends_in_use()) {
                 let mut random = generator(self.config.seed, (2 * pair + end) as u64);
-                self.walk((end, hero, batch), &mut random, &mut walks[end], &mut paths);
+                self.walk((end, hero, batch), &mut random, walks, &mut paths);
             }
             until.push([walks[SOURCE].len(), walks[RECEIVER].len()]);
         }
