@@ -31,6 +31,8 @@ fn by_optimize(room: &MeasuredRoom, bands: Bands) -> Found {
         duration_s: 1.25,
         seed: 1,
         cuboid_paths: CUBOID_PATHS,
+        // The same paths as the diagnosis traces.
+        weight_window: false,
         ..TracerConfig::default()
     };
     let tracer = PathTracer::new(config).unwrap();

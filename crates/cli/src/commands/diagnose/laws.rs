@@ -12,7 +12,7 @@ pub fn section(page: &mut Page, findings: &Findings) -> Result<(), Failure> {
     let Some(search) = &findings.law_search else { return Ok(()) };
     page.heading("The search for a law");
     if findings.laws.is_empty() {
-        page.paragraph("No law that no catalogue lists is named.");
+        page.paragraph("No law is named beside the catalogue.");
     }
     for law in &findings.laws {
         let target = law.surface.as_ref().map_or(law.target.clone(), |s| format!("{} at {s}", law.target));
