@@ -111,5 +111,5 @@ fn a_law_is_told_with_its_trials_and_drawn_through_what_is_left_without_it() {
         None,
     )
     .unwrap();
-    assert!(none.contains("No law that no catalogue lists is named.") && none.contains("six are needed"));
+    assert!(none.contains("No law is named beside the catalogue.") && none.contains("six are needed"));
 }
