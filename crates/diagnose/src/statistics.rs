@@ -19,6 +19,11 @@ pub(crate) fn log_density(ln_ratio: f64) -> f64 {
     z - z.exp() + 1.0 + (1.0 - HUBER_LOG_RATIO.exp()) * (ln_ratio - z)
 }
 
+/// What a bin pulls at the logarithm of its prediction, for a shape of one: minus the slope of [`log_density`].
+pub(crate) fn pull(ln_ratio: f64) -> f64 {
+    ln_ratio.min(HUBER_LOG_RATIO).exp() - 1.0
+}
+
 /// Log-density of the logarithm of an energy that is Gamma distributed, by its mean and relative variance.
 pub(crate) fn ln_gamma_density(energy: f64, (mean, variance): (f64, f64)) -> f64 {
     let shape = 1.0 / variance;

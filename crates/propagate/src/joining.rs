@@ -1,6 +1,7 @@
 //! Paths made of a ray from the source and a ray from the receiver.
 
-use crate::tracing::{Tracing, Walk};
+use crate::ray::Walk;
+use crate::tracing::Tracing;
 use crate::vector::{along, dot, norm, sub};
 use crate::walk::visible;
 use rand::Rng;
@@ -11,23 +12,8 @@ use std::f64::consts::PI;
 const EYE_LEVEL_M: f64 = 0.01;
 
 impl Tracing<'_> {
-    /// Joins the two rays of a pair, on all their ways, along lines between points where both are scattered.
+    /// Joins the two rays of a pair, each on one of its ways, along lines between points where both are scattered.
     pub fn join(
-        &self,
-        out: &mut [Walk],
-        back: &mut [Walk],
-        batch: u8,
-        random: &mut impl Rng,
-        paths: &mut PathSet,
-    ) {
-        for out in out {
-            for back in back.iter_mut() {
-                self.join_walks(out, back, batch, random, paths);
-            }
-        }
-    }
-
-    fn join_walks(
         &self,
         out: &mut Walk,
         back: &mut Walk,

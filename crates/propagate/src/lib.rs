@@ -128,6 +128,7 @@ mod prepared_scene;
 mod pressure_renderer;
 mod pulse;
 mod random;
+mod ray;
 mod reference_tracer;
 mod render_config;
 mod renderer;

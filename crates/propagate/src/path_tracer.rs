@@ -45,8 +45,8 @@ pub struct TracerConfig {
     /// 1 cm to 10 m; it shrinks to the distance of the nearest surface.
     pub receiver_radius_m: f64,
     /// Splits rays that carry much with the scene's materials, and ends by Russian roulette most of those that carry little
-    /// (a weight window): as many rays are left where the decay is 60 dB down as at its begin, in the same time. Paths hold for
-    /// any absorption either way; far from the scene's own they scatter as without.
+    /// (a weight window), so that the late decay does not hang on the few that no absorber has met. Paths hold for any absorption
+    /// either way; which rays are many is decided by the scene's own.
     pub weight_window: bool,
     /// Adds the ways around one edge where the direct line is blocked ([`DiffractingEdges`](crate::DiffractingEdges)), so that a
     /// screen casts a shadow and not a black hole.

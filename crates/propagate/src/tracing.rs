@@ -1,24 +1,19 @@
 //! The rays of one trace, from the source and from the receiver.
 
 use crate::TracerConfig;
-use crate::event_mixture::{EventMixture, EventProbabilities};
-use crate::patches::Patch;
 use crate::prepared_scene::PreparedScene;
-use crate::random::{direction, generator, lambert};
-use crate::techniques::{Use, Ways};
+use crate::random::{direction, generator};
+use crate::ray::{Met, RECEIVER, Ray, SOURCE, Walk};
+use crate::techniques::Use;
 use crate::vector::{Vec3, dot, mirror, norm, scale, sub};
 use crate::walk::{Sphere, before_hit, next_hit, visible};
-use crate::weight_window::{Fate, MAX_BANDS, WeightWindow};
+use crate::weight_window::{Fate, WeightWindow};
 use rand::Rng;
-use sabine_paths::{Contribution, Incidence, PathSet, Reflection};
+use sabine_paths::PathSet;
 use std::f64::consts::PI;
 
-/// The ends of the paths.
-const SOURCE: usize = 0;
-const RECEIVER: usize = 1;
 /// Pairs of rays that may meet each other, at most: so many are kept in memory by each thread.
 const MOST_PAIRS: usize = 256;
-
 /// Ways on which one ray may go, at most.
 const MOST_WALKS: usize = 64;
 
@@ -36,121 +31,6 @@ pub(crate) struct Tracing<'a> {
     /// What rays from each end carry on average.
     windows: Option<[WeightWindow; 2]>,
     config: &'a TracerConfig,
-}
-
-/// A reflection of a ray.
-pub(crate) struct Arrival {
-    /// Number of reflections so far, this one included.
-    pub depth: usize,
-    /// Just before the surface.
-    pub point: Vec3,
-    /// Towards the side from which the ray came.
-    pub normal: Vec3,
-    pub material: u32,
-    /// Cosine of the angle between the ray and the normal.
-    pub cosine: f64,
-    pub travelled_m: f64,
-    /// Of the reflections before this one.
-    pub mixture: EventMixture,
-    /// Of the way to this point, which may or may not scatter.
-    pub ways: Ways,
-    pub patch: Patch,
-    /// Area of wall in the patch, if the ray is scattered there.
-    pub area_m2: Option<f64>,
-    /// Logarithm of the number of rays for which this one comes here; none if another does so that goes on otherwise.
-    pub incoming: Option<f64>,
-    /// The same after the reflection.
-    pub log_rays: f64,
-}
-
-impl Arrival {
-    /// The way to this point and on, by scattering.
-    pub fn ways_on(&self) -> Ways {
-        let mut ways = self.ways;
-        ways.scattered_on(self.area_m2.unwrap_or(0.0));
-        ways
-    }
-
-    /// Density of the reflections so far, this one being scattered.
-    pub fn mixture_on(&self, probabilities: &EventProbabilities) -> EventMixture {
-        let mut mixture = self.mixture;
-        mixture.apply(probabilities, self.material, true);
-        mixture
-    }
-}
-
-/// A ray, as far as it was followed, from the end of the paths or from where it was split off.
-pub(crate) struct Walk {
-    /// Direction in which it began at the end of the paths.
-    pub heading: Vec3,
-    /// Its own reflections.
-    pub arrivals: Vec<Arrival>,
-    /// Class of octaves whose scattering coefficients it obeys.
-    pub hero: usize,
-    /// Reflections before its own.
-    before: usize,
-    /// Chains of those, and of the first of its own, as far as a contribution has needed them.
-    chains: Vec<u32>,
-}
-
-/// A ray that is being followed from an end.
-struct Ray {
-    end: usize,
-    batch: u8,
-    walk: Walk,
-    at: Progress,
-    /// By roulette.
-    ended: bool,
-}
-
-/// A surface that a ray has met.
-struct Met {
-    /// Towards the side from which the ray came.
-    normal: Vec3,
-    material: u32,
-    cosine: f64,
-    /// Of the way to this point.
-    ways: Ways,
-    patch: Patch,
-}
-
-/// Where a ray is.
-#[derive(Clone)]
-struct Progress {
-    origin: Vec3,
-    heading: Vec3,
-    travelled_m: f64,
-    mixture: EventMixture,
-    ways: Ways,
-    ever_scattered: bool,
-    /// Since the last scattering, or the beginning: how far, from which cosine, and whether over a mirror.
-    stretch_m: f64,
-    cosine_out: f64,
-    mirrored: bool,
-    /// Energy that is left, by octave.
-    ln_energy: [f64; MAX_BANDS],
-    log_rays: f64,
-}
-
-impl Walk {
-    /// The chain of the first `depth` reflections.
-    pub fn chain(&mut self, depth: usize, paths: &mut PathSet) -> u32 {
-        while self.before + self.chains.len() <= depth {
-            let arrival = &self.arrivals[self.chains.len() - 1];
-            let scattered = arrival.area_m2.is_some();
-            let reflection = if scattered { Reflection::Scattered } else { Reflection::Specular };
-            let incidence = Incidence::Cosine(arrival.cosine);
-            let last = self.chains[self.chains.len() - 1];
-            let longer = paths.reflect_at(last, arrival.material, reflection, incidence);
-            self.chains.push(longer);
-        }
-        self.chains[depth - self.before]
-    }
-
-    /// Reflections so far.
-    fn depth(&self) -> usize {
-        self.before + self.arrivals.len()
-    }
 }
 
 impl<'a> Tracing<'a> {
@@ -220,7 +100,11 @@ impl<'a> Tracing<'a> {
             let [out, back] = &mut walks;
             for ends in until.windows(2) {
                 let of = |end: usize| ends[0][end]..ends[1][end];
-                self.join(&mut out[of(SOURCE)], &mut back[of(RECEIVER)], batch, &mut random, &mut paths);
+                for out in &mut out[of(SOURCE)] {
+                    for back in &mut back[of(RECEIVER)] {
+                        self.join(out, back, batch, &mut random, &mut paths);
+                    }
+                }
             }
             self.meet(out, back, batch, &mut random, &mut paths);
         }
@@ -263,24 +147,9 @@ impl<'a> Tracing<'a> {
         walks: &mut Vec<Walk>,
         paths: &mut PathSet,
     ) {
-        let here = &self.ends[end];
-        let heading = direction(random);
-        let start = Progress {
-            origin: here.centre,
-            heading,
-            travelled_m: 0.0,
-            mixture: EventMixture::new(self.scene.probabilities.classes()),
-            ways: Ways::new(here.radius_m),
-            ever_scattered: false,
-            stretch_m: 0.0,
-            cosine_out: 1.0,
-            mirrored: false,
-            ln_energy: [0.0; MAX_BANDS],
-            log_rays: 0.0,
-        };
-        let walk = Walk { heading, arrivals: Vec::new(), hero, before: 0, chains: vec![PathSet::DIRECT] };
         let first = walks.len();
-        let mut waiting = vec![Ray { end, batch, walk, at: start, ended: false }];
+        let start = (&self.ends[end], direction(random));
+        let mut waiting = vec![Ray::new(end, hero, batch, start, self.scene.probabilities.classes())];
         while let Some(mut ray) = waiting.pop() {
             while !ray.ended
                 && let Some(met) = self.leg(&mut ray, random, paths)
@@ -294,11 +163,11 @@ impl<'a> Tracing<'a> {
 
     /// Follows a ray to the next surface and adds what it finds at the opposite end on its way. None where it ends.
     fn leg(&self, ray: &mut Ray, random: &mut impl Rng, paths: &mut PathSet) -> Option<Met> {
-        let Ray { end, batch, walk, at, .. } = ray;
-        let there = &self.ends[1 - *end];
+        let there = &self.ends[1 - ray.end];
+        let depth = ray.walk.depth();
+        let at = &mut ray.at;
         let hit = next_hit(&self.scene.mesh, at.origin, &mut at.heading, random);
         let leg_m = hit.map_or(f64::INFINITY, |h| h.distance);
-        let depth = walk.depth();
         // Specular paths that image sources have found, and those that a line has found, are not counted again.
         if at.mirrored
             && (at.ever_scattered || depth > self.exact_order)
@@ -310,12 +179,11 @@ impl<'a> Tracing<'a> {
                 false => 1.0,
             };
             let log_density = at.mixture.log_density() + there.volume_m3().ln();
-            let log_weight = self.log_share() + (share * chord_m).ln() - log_density + at.log_rays;
-            let length_m = at.travelled_m + middle_m;
-            let found = Found { length_m, log_weight, direction: scale(at.heading, -1.0) };
-            push(paths, *end, walk, depth, found, *batch);
+            let log_weight = self.log_share() + (share * chord_m).ln() - log_density;
+            let (length_m, back) = (at.travelled_m + middle_m, scale(at.heading, -1.0));
+            ray.push(length_m, log_weight, back, paths);
         }
-        let hit = hit?;
+        let (hit, at) = (hit?, &mut ray.at);
         at.travelled_m += hit.distance;
         if at.travelled_m >= self.max_length_m {
             return None;
@@ -428,15 +296,14 @@ impl<'a> Tracing<'a> {
     ) {
         let area_m2 = self.scene.patches.area_m2(met.patch);
         ray.arrive(met, incoming, Some(area_m2));
-        let Ray { end, batch, walk, at, .. } = ray;
+        let at = &mut ray.at;
         at.mixture.apply(&self.scene.probabilities, met.material, true);
         at.mirrored = false;
         at.ways = met.ways;
         at.ways.scattered_on(area_m2);
         at.ever_scattered = true;
         at.set_out(met.normal, random);
-        let there = &self.ends[1 - *end];
-        let depth = walk.depth();
+        let there = &self.ends[1 - ray.end];
         let line = sub(there.centre, at.origin);
         let distance_m = norm(line);
         let cosine = dot(line, met.normal) / distance_m;
@@ -444,74 +311,13 @@ impl<'a> Tracing<'a> {
         if cosine > 0.0 && length_m <= self.max_length_m && visible(&self.scene.mesh, at.origin, there.centre)
         {
             let share = match self.config.bidirectional {
-                true => at.ways.share_of_line(distance_m, cosine, self.usage(depth)),
+                true => at.ways.share_of_line(distance_m, cosine, self.usage(ray.walk.depth())),
                 false => 1.0,
             };
             // Lambert: cos / pi of the power per steradian, thinned by the square of the distance.
             let log_spread = (share * cosine / (PI * distance_m * distance_m)).ln();
-            let log_weight = self.log_share() + log_spread - at.mixture.log_density() + at.log_rays;
-            let found = Found { length_m, log_weight, direction: scale(line, -1.0 / distance_m) };
-            push(paths, *end, walk, depth, found, *batch);
+            let log_weight = self.log_share() + log_spread - at.mixture.log_density();
+            ray.push(length_m, log_weight, scale(line, -1.0 / distance_m), paths);
         }
     }
-}
-
-impl Ray {
-    /// A ray that goes on from here, its reflections so far being those of this one.
-    fn split_off(&mut self, paths: &mut PathSet) -> Self {
-        let before = self.walk.depth();
-        let chains = vec![self.walk.chain(before, paths)];
-        let Walk { heading, hero, .. } = self.walk;
-        Self {
-            walk: Walk { heading, arrivals: Vec::new(), hero, before, chains },
-            at: self.at.clone(),
-            ..*self
-        }
-    }
-
-    /// Adds a reflection.
-    fn arrive(&mut self, met: &Met, incoming: Option<f64>, area_m2: Option<f64>) {
-        let at = &self.at;
-        self.walk.arrivals.push(Arrival {
-            depth: self.walk.depth() + 1,
-            point: at.origin,
-            normal: met.normal,
-            material: met.material,
-            cosine: met.cosine.clamp(0.0, 1.0),
-            travelled_m: at.travelled_m,
-            mixture: at.mixture,
-            ways: met.ways,
-            patch: met.patch,
-            area_m2,
-            incoming,
-            log_rays: at.log_rays,
-        });
-    }
-}
-
-impl Progress {
-    /// Is scattered on by a surface, by Lambert's law.
-    fn set_out(&mut self, normal: Vec3, random: &mut impl Rng) {
-        self.heading = lambert(random, normal);
-        (self.stretch_m, self.cosine_out) = (0.0, dot(self.heading, normal));
-    }
-}
-
-/// A path that one ray has found by itself.
-struct Found {
-    length_m: f64,
-    log_weight: f64,
-    /// Outward from the opposite end, along the path.
-    direction: Vec3,
-}
-
-/// Adds a path along the first `depth` reflections of a ray from `end`.
-fn push(paths: &mut PathSet, end: usize, walk: &mut Walk, depth: usize, found: Found, batch: u8) {
-    let walked = walk.chain(depth, paths);
-    let Found { length_m, log_weight, direction } = found;
-    let (chain, tail, departure, arrival) = match end {
-        SOURCE => (walked, PathSet::DIRECT, walk.heading, direction),
-        _ => (PathSet::DIRECT, walked, direction, walk.heading),
-    };
-    paths.push(Contribution { length_m, log_weight, chain, tail, departure, arrival, batch: Some(batch) });
 }

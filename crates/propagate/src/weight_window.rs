@@ -32,10 +32,10 @@ const WALKERS: RangeInclusive<usize> = 16..=512;
 /// Turns a seed into that of the pilot.
 const PILOT: u64 = 0x7069_6C6F_7400;
 
-/// Nepers of energy that each material takes in each octave.
+/// Logarithm of the share of energy that each material reflects in each octave.
 pub(crate) type KeptEnergy = Vec<[f64; MAX_BANDS]>;
 
-/// Logarithm of the energy that each material reflects, by octave; what an octave lacks beyond the last is that of the last.
+/// Of these materials; beyond the last octave they are as in it.
 pub(crate) fn ln_kept<'a>(materials: impl Iterator<Item = &'a Material>) -> KeptEnergy {
     let of = |material: &Material| {
         let absorption = material.absorption().values();

@@ -159,18 +159,17 @@ fn a_walk_and_a_replacement_happen_in_the_room_of_the_model() {
     soft.absorption.insert("carpet".to_owned(), vec![0.95; 7]);
     soft.with_law(read_laws(LAW).unwrap().remove(0)).write(&path).unwrap();
     let model = ["--model", path.to_str().unwrap()];
-    // Reverberation times of all octaves: that of one has an error of a fifth with so few rays.
-    let replaced = |name: &str, more: &[&str]| -> Vec<f64> {
+    // Reverberation time at 2 kHz: 2,000 rays would know it to a fifth.
+    let replaced = |name: &str, more: &[&str]| -> f64 {
         let out = folder.path().join(name);
-        let few = ["--rays", "2000", "--duration-s", "1.5", "--out", out.to_str().unwrap()];
+        let few = ["--rays", "40000", "--duration-s", "1.5", "--out", out.to_str().unwrap()];
         succeeds("replace", &[&few[..], more].concat());
         let text = std::fs::read_to_string(out.join("change.json")).unwrap();
         let change: Value = serde_json::from_str(&text).unwrap();
-        change["rows"][0]["before"].as_array().unwrap().iter().map(|t| t.as_f64().unwrap()).collect()
+        change["rows"][0]["before"][4].as_f64().unwrap()
     };
     let (stated, modelled) = (replaced("stated", &[]), replaced("modelled", &model));
-    let mean_ratio = modelled.iter().zip(&stated).map(|(m, s)| m / s).sum::<f64>() / stated.len() as f64;
-    assert!(mean_ratio < 0.9, "{modelled:?} {stated:?}");
+    assert!(modelled < 0.9 * stated, "{modelled} {stated}");
 
     let neutral = folder.path().join("neutral.toml");
     let mut stated = ExtendedModel::default();

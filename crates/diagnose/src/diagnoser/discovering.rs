@@ -24,7 +24,7 @@ fn is_law(id: &str) -> bool {
 impl Diagnoser {
     /// Whether it looks for laws.
     pub(super) fn looks_for_laws(&self) -> bool {
-        self.effects.iter().any(|effect| is_law(&effect.id()))
+        self.law_effect().is_some()
     }
 
     /// Looks for laws beside the catalogue with the vault left out of everything, and opens it for those that were named. Where none stands,
@@ -80,9 +80,7 @@ impl Diagnoser {
         diagnosis.law_search = Some(told);
         Ok(diagnosis)
     }
-}
 
-impl Diagnoser {
     /// The number of the effect that stands for laws.
     fn law_effect(&self) -> Option<usize> {
         self.effects.iter().position(|effect| is_law(&effect.id()))

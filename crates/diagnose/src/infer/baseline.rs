@@ -123,12 +123,11 @@ impl Baseline {
         self.prepare_those(cases, |slot| stale.contains(&slot)).map(|_| ())
     }
 
-    /// Makes room for the tables of so many cases more, which wait for [`Baseline::prepare_rest`]; says which is their first slot.
-    pub fn add_slots(&mut self, count: usize) -> usize {
+    /// Makes room for the tables of so many cases more, which wait for [`Baseline::prepare_rest`].
+    pub fn add_slots(&mut self, count: usize) {
         let first = self.simulation.tables.len();
         self.simulation.tables.extend(std::iter::repeat_with(Tables::default).take(count));
         self.stale.extend(first..first + count);
-        first
     }
 
     fn forget_tables(&mut self, cases: &[CatalogueCase]) {

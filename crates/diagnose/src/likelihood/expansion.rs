@@ -26,7 +26,8 @@ impl Expansion {
         self.shared.set_column(place, &moved);
     }
 
-    /// Columns `(datum, column)` over the covariance V of the data: V^-1 X.
+    /// Columns `(datum, column)` over the covariance V of the data: V^-1 X (Woodbury 1950: what is shared is taken
+    /// off what the data say one by one).
     pub fn over_covariance(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let weighted = |m: &DMatrix<f64>| {
             let mut out = m.clone();
@@ -39,32 +40,14 @@ impl Expansion {
         let onto = weighted_shared.tr_mul(columns);
         match among.cholesky() {
             Some(factor) => weighted(columns) - weighted_shared * factor.solve(&onto),
+            // The identity and a square: it has a factor unless a figure is none.
             None => DMatrix::from_element(columns.nrows(), columns.ncols(), f64::NAN),
         }
     }
 
-    /// Products of columns `(datum, column)` over the covariance V of the data: X' V^-1 X (Woodbury 1950: what is shared is taken off
-    /// what the data say one by one).
+    /// Products of columns `(datum, column)` over the covariance V of the data: X' V^-1 X.
     pub fn products(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
-        let weighted = |m: &DMatrix<f64>| {
-            let mut out = m.clone();
-            for mut column in out.column_iter_mut() {
-                column.component_mul_assign(&self.weights);
-            }
-            out
-        };
-        let own = columns.tr_mul(&weighted(columns));
-        let weighted_shared = weighted(&self.shared);
-        let mut among = self.shared.tr_mul(&weighted_shared);
-        for i in 0..among.nrows() {
-            among[(i, i)] += 1.0;
-        }
-        let onto = weighted_shared.tr_mul(columns);
-        match among.cholesky() {
-            Some(factor) => own - onto.tr_mul(&factor.solve(&onto)),
-            // The identity and a square: it has a factor unless a figure is none.
-            None => DMatrix::from_element(own.nrows(), own.ncols(), f64::NAN),
-        }
+        columns.tr_mul(&self.over_covariance(columns))
     }
 }
 

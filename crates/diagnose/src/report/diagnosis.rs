@@ -162,7 +162,7 @@ pub struct FoundLaw {
     pub evidence_nats: f64,
     /// What it pays for being one formula of many, in nats: minus the logarithm of its probability beforehand.
     pub prior_nats: f64,
-    /// Probability that the best of all formulas does as well, by simulation, where none is at work.
+    /// Probability that the best of all formulas does as well, by simulation, where no law acts.
     pub family_p: f64,
     /// Logarithm of how much more probable it makes the responses of the vault, predicted from all others, in nats; `None` without a vault.
     pub vault_gain_nats: Option<f64>,

@@ -57,7 +57,7 @@ pub(crate) fn found_law(
 pub(crate) fn reason(trial: &Trial) -> String {
     match trial.fault() {
         Some(Fault::Chance) => format!(
-            "the best of as many formulas is as good by chance with probability {:.3} where no law is at work",
+            "the best of as many formulas is as good by chance with probability {:.3} where no law acts",
             trial.family_p
         ),
         Some(Fault::Sham) => {

@@ -41,6 +41,20 @@ fn what_bends_around_a_screen_is_found() {
     assert!(found.model.applied().diffraction);
 }
 
+/// Prints what is named beside it, and what it gains at positions left out.
+#[test]
+#[ignore = "nightly: a minute, and one seed is not ignored"]
+fn what_bends_is_found_with_any_rays() {
+    let room = ScreenedRoom::new(ROOM).unwrap();
+    let responses = room.responses().unwrap();
+    for seed in 0..5 {
+        println!("rays of seed {seed}");
+        let config = DiagnoseConfig { rays: 10_000, seed, ..DiagnoseConfig::default() };
+        let found = diagnose(&room, responses.clone(), &Diagnoser::new(config).unwrap());
+        assert!(found.causes.iter().any(|c| c.effect == "edge_diffraction"), "{seed}: {:?}", found.causes);
+    }
+}
+
 #[test]
 fn where_there_is_no_screen_nothing_bends() {
     let room = ScreenedRoom::new(ScreenedConfig { screen: false, ..ROOM }).unwrap();

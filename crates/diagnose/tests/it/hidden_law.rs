@@ -85,7 +85,6 @@ fn a_hidden_law_is_named_with_its_size_and_rendered() {
 
 /// Nobody wrote the law: the quantity that it goes with is found, and how much of it there is.
 #[test]
-#[ignore = "nightly: a minute and a half"]
 fn what_a_hidden_law_goes_with_is_discovered() {
     let hidden = Hidden::GrazingAbsorption { material: 0, db: PLAIN_DB, from_hz: 1000.0 };
     let (_folder, room) = room(&[hidden]);

@@ -1,4 +1,4 @@
-//! How often a search names a law where none is at work, and the right one where one is: rooms that are drawn, and printed one by one.
+//! How often a search names a law where none acts, and the right one where one does: rooms that are drawn, and printed one by one.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
 use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis};

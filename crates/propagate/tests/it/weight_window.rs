@@ -18,7 +18,7 @@ fn material(absorption: [f64; 2], scattering: [f64; 2]) -> Material {
     Material::new(of(absorption), of(scattering)).unwrap()
 }
 
-/// A hard room with a carpet and an absorbing ceiling, which scatters little, and not alike in both octaves.
+/// A hard room with a carpet and an absorbing ceiling, which scatters little, more at 1 kHz than at 500 Hz.
 fn uneven_box() -> Scene {
     let wall = || material([0.03, 0.04], [0.1, 0.3]);
     let faces =

@@ -83,13 +83,13 @@ impl Column {
             Some(Sham::Surfaces) => {
                 // Covariates of one form, surface by surface.
                 let name = grammar.covariates[covariate].forms[0].name;
-                let alike: Vec<usize> = (0..grammar.covariates.len())
+                let of_form: Vec<usize> = (0..grammar.covariates.len())
                     .filter(|&c| {
                         grammar.covariates[c].surface.is_some() && grammar.covariates[c].forms[0].name == name
                     })
                     .collect();
-                let own = alike.iter().position(|&c| c == covariate)?;
-                let other = alike[(own + places.surfaces[pair]) % alike.len()];
+                let own = of_form.iter().position(|&c| c == covariate)?;
+                let other = of_form[(own + places.surfaces[pair]) % of_form.len()];
                 Some(features.of(pair, band, other, count))
             }
             Some(Sham::Times) => {

@@ -1,4 +1,4 @@
-//! How probable the best of all laws is by chance: measurements are drawn in which none is at work, and the best of the whole family is
+//! How probable the best of all laws is by chance: measurements are drawn without any, and the best of the whole family is
 //! looked for in each.
 //!
 //! Source: parametric bootstrap of a maximum, P. H. Westfall, S. S. Young: Resampling-based multiple testing, 1993.

@@ -145,7 +145,7 @@ impl<'a> LawScreen<'a> {
         self.ranked().into_iter().take(MAX_COMPARED).filter(same).map(|(other, _)| other).collect()
     }
 
-    /// Probability that the best of the whole family is as good as a formula where no law is at work.
+    /// Probability that the best of the whole family is as good as a formula where no law acts.
     pub fn family_p(&self, formula: usize) -> f64 {
         let columns = self.grammar.covariates.len();
         let drawn = largest(&self.screen, &self.terms, columns, &self.null, (DRAWS, self.seed ^ 0xFA111));

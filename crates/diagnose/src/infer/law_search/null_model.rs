@@ -1,4 +1,4 @@
-//! What measurements look like where no law is at work: the fitted model, with everything that moves many bins together.
+//! What measurements look like where no law acts: the fitted model, with everything that moves many bins together.
 //!
 //! Bins that scattered independently would make any law far too sure. Beside the levels, drifts and chance of the tracer that every likelihood
 //! knows, two random effects are drawn: one of each response in each octave, and one of each place, which all octaves and all sources at that
@@ -17,7 +17,7 @@ const TRIED_DB: [f64; 11] = [0.0, 0.1, 0.18, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0
 /// Rounds over the two.
 const ROUNDS: usize = 3;
 
-/// The bins of one response where no law is at work.
+/// The bins of one response where no law acts.
 struct NullPair {
     receiver: usize,
     weights: DVector<f64>,

@@ -39,7 +39,7 @@ pub(crate) fn points(
         ..state.energy_firsts[order] + search.candidates[candidate].case.parameters.len();
     let mut without = state.energy.values.clone();
     without[own.clone()].fill(0.0);
-    // In which bands it is at work.
+    // In which bands it acts.
     let terms = formula.bands.terms(survey);
     let strength = |band: usize| {
         let fitted = &state.energy.values[own.clone()];

@@ -26,7 +26,7 @@ pub(crate) struct Trial {
     pub candidate: usize,
     /// What the screen says for it beside the other causes, in nats.
     pub nats: f64,
-    /// Probability of as good a law anywhere in the family where none is at work.
+    /// Probability of as good a law anywhere in the family where no law acts.
     pub family_p: f64,
     pub sham: Option<BestSham>,
     /// What the data do not tell it from, in words.

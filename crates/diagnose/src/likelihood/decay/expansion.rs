@@ -4,7 +4,7 @@ use super::EnergyModel;
 use super::offsets::{BandBins, Directions};
 use super::pair_likelihood::ComparedBand;
 use crate::likelihood::expansion::Expansion;
-use crate::statistics::HUBER_LOG_RATIO;
+use crate::statistics::pull;
 use nalgebra::{DMatrix, DVector};
 
 impl EnergyModel<'_> {
@@ -39,7 +39,7 @@ impl EnergyModel<'_> {
         let offsets = Directions::new(&bins).top();
         let of_band = |(own, offset): (&BandBins<'_>, &Vec<f64>)| -> Vec<f64> {
             let each = own.ln_ratio.iter().zip(offset).zip(own.shapes);
-            each.map(|((z, offset), shape)| shape * ((z - offset).min(HUBER_LOG_RATIO).exp() - 1.0)).collect()
+            each.map(|((z, offset), shape)| shape * pull(z - offset)).collect()
         };
         let all: Vec<f64> = bins.iter().zip(&offsets.of).flat_map(of_band).collect();
         DVector::from_vec(all)

@@ -8,7 +8,7 @@ use crate::likelihood::parameters::ModelTerm;
 use crate::simulate::modes::Modes;
 use crate::simulate::reflection_reweighting::HitChanges;
 use crate::simulate::views::BandView;
-use crate::statistics::HUBER_LOG_RATIO;
+use crate::statistics::pull;
 
 /// The compared bins of one band of a response under some values.
 pub(super) struct ComparedBand<'a> {
@@ -176,7 +176,7 @@ fn add_slopes(
     (shapes, ln_ratio): (&[f64], &[f64]),
 ) {
     for (bin, (&weight, ln_ratio)) in shapes.iter().zip(ln_ratio).enumerate() {
-        let pull = weight * (ln_ratio.min(HUBER_LOG_RATIO).exp() - 1.0);
+        let pull = weight * pull(*ln_ratio);
         for (i, &a) in columns.iter().enumerate() {
             let slope = rows[i][bin];
             if slope == 0.0 {
