@@ -131,22 +131,20 @@ fn folder(path: &Path) -> Result<Room, Failure> {
         return Err(format!("{}: the room has no source or no receiver", path.display()).into());
     }
     let surfaces = |scene: &Scene| -> Vec<Material> {
-        scene.materials().iter().map(|named| named.material.resampled(Bands::SIMULATION)).collect()
+        scene.materials().iter().map(|named| named.material.clone()).collect()
     };
     let model = path.join(MODEL);
     if !model.is_file() {
         let (materials, air) = (surfaces(room.scene()), room.air());
-        let scene = room.scene().with_materials(materials.clone())?;
         let ends = (&room.sources()[0], &room.receivers()[0]);
-        return traced(&scene, &Conditions::new(&materials, &air), ends, TracerConfig::default());
+        return traced(room.scene(), &Conditions::new(&materials, &air), ends, TracerConfig::default());
     }
     let extended = ExtendedModel::read(model)?.room(&room)?;
     let materials = surfaces(&extended.scene);
-    let scene = extended.scene.with_materials(materials.clone())?;
     let ExtendedRoom { diffraction, cuboid_paths, .. } = extended;
     let tracer = TracerConfig { diffraction, cuboid_paths, ..TracerConfig::default() };
     let ends = (&extended.sources[0], &extended.receivers[0]);
-    traced(&scene, &extended.conditions(&materials, 0, 0), ends, tracer)
+    traced(&extended.scene, &extended.conditions(&materials, 0, 0), ends, tracer)
 }
 
 /// A hall of plaster and wood with upholstered seats, traced once for all instances.
@@ -169,8 +167,8 @@ fn hall() -> Result<Arc<Room>, Failure> {
         .map_err(Failure::from)
 }
 
-/// The response at two coincident cardioids that point to the left and to the right of someone who faces the source. The direct
-/// sound of a source 1 m away has amplitude 1.
+/// The response at two coincident cardioids that point to the left and to the right of someone who looks as the receiver does or, if
+/// that is not stated, faces the source. A source 1 m away has a direct sound of amplitude 1, of which each cardioid hears half.
 fn traced(
     scene: &Scene,
     conditions: &Conditions,
@@ -179,8 +177,8 @@ fn traced(
 ) -> Result<Room, Failure> {
     let tracer = PathTracer::new(TracerConfig { rays: RAYS, duration_s: TRACE_S, ..tracer })?;
     let (paths, _) = tracer.trace_until_t30(scene, source, receiver, conditions, &())?;
-    let (from, to) = (receiver.position_m, source.position_m);
-    let facing = Orientation::towards([to[0] - from[0], to[1] - from[1], to[2] - from[2]])?;
+    let to_source = [0, 1, 2].map(|axis| source.position_m[axis] - receiver.position_m[axis]);
+    let facing = Orientation::towards(receiver.axis.unwrap_or(to_source))?;
     let render = RenderConfig { sample_rate_hz: TRACE_HZ, ..RenderConfig::default() };
     let heard = AmbisonicRenderer::new(1, render)?.render(&paths, conditions, facing)?;
     let (w, y) = (heard.channel(0), heard.channel(1));
