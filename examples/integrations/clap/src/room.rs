@@ -6,7 +6,7 @@ use sabine_acoustics::{
     resample_response,
 };
 use sabine_diagnose::{ExtendedModel, ExtendedRoom};
-use sabine_paths::Conditions;
+use sabine_paths::{Conditions, PathSet, Propagator};
 use sabine_propagate::{AmbisonicRenderer, PathTracer, RenderConfig, TracerConfig};
 use sabine_scene::{MeasuredRoom, Receiver, Scene, Source};
 use std::error::Error;
@@ -18,10 +18,11 @@ pub type Failure = Box<dyn Error + Send + Sync>;
 
 /// Rays of a trace: half a second of work, and decays that are right to some percent.
 const RAYS: usize = 10_000;
-/// Longest time that is traced, in seconds.
+/// Longest time that is traced of a room in a folder, in seconds.
 const TRACE_S: f64 = 8.0;
-/// The built-in hall: length, width and height in metres.
+/// The built-in hall: length, width and height in metres, and the time that is traced in seconds: until it is 60 dB below its start.
 const HALL_M: [f64; 3] = [16.0, 11.0, 6.0];
+const HALL_S: f64 = 2.8;
 /// What `sabine diagnose` writes, if it lies in the folder of a room.
 const MODEL: &str = "extended_model.toml";
 /// Sample rate of traced responses in Hz.
@@ -56,6 +57,10 @@ impl Room {
         match place {
             Place::BuiltIn => hall(),
             Place::Nothing => Ok(Self::silent()),
+            // What it is relative to, the host decides; a path of another system is none here.
+            Place::At(path) if !path.is_absolute() => {
+                Err(format!("{}: the path of a room must begin at the root", path.display()).into())
+            }
             Place::At(path) if path.is_dir() => in_own_threads(|| folder(path)).map(Arc::new),
             Place::At(path) => file(path).map(Arc::new),
         }
@@ -160,15 +165,18 @@ fn hall() -> Result<Arc<Room>, Failure> {
         let receiver = Receiver::omni("seat", [10.5, 6.2, 1.4])?;
         let air = Air::default();
         let conditions = Conditions::new(&materials, &air);
-        in_own_threads(|| traced(&scene, &conditions, (&source, &receiver), TracerConfig::default()))
+        let tracer = TracerConfig { rays: RAYS, duration_s: HALL_S, ..TracerConfig::default() };
+        in_own_threads(|| {
+            let paths = PathTracer::new(tracer)?.trace(&scene, &source, &receiver, &air, &())?;
+            rendered(&paths, &conditions, &source, &receiver)
+        })
     };
     HALL.get_or_init(|| trace().map(Arc::new).map_err(|error| error.to_string()))
         .clone()
         .map_err(Failure::from)
 }
 
-/// The response at two coincident cardioids that point to the left and to the right of someone who looks as the receiver does or, if
-/// that is not stated, faces the source. A source 1 m away has a direct sound of amplitude 1, of which each cardioid hears half.
+/// Traced until T30 can be read in every band, as the command does.
 fn traced(
     scene: &Scene,
     conditions: &Conditions,
@@ -177,10 +185,21 @@ fn traced(
 ) -> Result<Room, Failure> {
     let tracer = PathTracer::new(TracerConfig { rays: RAYS, duration_s: TRACE_S, ..tracer })?;
     let (paths, _) = tracer.trace_until_t30(scene, source, receiver, conditions, &())?;
+    rendered(&paths, conditions, source, receiver)
+}
+
+/// The response at two coincident cardioids that point to the left and to the right of someone who looks as the receiver does or, if
+/// that is not stated, faces the source. A source 1 m away has a direct sound of amplitude 1, of which each cardioid hears half.
+fn rendered(
+    paths: &PathSet,
+    conditions: &Conditions,
+    source: &Source,
+    receiver: &Receiver,
+) -> Result<Room, Failure> {
     let to_source = [0, 1, 2].map(|axis| source.position_m[axis] - receiver.position_m[axis]);
     let facing = Orientation::towards(receiver.axis.unwrap_or(to_source))?;
     let render = RenderConfig { sample_rate_hz: TRACE_HZ, ..RenderConfig::default() };
-    let heard = AmbisonicRenderer::new(1, render)?.render(&paths, conditions, facing)?;
+    let heard = AmbisonicRenderer::new(1, render)?.render(paths, conditions, facing)?;
     let (w, y) = (heard.channel(0), heard.channel(1));
     let cardioid = |side: f32| {
         let samples = w.iter().zip(y).map(|(w, y)| 0.5 * (w + side * y)).collect();

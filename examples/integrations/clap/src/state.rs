@@ -42,7 +42,7 @@ impl State {
     /// Reads what [`State::write`] wrote.
     ///
     /// # Errors
-    /// Bytes that are no state of ours, a gain out of range, a path that is not absolute.
+    /// Bytes that are no state of ours, a gain out of range.
     pub fn read(bytes: &[u8]) -> Result<Self, Failure> {
         let foreign = || format!("the state is not one of this plug-in: it does not begin with {HEAD:?}");
         let text = std::str::from_utf8(bytes).map_err(|_| foreign())?;
@@ -57,11 +57,6 @@ impl State {
                 Place::At(PathBuf::from(path))
             }
         };
-        if let Place::At(path) = &place
-            && !path.is_absolute()
-        {
-            return Err(format!("room is {}; it must be a path from the root on", path.display()).into());
-        }
         Ok(Self { wet_db, dry_db, place })
     }
 }
@@ -115,7 +110,6 @@ mod tests {
             (b"Sabine room 1\nwet_db 0\ndry_db NaN\n", "dry_db is NaN"),
             (b"Sabine room 1\nwet_db 99\ndry_db 0\n", "wet_db is 99"),
             (b"Sabine room 1\nwet_db 0\ndry_db 0\nhall /a.wav", "no line \"room\""),
-            (b"Sabine room 1\nwet_db 0\ndry_db 0\nroom a.wav", "from the root on"),
         ] {
             let found = State::read(bytes).unwrap_err().to_string();
             assert!(found.contains(why), "{found}");

@@ -4,6 +4,7 @@ use crate::host::{Rack, noise, state};
 use clack_extensions::log::LogSeverity;
 use sabine_acoustics::{SampleFormat, write_wav, write_wav_channels};
 use sabine_clap_plugin::Parameter;
+use std::path::Path;
 use std::sync::atomic::Ordering;
 
 /// The one thing that was logged; a caught panic would be `PluginMisbehaving`.
@@ -58,6 +59,16 @@ fn rooms_that_cannot_be_read_are_named_kept_and_silent() {
         assert!(heard[1][64..].iter().all(|s| (s - 0.501_187_2).abs() < 1e-6), "the dry sound alone");
         rack.stop(player);
     }
+}
+
+#[test]
+fn a_path_of_another_system_is_kept_but_not_followed() {
+    let foreign = if cfg!(windows) { "/rooms/hall.wav" } else { "C:\\rooms\\hall.wav" };
+    let mut rack = Rack::new();
+    let state = state(Path::new(foreign), 0.0, -6.0);
+    assert!(!rack.load(state.as_bytes()));
+    assert!(logged(&rack, LogSeverity::Error).contains("root"));
+    assert_eq!(rack.save(), state);
 }
 
 #[test]
