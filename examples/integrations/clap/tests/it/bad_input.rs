@@ -62,6 +62,21 @@ fn rooms_that_cannot_be_read_are_named_kept_and_silent() {
 }
 
 #[test]
+fn another_room_that_is_missing_silences_the_one_that_plays() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("half.wav");
+    write_wav(&path, &[0.5], 48_000, SampleFormat::Float32).unwrap();
+    let mut rack = Rack::with_room(&path, 0.0, Parameter::LEAST_DB);
+    let mut player = rack.start(48e3, 480, 2);
+    let ones = vec![1.0; 9600];
+    assert_eq!(player.render(&[&ones, &ones], &[], &[480])[0][9599], 0.5);
+    assert!(!rack.load(state(&folder.path().join("none.wav"), 0.0, Parameter::LEAST_DB).as_bytes()));
+    assert!(logged(&rack, LogSeverity::Error).contains("none.wav"));
+    assert_eq!(player.render(&[&ones, &ones], &[], &[480])[0][9599], 0.0);
+    rack.stop(player);
+}
+
+#[test]
 fn a_path_of_another_system_is_kept_but_not_followed() {
     let foreign = if cfg!(windows) { "/rooms/hall.wav" } else { "C:\\rooms\\hall.wav" };
     let mut rack = Rack::new();
