@@ -30,7 +30,7 @@ use std::sync::Arc;
 
 /// What belongs to the main thread.
 ///
-/// A host may call back into the plug-in from any of its own functions, so that nothing is borrowed while one is called.
+/// A host may call back into the plug-in from any of its own functions, so nothing is borrowed while one is called.
 pub struct MainThread<'a> {
     host: HostMainThreadHandle<'a>,
     shared: &'a Shared<'a>,
