@@ -105,7 +105,7 @@ fn sample_rates_that_no_room_has_are_refused() {
         assert!(rack.try_start(rate_hz, 64, 2).is_none(), "{rate_hz}");
         assert!(logged(&rack, LogSeverity::Error).contains("sample rate"));
     }
-    for rate_hz in [8e3, 47_952.047, 192e3] {
+    for rate_hz in [1e3, 1234.567, 47_952.047, 192e3, 768e3] {
         let mut player = rack.start(rate_hz, 64, 2);
         player.render(&[&[0.1; 640], &[0.1; 640]], &[], &[64]);
         rack.stop(player);
