@@ -86,8 +86,6 @@ impl DiagnoseConfig {
             image_order: self.image_order,
             cuboid_paths: CUBOID_PATHS,
             allow_leaks: self.allow_leaks,
-            // Not yet: what speaks for causes in such paths has not been calibrated (docs/validation/diagnose.md, rays in a weight window).
-            weight_window: false,
             ..TracerConfig::default()
         }
     }

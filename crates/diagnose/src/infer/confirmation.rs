@@ -236,14 +236,15 @@ fn least_confirmed(
     let helps = |place: usize| {
         let gain = &predicted.gains[place];
         // No simulation predicts the decay of single modes: octaves that have few do not tell near from far.
-        let [before, after] = if is_of_decays_alone(&search.candidates[state.chosen[place]]) {
-            predicted.diffuse_rmse_db[place]
+        let change = if is_of_decays_alone(&search.candidates[state.chosen[place]]) {
+            predicted.diffuse_changes[place]
         } else {
-            [gain.db_rmse_before, gain.db_rmse_after]
+            predicted.decay_changes[place]
         };
+        let [before, after] = change.rmse_db;
         let nearer = after < MAX_RMSE_RATIO * before;
         // Likelier bins under decays that lie farther off: the cause stands for something else.
-        let farther = MAX_RMSE_RATIO * after > before;
+        let farther = MAX_RMSE_RATIO * after > before && change.is_farther_surely;
         let gains = gain.low > 0.0 || predicted.gains_everywhere[place];
         (gains && !farther)
             || (gain.nats_per_bin > 0.0 && nearer)
@@ -262,6 +263,7 @@ mod tests {
     use crate::effects::TransducerResponse;
     use crate::hand_made::Tables;
     use crate::infer::candidates::cases;
+    use crate::infer::cross_validation::DecayChange;
     use crate::report::diagnosis::HeldOutGain;
     use sabine_scene::{Levels, TimeZero};
 
@@ -298,18 +300,19 @@ mod tests {
         let state = search.state(&[0], None).expect("a fit");
         let gain =
             HeldOutGain { nats_per_bin: 0.1, low: 0.05, high: 0.15, db_rmse_before: 1.0, db_rmse_after: 1.1 };
-        for (diffuse_rmse_db, doubted) in [([0.8, 0.8], None), ([0.8, 0.85], Some(0))] {
+        // That curves of one group lie far off may be chance.
+        for (rmse_db, is_farther_surely, doubted) in
+            [([0.8, 0.8], true, None), ([0.8, 0.85], true, Some(0)), ([0.8, 0.85], false, None)]
+        {
             let predicted = Predicted {
                 gains: vec![gain.clone()],
                 gains_everywhere: vec![true],
-                diffuse_rmse_db: vec![diffuse_rmse_db],
+                decay_changes: vec![DecayChange { rmse_db: [1.0, 1.1], is_farther_surely: true }],
+                diffuse_changes: vec![DecayChange { rmse_db, is_farther_surely }],
                 ..Predicted::default()
             };
-            assert_eq!(
-                least_confirmed(&search, &state, &predicted, &[false]),
-                doubted,
-                "{diffuse_rmse_db:?}"
-            );
+            let found = least_confirmed(&search, &state, &predicted, &[false]);
+            assert_eq!(found, doubted, "{rmse_db:?} {is_farther_surely}");
         }
     }
 }

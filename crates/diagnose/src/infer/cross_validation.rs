@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::infer::baseline::Baseline;
 use crate::infer::direct_evidence;
 use crate::infer::direct_evidence::Fitted;
-use crate::infer::prediction::{Compared, Errors, compare, decay_db};
+use crate::infer::prediction::{Compared, Errors, compare, decay_db, squared_errors};
 use crate::infer::search::{Search, State};
 use crate::likelihood::decay::WarmStart;
 use crate::likelihood::polarity;
@@ -86,10 +86,35 @@ pub(crate) struct Predicted {
     pub gains_nats: Vec<f64>,
     /// Whether every group of positions that was left out gains by each cause.
     pub gains_everywhere: Vec<bool>,
-    /// Error of decay curves at positions left out without and with each cause, in dB, in the octaves above the Schroeder frequency; in all
-    /// where none lies above it.
-    pub diffuse_rmse_db: Vec<[f64; 2]>,
+    /// What each cause does to decay curves at positions left out, in all octaves and in those above the Schroeder frequency; in all where
+    /// none lies above it.
+    pub decay_changes: Vec<DecayChange>,
+    pub diffuse_changes: Vec<DecayChange>,
     pub decays: Vec<DecayCurves>,
+}
+
+/// Decay curves at positions left out, without a cause and with it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DecayChange {
+    /// Their errors in dB.
+    pub rmse_db: [f64; 2],
+    /// Whether they lie farther off beyond chance: the 90 % interval of the change over groups of positions has its lower end above zero, or
+    /// every group is farther off.
+    pub is_farther_surely: bool,
+}
+
+impl DecayChange {
+    /// From squared errors without and with the cause and their number, for each group.
+    fn of(groups: &[[(f64, f64); 2]]) -> Self {
+        let rmse_db = [0, 1].map(|k| {
+            let (squares, points) = groups.iter().fold((0.0, 0.0), |(s, n), g| (s + g[k].0, n + g[k].1));
+            if points > 0.0 { (squares / points).sqrt() } else { 0.0 }
+        });
+        let more: Vec<(f64, f64)> =
+            groups.iter().map(|[before, after]| (after.0 - before.0, after.1)).collect();
+        let [low, _] = statistics::ratio_interval(&more);
+        Self { rmse_db, is_farther_surely: low > 0.0 || more.iter().all(|(more, _)| *more > 0.0) }
+    }
 }
 
 /// What positions are predicted by: a set of causes, and the discrepancy without a name where it joins them.
@@ -259,21 +284,20 @@ fn summary(baseline: &Baseline, causes: usize, folds: &Folds, splits: &[SplitGai
             }
         })
         .collect();
-    let first = first_diffuse_band(baseline.survey());
-    let diffuse = |c: &&Compared| c.band >= first;
-    let diffuse_rmse_db = (0..causes)
-        .map(|i| {
-            let before: Vec<Compared> = without(i).filter(diffuse).cloned().collect();
-            let after = splits.iter().flat_map(|s| &s.predicted[1]).filter(diffuse).cloned();
-            [before, after.collect()].map(|compared| Errors::of(&compared).db_rmse)
-        })
-        .collect();
+    let changes = |first: usize| -> Vec<DecayChange> {
+        let squares = |c: &[Compared]| squared_errors(c.iter().filter(|c| c.band >= first));
+        let groups = |i: usize| -> Vec<_> {
+            splits.iter().map(|s| [squares(&s.without_each[i]), squares(&s.predicted[1])]).collect()
+        };
+        (0..causes).map(|i| DecayChange::of(&groups(i))).collect()
+    };
     let curves = |s: &SplitGain| decay_curves(baseline, &s.predicted[0], &s.predicted[1], true);
     Predicted {
         held_out: Some(held_out),
         gains,
         gains_nats: (0..causes).map(|i| splits.iter().map(|s| s.each[i]).sum()).collect(),
-        diffuse_rmse_db,
+        decay_changes: changes(0),
+        diffuse_changes: changes(first_diffuse_band(baseline.survey())),
         gains_everywhere: (0..causes).map(|i| splits.iter().all(|s| s.each[i] > 0.0)).collect(),
         decays: splits.iter().flat_map(curves).collect(),
     }
@@ -320,6 +344,25 @@ mod tests {
         assert_eq!((survey.bands.len(), survey.bands_of_modes, first_diffuse_band(&survey)), (2, 1, 1));
         survey.bands_of_modes = 2;
         assert_eq!(first_diffuse_band(&survey), 0);
+    }
+
+    #[test]
+    fn decays_are_surely_farther_off_where_groups_agree() {
+        // Mean squared errors with a cause, by group; without it they are 1 dB2 in 100 points.
+        let of = |after: &[f64]| {
+            let groups: Vec<_> = after.iter().map(|s| [(100.0, 100.0), (100.0 * s, 100.0)]).collect();
+            DecayChange::of(&groups)
+        };
+        // One group far off says nothing of others, however far.
+        let one = of(&[0.99, 0.98, 2.0, 0.97]);
+        assert!(
+            !one.is_farther_surely && (one.rmse_db[1] - (0.25f64 * 4.94).sqrt()).abs() < 1e-12,
+            "{one:?}"
+        );
+        assert!(of(&[1.1, 1.12, 1.09, 1.11, 1.1, 0.999]).is_farther_surely);
+        // Two groups have no interval worth the name.
+        assert!(of(&[1.1, 1.5]).is_farther_surely && !of(&[1.5, 0.99]).is_farther_surely);
+        assert!(!of(&[0.9, 0.91, 0.92]).is_farther_surely);
     }
 
     #[test]

@@ -76,10 +76,27 @@ const LOWEST_DB: f64 = -30.0;
 const T20_JND: f64 = 0.05;
 const C50_JND_DB: f64 = 1.0;
 
+/// Squared errors of decay curves in dB2, summed, and their number.
+pub(crate) fn squared_errors<'a>(compared: impl IntoIterator<Item = &'a Compared>) -> (f64, f64) {
+    let (mut squares, mut points) = (0.0, 0.0);
+    for c in compared {
+        let total: f64 = c.measured.iter().sum();
+        if total <= 0.0 {
+            continue;
+        }
+        let (m, p) = (decay_db(&c.measured, total), decay_db(&c.predicted, total));
+        for (m, p) in m.iter().zip(&p).filter(|(m, _)| **m > LOWEST_DB) {
+            squares += (m - p).powi(2);
+            points += 1.0;
+        }
+    }
+    (squares, points)
+}
+
 impl Errors {
     /// In the mean over pairs and bands.
     pub fn of(compared: &[Compared]) -> Self {
-        let (mut squares, mut points) = (0.0, 0.0);
+        let (squares, points) = squared_errors(compared);
         let (mut t20, mut t20s, mut c50, mut c50s) = (0.0, 0.0, 0.0, 0.0);
         for c in compared {
             let total: f64 = c.measured.iter().sum();
@@ -87,10 +104,6 @@ impl Errors {
                 continue;
             }
             let (m, p) = (decay_db(&c.measured, total), decay_db(&c.predicted, total));
-            for (m, p) in m.iter().zip(&p).filter(|(m, _)| **m > LOWEST_DB) {
-                squares += (m - p).powi(2);
-                points += 1.0;
-            }
             if let (Some(m), Some(p)) = (slope(&c.times_s, &m), slope(&c.times_s, &p)) {
                 // T is inverse to the slope.
                 t20 += (m / p - 1.0).abs() / T20_JND;

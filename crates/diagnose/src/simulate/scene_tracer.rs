@@ -110,7 +110,9 @@ impl PreparedTracer for PreparedRays {
     }
 
     fn trace(&self, source: &Source, receiver: &Receiver, air: &Air) -> Result<PathSet, Error> {
-        Ok(self.tracer.trace_prepared(&self.prepared, source, receiver, air, &())?)
+        let seed = seed_of_pair(self.tracer.config().seed, source, receiver);
+        let tracer = PathTracer::new(TracerConfig { seed, ..self.tracer.config().clone() })?;
+        Ok(tracer.trace_prepared(&self.prepared, source, receiver, air, &())?)
     }
 
     fn cuboid_faces(&self) -> Option<[u32; 6]> {
@@ -125,6 +127,17 @@ impl PreparedTracer for PreparedRays {
     ) {
         self.prepared.for_each_image(source_m, receiver_m, max_length_m, visit);
     }
+}
+
+/// The seed of the rays of one pair. Each pair draws rays of its own: were they the same, all responses would be off together where these
+/// rays miss something, and whatever acts on all positions would be credited with it. Names tell pairs apart, so that a source that is
+/// moved keeps its rays.
+fn seed_of_pair(seed: u64, source: &Source, receiver: &Receiver) -> u64 {
+    // FNV-1a.
+    let names = source.id.bytes().chain([0]).chain(receiver.id.bytes());
+    names.fold(seed ^ 0xCBF2_9CE4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3)
+    })
 }
 
 /// Any [`Propagator`], which looks at the scene anew for each pair. Its own duration holds: it must reach as far as decays are compared.
@@ -145,5 +158,36 @@ impl<P: Propagator + Clone + 'static> SceneTracer for EachScene<P> {
 impl<P: Propagator> PreparedTracer for WithScene<P> {
     fn trace(&self, source: &Source, receiver: &Receiver, air: &Air) -> Result<PathSet, Error> {
         Ok(self.propagator.trace(&self.scene, source, receiver, air, &())?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::DiagnoseConfig;
+    use sabine_acoustics::{Bands, Material};
+
+    #[test]
+    fn each_pair_has_rays_of_its_own_and_keeps_them() {
+        let bands = Bands::octaves(500.0, 1000.0).unwrap();
+        let walls = [0.1; 6].map(|a| Material::uniform(bands, a, 0.3).unwrap());
+        let scene = Scene::shoebox([5.0, 4.0, 3.0], walls).unwrap();
+        let tracer = Rays { config: TracerConfig { rays: 256, ..DiagnoseConfig::default().tracer() } };
+        let prepared = tracer.prepare(&scene, 0.2).unwrap();
+        let source = Source::omni("s", [1.0, 1.0, 1.5]).unwrap();
+        let late = |name: &str, x: f64| -> Vec<f32> {
+            let receiver = Receiver::omni(name, [x, 3.0, 1.2]).unwrap();
+            let paths = prepared.trace(&source, &receiver, &Air::default()).unwrap();
+            let sampled = (0..paths.len()).filter(|&i| !paths.is_exact(i));
+            sampled.map(|i| paths.lengths_m()[i]).collect()
+        };
+        assert_eq!(late("r1", 4.0), late("r1", 4.0));
+        assert_ne!(late("r1", 4.0), late("r2", 4.0));
+        let seed = |a: &str, b: &str| {
+            let receiver = Receiver::omni(b, [4.0, 3.0, 1.2]).unwrap();
+            seed_of_pair(7, &Source::omni(a, [1.0; 3]).unwrap(), &receiver)
+        };
+        // What belongs to which name counts.
+        assert_ne!(seed("s1", "1r"), seed("s11", "r"));
     }
 }
