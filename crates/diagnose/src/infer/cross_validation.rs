@@ -271,19 +271,6 @@ fn summary(baseline: &Baseline, causes: usize, folds: &Folds, splits: &[SplitGai
         nats_per_bin: [mean(&|s| s.named), mean(&|s| s.free)],
         nats_interval: [interval(&|s| s.named), interval(&|s| s.free)],
     };
-    let without = |i: usize| splits.iter().flat_map(move |s| &s.without_each[i]);
-    let gains = (0..causes)
-        .map(|i| {
-            let [low, high] = interval(&|s| s.each[i]);
-            HeldOutGain {
-                nats_per_bin: mean(&|s| s.each[i]),
-                low,
-                high,
-                db_rmse_before: Errors::of(&without(i).cloned().collect::<Vec<_>>()).db_rmse,
-                db_rmse_after: errors[1].db_rmse,
-            }
-        })
-        .collect();
     let changes = |first: usize| -> Vec<DecayChange> {
         let squares = |c: &[Compared]| squared_errors(c.iter().filter(|c| c.band >= first));
         let groups = |i: usize| -> Vec<_> {
@@ -291,12 +278,20 @@ fn summary(baseline: &Baseline, causes: usize, folds: &Folds, splits: &[SplitGai
         };
         (0..causes).map(|i| DecayChange::of(&groups(i))).collect()
     };
+    let decay_changes = changes(0);
+    let gains = (0..causes)
+        .map(|i| {
+            let [low, high] = interval(&|s| s.each[i]);
+            let [db_rmse_before, db_rmse_after] = decay_changes[i].rmse_db;
+            HeldOutGain { nats_per_bin: mean(&|s| s.each[i]), low, high, db_rmse_before, db_rmse_after }
+        })
+        .collect();
     let curves = |s: &SplitGain| decay_curves(baseline, &s.predicted[0], &s.predicted[1], true);
     Predicted {
         held_out: Some(held_out),
         gains,
         gains_nats: (0..causes).map(|i| splits.iter().map(|s| s.each[i]).sum()).collect(),
-        decay_changes: changes(0),
+        decay_changes,
         diffuse_changes: changes(first_diffuse_band(baseline.survey())),
         gains_everywhere: (0..causes).map(|i| splits.iter().all(|s| s.each[i] > 0.0)).collect(),
         decays: splits.iter().flat_map(curves).collect(),

@@ -78,7 +78,7 @@ fn a_clock_and_a_temperature_come_as_a_set() {
 }
 
 /// Both straighten decays. What scatters is found by chance, more or less: with 3,000 rays this room was named the other way, and with 10,000
-/// of one seed of eight (5000): there the gain at positions left out has an interval that reaches below zero.
+/// of one seed of seven (5000): there the gain at positions left out has an interval that reaches below zero.
 #[test]
 fn some_scattering_is_told_from_walls_that_react_locally() {
     let lab = lab(5000, 12);

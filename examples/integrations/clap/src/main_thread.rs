@@ -41,7 +41,7 @@ pub struct MainThread<'a> {
     project: RefCell<Option<PathBuf>>,
     /// The room that was read last, and where it was.
     room: RefCell<Option<(Place, Arc<Room>)>>,
-    /// Way to the reverb at work, while the instance is active.
+    /// Controls the reverb while the instance is active.
     control: RefCell<Option<RoomReverbControl>>,
 }
 
@@ -134,7 +134,7 @@ impl<'a> MainThread<'a> {
         Ok(())
     }
 
-    /// Hands the gains to the reverb at work.
+    /// Hands the gains to the reverb, if the instance is active.
     fn set_gains(&self) -> Result<(), Failure> {
         let control = self.control.borrow();
         let Some(control) = control.as_ref() else { return Ok(()) };

@@ -74,7 +74,7 @@ impl Room {
     /// Responses for the reverb: from each of `inputs` channels, 1 or 2, to left and right, at a sample rate in Hz.
     ///
     /// A single response, or one for each side, keeps the sides of a stereo input apart, as programs of this kind do: nothing is heard
-    /// across. A mono input is heard as a stereo input of which both sides are alike.
+    /// across. A mono input is heard as a stereo input with the same sound on both sides.
     ///
     /// # Errors
     /// A response that cannot be brought to the sample rate.

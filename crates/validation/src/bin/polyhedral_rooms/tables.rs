@@ -61,7 +61,7 @@ pub fn print(trials: &[Trial]) {
             rest.len()
         );
     }
-    println!("\n| hidden | shape | world | seed | answer | p of what is left | decays left out (dB) |");
+    println!("\n| hidden | shape | world | seed | answer | p without a cause | decays left out (dB) |");
     println!("|---|---|---|---|---|---|---|");
     for t in trials.iter().filter(|t| t.outcome != Outcome::Right) {
         println!(

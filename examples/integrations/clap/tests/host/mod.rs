@@ -173,7 +173,7 @@ pub fn change(at: usize, parameter: Parameter, value: f64) -> ParamValueEvent {
     ParamValueEvent::new(at as u32, parameter.id(), Pckn::match_all(), value)
 }
 
-/// An instance at work.
+/// An active instance.
 pub struct Player {
     pub processor: StartedPluginAudioProcessor<TestHost>,
     input_ports: AudioPorts,
