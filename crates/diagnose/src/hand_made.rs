@@ -99,6 +99,18 @@ impl Tables {
         self
     }
 
+    /// Times as they are if a receiver stands so far from where the survey has it.
+    pub fn with_receiver_moved(mut self, receiver: usize, offset_m: [f64; 3]) -> Self {
+        let mut truth = self.survey.clone();
+        let place = &mut truth.receivers[receiver].position_m;
+        *place = std::array::from_fn(|k| place[k] + offset_m[k]);
+        for (pair, response) in truth.responses.iter().enumerate() {
+            let found = measured(&truth, pair, &self.states[pair], &arrivals(&truth, response));
+            self.measured[pair] = found;
+        }
+        self
+    }
+
     /// Decays of 0.4 s with a scatter of a few decibels, one bin of which is far louder than anything predicted.
     pub fn new(levels: Levels, time_zero: TimeZero) -> Self {
         let survey = survey(levels, time_zero);

@@ -4,6 +4,7 @@
 //! (a mixture of normal distributions about the predicted times and an even background).
 
 pub(crate) mod expansion;
+mod places;
 mod unassigned_peaks;
 
 use crate::effect::Case;
@@ -177,12 +178,11 @@ impl<'a> ArrivalModel<'a> {
         let receiver = self.layout.receiver(response.receiver).start;
         let latency = self.layout.latency(self.assignment[pair]);
         let effects_s = self.effect_delay_s(at, &self.view(pair, arrival));
-        let mut time_s = arrival.length_m / speed + values[latency] + effects_s;
-        for k in 0..3 {
-            let (s, r) = (-arrival.departure[k] / speed, -arrival.arrival[k] / speed);
-            time_s += s * values[source + k] + r * values[receiver + k];
-        }
-        time_s
+        let offset = |first: usize| &values[first..first + 3];
+        let length_m = arrival.length_m
+            + places::longer_m(arrival.length_m, arrival.departure, offset(source))
+            + places::longer_m(arrival.length_m, arrival.arrival, offset(receiver));
+        length_m / speed + values[latency] + effects_s
     }
 
     /// Change of that time with each parameter that matters.
@@ -192,9 +192,9 @@ impl<'a> ArrivalModel<'a> {
         let source = self.layout.source(response.source).start;
         let receiver = self.layout.receiver(response.receiver).start;
         let mut found = Vec::with_capacity(8 + 4 * self.terms.len());
-        for k in 0..3 {
-            found.push((source + k, -arrival.departure[k] / speed));
-            found.push((receiver + k, -arrival.arrival[k] / speed));
+        for (first, direction) in [(source, arrival.departure), (receiver, arrival.arrival)] {
+            let slopes = places::slopes(arrival.length_m, direction, &at.values[first..first + 3]);
+            found.extend(slopes.into_iter().enumerate().map(|(k, slope)| (first + k, slope / speed)));
         }
         found.push((self.layout.latency(self.assignment[pair]), 1.0));
         let view = self.view(pair, arrival);
@@ -349,6 +349,7 @@ pub(crate) fn fit(
     // others away.
     let direct = maximise(&model, &start, "arrival times")?.values;
     let mut firsts = offered(&mut model, &start);
+    firsts.extend(places::starts(&mut model, &direct));
     firsts.extend([(direct, 0), (start, 0)]);
     let mut tops: Vec<LaplaceFit> = Vec::new();
     for (number, width_s) in WIDTHS_S.into_iter().enumerate() {

@@ -1,5 +1,6 @@
 //! Reflections that the mesh does not have: what effects add, where peaks point, and the fit from there.
 
+use super::places::longer_m;
 use super::{ArrivalData, ArrivalModel, At, PEAKS_S, REFLECTION_SD_S, STRAY_SHARE, WIDTHS_S, at_fit, normal};
 use crate::effect::{Case, FittedCase, Nuisance};
 use crate::error::Error;
@@ -154,7 +155,7 @@ impl<'a> ArrivalModel<'a> {
             ),
         ] {
             if !moved.contains(&place) {
-                later_s -= (0..3).map(|k| direction[k] * values[first + k]).sum::<f64>() / speed_m_s;
+                later_s += longer_m(single.length_m, direction, &values[first..first + 3]) / speed_m_s;
             }
         }
         later_s
