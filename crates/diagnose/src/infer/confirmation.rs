@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::infer::candidates::Candidate;
 use crate::infer::cross_validation::{Folds, Predicted, predict};
 use crate::infer::lack_of_fit::{self, Lack};
+use crate::infer::law_search::best::Formulas;
 use crate::infer::ray_dependence::unsettled;
 use crate::infer::search::{Search, State};
 use crate::infer::selection::Selection;
@@ -76,7 +77,8 @@ pub(crate) fn confirm(
 
     let started = Instant::now();
     report(observer, "lack of fit", 0, 2)?;
-    let lack_before = lack_of_fit::test(search, &base)?;
+    let formulas = Formulas::of(baseline)?;
+    let lack_before = lack_of_fit::test(search, &base, &formulas)?;
     report(observer, "lack of fit", 1, 2)?;
     let mut dropped = Vec::new();
     while let Some((worst, doubt)) = doubtful(search, &state, found, &predicted)? {
@@ -89,7 +91,7 @@ pub(crate) fn confirm(
         }
         predicted = predict(search, &state, &in_turn, observer)?;
     }
-    let lack_after = lack_of(search, &state)?;
+    let lack_after = lack_of(search, &state, &formulas)?;
     // Where bins scatter a hundred times as far as they may, the baseline itself has not been met: no name can be trusted.
     let hopeless = baseline.dispersion.iter().any(|d| *d > MAX_DISPERSION);
     let verdict = if hopeless || is_beaten(search, &base, &state, &lack_before) {
@@ -131,11 +133,11 @@ pub(crate) fn confirm(
 }
 
 /// The lack of fit under the chosen causes, where there are any.
-fn lack_of(search: &Search<'_>, state: &State) -> Result<Option<Lack>, Error> {
+fn lack_of(search: &Search<'_>, state: &State, formulas: &Formulas) -> Result<Option<Lack>, Error> {
     if state.chosen.is_empty() {
         return Ok(None);
     }
-    lack_of_fit::test(search, state).map(Some)
+    lack_of_fit::test(search, state, formulas).map(Some)
 }
 
 /// Whether the discrepancy without a name beats all causes. Causes that do not bear on decays are beyond its reach.

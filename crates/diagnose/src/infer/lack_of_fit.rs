@@ -11,6 +11,7 @@ pub(crate) use scatter::odd_bins;
 use crate::effect::Observable;
 use crate::error::Error;
 use crate::infer::baseline::Baseline;
+use crate::infer::law_search::best::Formulas;
 use crate::infer::search::{Search, State};
 use crate::likelihood::arrivals::ArrivalModel;
 use crate::likelihood::decay::{BinResidual, EnergyModel};
@@ -50,8 +51,9 @@ pub(crate) struct Lack {
     pub tests: Vec<Test>,
 }
 
-/// Tests a fitted model: on measurements simulated from the model itself, on what is known of levels, and on what was stated.
-pub(crate) fn test(search: &Search<'_>, state: &State) -> Result<Lack, Error> {
+/// Tests a fitted model: on measurements simulated from the model itself, on what is known of levels, on what was stated, and on what
+/// formulas go with.
+pub(crate) fn test(search: &Search<'_>, state: &State, formulas: &Formulas) -> Result<Lack, Error> {
     let baseline = search.baseline;
     let bands = baseline.survey().bands.len();
     let pairs: Vec<usize> = (0..search.used.len()).filter(|&p| search.used[p]).collect();
@@ -75,6 +77,7 @@ pub(crate) fn test(search: &Search<'_>, state: &State) -> Result<Lack, Error> {
     tests.push(Test { name, subject: farthest, p_value: levels.p_value });
     tests.extend(what_levels_go_with(baseline, &residuals));
     tests.extend(against_statements(search, state));
+    tests.extend(goes_with(search, state, formulas));
     // Corrected for their number (Bonferroni).
     let worst = tests.iter().map(|t| t.p_value).fold(1.0, f64::min);
     Ok(Lack { p_value: (tests.len() as f64 * worst).min(1.0), discrepancy_nats, levels, tests })
@@ -178,6 +181,14 @@ fn what_levels_go_with(baseline: &Baseline, residuals: &[BinResidual]) -> Vec<Te
         Some(Test { name, subject: None, p_value })
     };
     known.into_iter().filter_map(test).collect()
+}
+
+/// Whether what is left goes with an angle, a length, a direction or a time: whether the best of all formulas of the search for laws is better
+/// than chance makes the best of them.
+fn goes_with(search: &Search<'_>, state: &State, formulas: &Formulas) -> Option<Test> {
+    let cases = search.cases_of(&state.chosen, Observable::Decay);
+    let (subject, p_value) = formulas.best(search.baseline, &cases, &state.energy, &search.used)?;
+    Some(Test { name: "decays go with a quantity of paths or places", subject: Some(subject), p_value })
 }
 
 /// Whether fitted absorption, gains and places contradict the room file.

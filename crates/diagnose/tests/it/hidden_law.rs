@@ -82,6 +82,22 @@ fn a_hidden_law_is_named_with_its_size_and_rendered() {
     assert!(own.id() == id && found.model.room(&room).is_ok());
 }
 
+/// Nobody wrote the law, and nobody looks for it: the simulation is not called adequate, and what is wrong with it is said.
+#[test]
+fn a_room_with_a_hidden_law_is_not_called_adequate() {
+    let hidden = Hidden::GrazingAbsorption { material: 0, db: HIDDEN_DB, from_hz: 1000.0 };
+    let (_folder, room) = room(&[hidden]);
+    let found = diagnose(&room, Vec::new()).unwrap();
+    assert_eq!(found.verdict, Verdict::Unexplained, "{:?} {:?}", found.causes, found.lack_of_fit);
+    let test = found.lack_of_fit.tests.iter().find(|test| test.name.contains("go with a quantity")).unwrap();
+    let subject = test.subject.clone().unwrap();
+    let name = &room.scene().materials()[0].name;
+    assert!(
+        test.p_value < 1e-4 && subject.contains(name.as_str()) && subject.contains("cos_incidence"),
+        "{test:?}"
+    );
+}
+
 /// Nobody wrote the law: the quantity that it goes with is found, and how much of it there is. With 1,000 rays the law falls.
 #[test]
 fn what_a_hidden_law_goes_with_is_discovered() {

@@ -129,6 +129,9 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
                 let names: Vec<String> = findings.causes.iter().map(named).collect();
                 told.push(format!("This was found, and does not suffice: {}.", names.join("; ")));
             }
+            if findings.law_search.is_none() {
+                told.push("Try `--discover`: it looks for a formula that no list of causes has.".to_owned());
+            }
         }
     }
     let slight: Vec<String> = findings.causes.iter().filter(|c| c.slight).map(named).collect();

@@ -10,7 +10,9 @@ use nalgebra::DMatrix;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sabine_acoustics::Error as Cause;
-use sabine_paths::laws::{BoundLaws, Law, LawTarget, LawVariable};
+use sabine_paths::laws::{BoundLaws, Law, LawSite, LawTarget, LawVariable};
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 /// Angles through which directions are turned for a sham, in degrees: neither nearly as they are nor nearly opposite throughout.
 const TURNED_DEG: (f64, f64) = (60.0, 300.0);
@@ -65,18 +67,56 @@ struct Turn {
     upside_down: bool,
 }
 
+impl Turn {
+    /// A variable of a path whose ends are turned.
+    fn moved(self, name: &str, value: f64) -> f64 {
+        if name.ends_with("azimuth_deg") {
+            value + self.azimuth_deg
+        } else if name.ends_with("elevation_deg") && self.upside_down {
+            -value
+        } else {
+            value
+        }
+    }
+}
+
+/// Covariates of reflections whose sums are taken along the paths together.
+const TOGETHER: usize = 4;
+
 /// `[band]`, `(bin, column)`.
 fn of_pair(
     pair: &TracedPairView<'_>,
     grammar: &Grammar,
     (turned, turn): (&[usize], Turn),
 ) -> Result<Vec<DMatrix<f64>>, Error> {
-    let mut numbers: Vec<Vec<f32>> = Vec::new();
-    for covariate in &grammar.covariates {
-        numbers.push(on_paths(pair, covariate, None)?);
+    let mut quantities = Quantities { pair, site: pair.law_site(), known: BTreeMap::new() };
+    // Those of reflections come first.
+    let count = grammar.covariates.iter().take_while(|c| c.target == LawTarget::Reflection).count();
+    let (of_reflections, others) = grammar.covariates.split_at(count);
+    let mut numbers = of_surfaces(pair, of_reflections)?;
+    // A product is that of its forms.
+    let mut forms: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for covariate in others {
+        let mut product: Vec<f64> = Vec::new();
+        for form in &covariate.forms {
+            let own = match forms.entry(form.name) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(place) => {
+                    let alone = Covariate { forms: vec![*form], ..covariate.clone() };
+                    place.insert(quantities.taken(&alone, None)?)
+                }
+            };
+            if product.is_empty() {
+                product.clone_from(own);
+            } else {
+                product.iter_mut().zip(own).for_each(|(p, x)| *p *= *x);
+            }
+        }
+        numbers.push(product.into_iter().map(|x| x as f32).collect());
     }
     for &covariate in turned {
-        numbers.push(on_paths(pair, &grammar.covariates[covariate], Some(turn))?);
+        let own = quantities.taken(&grammar.covariates[covariate], Some(turn))?;
+        numbers.push(own.into_iter().map(|x| x as f32).collect());
     }
     let columns = numbers.len();
     let paths = ClassedPaths { classes: vec![0; pair.paths().len()], count: 1, numbers };
@@ -92,49 +132,62 @@ fn of_pair(
     Ok(energies.iter().enumerate().map(of_band).collect())
 }
 
-/// What the unit law of a covariate takes from each path, in dB.
-fn on_paths(pair: &TracedPairView<'_>, covariate: &Covariate, turn: Option<Turn>) -> Result<Vec<f32>, Error> {
-    let law = covariate.unit_law().map_err(Cause::from)?;
-    if covariate.target == LawTarget::Reflection {
-        of_reflections(pair, &law)
-    } else {
-        of_variables(pair, &law, turn)
-    }
-}
-
-fn of_reflections(pair: &TracedPairView<'_>, law: &Law) -> Result<Vec<f32>, Error> {
+/// What the unit laws of covariates of reflections take from each path, in dB.
+fn of_surfaces(pair: &TracedPairView<'_>, covariates: &[Covariate]) -> Result<Vec<Vec<f32>>, Error> {
     let materials = pair.room().survey().materials();
-    let Some(own) = materials.iter().position(|name| Some(name.as_str()) == law.surface()) else {
-        return Ok(vec![0.0; pair.paths().len()]);
-    };
-    let taken =
-        |cosine: f64| law.value(|name| (name == "cos_incidence").then_some(cosine)).map_or(0.0, |db| -db);
-    let sums =
-        pair.paths().sums_by_angle(|material, cosine| [if material == own { taken(cosine) } else { 0.0 }]);
-    Ok(sums.into_iter().map(|[sum]| sum).collect())
+    let mut numbers = Vec::with_capacity(covariates.len());
+    for own in covariates.chunks(TOGETHER) {
+        let laws: Vec<Law> =
+            own.iter().map(Covariate::unit_law).collect::<Result<_, _>>().map_err(Cause::from)?;
+        let surfaces: Vec<Option<usize>> = laws
+            .iter()
+            .map(|law| materials.iter().position(|name| Some(name.as_str()) == law.surface()))
+            .collect();
+        let taken = |law: &Law, cosine: f64| {
+            law.value(|name| (name == "cos_incidence").then_some(cosine)).map_or(0.0, |db| -db)
+        };
+        let step = |material: usize, cosine: f64| -> [f64; TOGETHER] {
+            std::array::from_fn(|i| match surfaces.get(i) {
+                Some(&surface) if surface == Some(material) => taken(&laws[i], cosine),
+                _ => 0.0,
+            })
+        };
+        let sums = pair.paths().sums_by_angle(step);
+        numbers.extend((0..own.len()).map(|i| sums.iter().map(|sum| sum[i]).collect::<Vec<f32>>()));
+    }
+    Ok(numbers)
 }
 
-fn of_variables(pair: &TracedPairView<'_>, law: &Law, turn: Option<Turn>) -> Result<Vec<f32>, Error> {
-    let site = pair.law_site();
-    let bound = BoundLaws::new(std::slice::from_ref(law), &site).map_err(Cause::from)?;
-    let moved = |name: &str, value: f64| match turn {
-        Some(turn) if name.ends_with("azimuth_deg") => value + turn.azimuth_deg,
-        Some(turn) if name.ends_with("elevation_deg") && turn.upside_down => -value,
-        _ => value,
-    };
-    let variables = bound.path_variables(pair.paths(), pair.air().speed_of_sound_m_s());
-    let known: Vec<(String, Vec<f64>)> = variables
-        .into_iter()
-        .map(|v| {
-            let values = v.values.iter().map(|x| moved(&v.name, f64::from(*x))).collect();
-            (v.name, values)
-        })
-        .collect();
-    let parameters: Vec<f64> = law.parameters().map(|(_, p)| p.value).collect();
-    let variable = |name: &str| {
-        let each = known.iter().find(|(own, _)| own == name).map(|(_, values)| LawVariable::Each(values));
-        each.or_else(|| site.variable(name).map(LawVariable::Same))
-    };
-    let taken = law.values(&parameters, pair.paths().len(), variable).map_err(Cause::from)?;
-    Ok(taken.into_iter().map(|db| if db.is_finite() { -db as f32 } else { 0.0 }).collect())
+/// What laws ask of the paths of a pair, each variable looked up once.
+struct Quantities<'a> {
+    pair: &'a TracedPairView<'a>,
+    site: LawSite,
+    known: BTreeMap<String, Vec<f64>>,
+}
+
+impl Quantities<'_> {
+    /// What the unit law of a covariate takes from each path, in dB.
+    fn taken(&mut self, covariate: &Covariate, turn: Option<Turn>) -> Result<Vec<f64>, Error> {
+        let (pair, law) = (self.pair, covariate.unit_law().map_err(Cause::from)?);
+        let names = law.variables();
+        if names.iter().any(|name| !self.known.contains_key(name) && self.site.variable(name).is_none()) {
+            let bound = BoundLaws::new(std::slice::from_ref(&law), &self.site).map_err(Cause::from)?;
+            for v in bound.path_variables(pair.paths(), pair.air().speed_of_sound_m_s()) {
+                self.known.entry(v.name).or_insert_with(|| v.values.iter().map(|x| f64::from(*x)).collect());
+            }
+        }
+        let turned: BTreeMap<&String, Vec<f64>> = turn.map_or_else(BTreeMap::new, |turn| {
+            let own = self.known.iter().filter(|(name, _)| names.contains(name));
+            own.map(|(name, values)| (name, values.iter().map(|x| turn.moved(name, *x)).collect())).collect()
+        });
+        let parameters: Vec<f64> = law.parameters().map(|(_, p)| p.value).collect();
+        let variable = |name: &str| {
+            let each = turned.iter().find(|(own, _)| own.as_str() == name).map(|(_, values)| values);
+            let each = each.or_else(|| self.known.get(name));
+            each.map(|values| LawVariable::Each(values))
+                .or_else(|| self.site.variable(name).map(LawVariable::Same))
+        };
+        let values = law.values(&parameters, pair.paths().len(), variable).map_err(Cause::from)?;
+        Ok(values.into_iter().map(|db| if db.is_finite() { -db } else { 0.0 }).collect())
+    }
 }

@@ -1,7 +1,7 @@
 //! All laws of the grammar, and their shams, beside one fit.
 
 use super::columns::{Column, Sham, ShamPlaces, columns};
-use super::family::{by_chance, largest};
+use super::family::{by_chance, largest, tail};
 use super::features::Features;
 use super::null_model::NullModel;
 use super::screen::{ReadyTerm, Screen, ScreenPair, ScreenTerm};
@@ -145,11 +145,21 @@ impl<'a> LawScreen<'a> {
         self.ranked().into_iter().take(MAX_COMPARED).filter(same).map(|(other, _)| other).collect()
     }
 
+    /// The best of all formulas, and the probability that one as good is found where no law acts.
+    pub fn best(&self) -> Option<(usize, f64)> {
+        let (formula, nats) = self.ranked().into_iter().next()?;
+        Some((formula, tail(nats, &self.drawn())))
+    }
+
     /// Probability that the best of the whole family is as good as a formula where no law acts.
     pub fn family_p(&self, formula: usize) -> f64 {
+        by_chance(self.nats(formula), &self.drawn())
+    }
+
+    /// The best of the whole family in measurements without a law.
+    fn drawn(&self) -> Vec<f64> {
         let columns = self.grammar.covariates.len();
-        let drawn = largest(&self.screen, &self.terms, columns, &self.null, (DRAWS, self.seed ^ 0xFA111));
-        by_chance(self.nats(formula), &drawn)
+        largest(&self.screen, &self.terms, columns, &self.null, (DRAWS, self.seed ^ 0xFA111))
     }
 
     /// The sham that does best.

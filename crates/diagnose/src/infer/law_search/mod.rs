@@ -1,6 +1,7 @@
 //! The search for a law that no catalogue lists: a grammar of formulas is screened by score tests, the best few are fitted beside the
 //! catalogue, and what is chosen must stand trial.
 
+pub(crate) mod best;
 mod columns;
 mod family;
 mod features;

@@ -169,7 +169,7 @@ impl NullModel {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)] // a panic is how a test fails
-    use super::super::family::{by_chance, largest};
+    use super::super::family::{by_chance, largest, tail};
     use super::super::screen::tests::{linear, term};
     use super::super::screen::{ReadyTerm, Screen};
     use super::*;
@@ -177,8 +177,8 @@ mod tests {
     use rand_pcg::Pcg64Mcg;
 
     /// Probabilities of the whole family in worlds without a law, whose places have effects of their own; `known` says whether the null model
-    /// has random effects.
-    fn probabilities(place_sd: f64, known: bool) -> Vec<f64> {
+    /// has random effects; `of` says what a value among those drawn is worth.
+    fn probabilities(place_sd: f64, known: bool, of: fn(f64, &[f64]) -> f64) -> Vec<f64> {
         let world = |seed: u64| -> f64 {
             let (mut pairs, covariance, sd) = linear(100 + seed, 5, 6);
             let mut random = Pcg64Mcg::seed_from_u64(seed);
@@ -221,15 +221,17 @@ mod tests {
                 .map(|(c, shares)| screen.ready(term(c, &[shares], &[0.5])))
                 .collect();
             let best = terms.iter().map(|t| screen.nats(t, &screen.slopes)).fold(f64::NEG_INFINITY, f64::max);
-            by_chance(best, &largest(&screen, &terms, 6, &null, (60, seed)))
+            of(best, &largest(&screen, &terms, 6, &null, (60, seed)))
         };
         (0..120).map(world).collect()
     }
 
     #[test]
     fn without_a_law_probabilities_of_the_family_are_what_they_say() {
-        for place_sd in [0.0, 0.3] {
-            let found = probabilities(place_sd, true);
+        for (place_sd, of) in
+            [(0.0, by_chance as fn(f64, &[f64]) -> f64), (0.3, by_chance), (0.0, tail), (0.3, tail)]
+        {
+            let found = probabilities(place_sd, true, of);
             let below = |p: f64| found.iter().filter(|own| **own <= p).count();
             // 12, 60 of 120 are expected, give or take 3.3 and 5.5; variances that are estimated add to that.
             assert!(
@@ -239,7 +241,7 @@ mod tests {
         }
         // Bins that were taken to scatter independently would find laws far too often: these worlds are small;
         // no larger than those of bins.
-        let found = probabilities(1.0, false);
+        let found = probabilities(1.0, false, by_chance);
         assert!(found.iter().filter(|p| **p <= 0.1).count() > 23, "{found:?}");
     }
 }
