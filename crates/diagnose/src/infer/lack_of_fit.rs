@@ -51,8 +51,8 @@ pub(crate) struct Lack {
     pub tests: Vec<Test>,
 }
 
-/// Tests a fitted model: on measurements simulated from the model itself, on what is known of levels, on what was stated, and on what
-/// formulas go with.
+/// Tests a fitted model: on measurements simulated from the model itself, on what is known of levels, on what was stated, and on
+/// whether they go with an angle, a length, a direction or a time.
 pub(crate) fn test(search: &Search<'_>, state: &State, formulas: &Formulas) -> Result<Lack, Error> {
     let baseline = search.baseline;
     let bands = baseline.survey().bands.len();

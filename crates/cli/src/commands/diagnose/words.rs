@@ -130,7 +130,7 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
                 told.push(format!("This was found, and does not suffice: {}.", names.join("; ")));
             }
             if findings.law_search.is_none() {
-                told.push("Try `--discover`: it looks for a formula that no list of causes has.".to_owned());
+                told.push("The option --discover looks for a formula that no list of causes has.".to_owned());
             }
         }
     }

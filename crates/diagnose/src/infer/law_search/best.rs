@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::infer::baseline::Baseline;
 use crate::likelihood::laplace::LaplaceFit;
 
-/// All formulas, and what is known of their covariates in each bin: the same beside any causes, as long as nothing is traced or expanded anew.
+/// All formulas, and what is known of their covariates in each bin: the same beside any causes, as long as nothing is traced or expanded again.
 pub(crate) struct Formulas {
     grammar: Grammar,
     features: Features,

@@ -2,8 +2,8 @@
 
 use super::{ArrivalModel, WIDTHS_S};
 use crate::effect::Nuisance;
+use crate::simulate::traced_pair::Arrival;
 use crate::survey::surfaces::axes_of;
-use std::ops::Range;
 
 /// From so many responses on, their direct sounds alone say where a place is: three distances leave a place and its mirror image.
 const ENOUGH_RESPONSES: usize = 4;
@@ -32,8 +32,8 @@ pub(super) fn slopes(length_m: f64, direction: [f64; 3], offset_m: &[f64]) -> [f
 }
 
 /// Where the search for places starts that the cases open, and the width ([`WIDTHS_S`]) with which each start is followed. A direct sound
-/// says how far away a place is, and reflections say where about the source it lies; but from a place a foot away their peaks find no
-/// partners. `direct` are the values at which the direct sounds alone come when they should.
+/// says how far away a place is, and reflections say where about the source it lies; but from a place 30 cm away their peaks find
+/// no partners. `direct` are the values at which the direct sounds alone come when they should.
 pub(super) fn starts(model: &mut ArrivalModel<'_>, direct: &[f64]) -> Vec<(Vec<f64>, usize)> {
     let opened: Vec<Nuisance> = model.terms.iter().flat_map(|t| &t.case.relaxes).map(|r| r.0).collect();
     let mut found = Vec::new();
@@ -43,7 +43,10 @@ pub(super) fn starts(model: &mut ArrivalModel<'_>, direct: &[f64]) -> Vec<(Vec<f
         if !(1..ENOUGH_RESPONSES).contains(&pairs.len()) {
             continue;
         }
-        let places = places(model, nuisance, pairs[0], &direct[range.clone()]);
+        let first = &model.data.arrivals[pairs[0]][0];
+        let is_source = matches!(nuisance, Nuisance::SourcePosition(_));
+        let towards = if is_source { first.departure } else { first.arrival };
+        let places = places(first, towards, &direct[range.clone()], model.priors[range.start].sd);
         let at = |place: &[f64; 3]| {
             let mut values = direct.to_vec();
             values[range.clone()].copy_from_slice(place);
@@ -87,14 +90,10 @@ fn pairs_of(model: &ArrivalModel<'_>, nuisance: Nuisance) -> Vec<usize> {
     (0..model.assignment.len()).filter(has).collect()
 }
 
-/// Offsets of a place, evenly over the sphere about the other end of a pair on which the direct sound has it.
-fn places(model: &ArrivalModel<'_>, nuisance: Nuisance, pair: usize, direct_m: &[f64]) -> Vec<[f64; 3]> {
-    let first = &model.data.arrivals[pair][0];
-    let towards =
-        if matches!(nuisance, Nuisance::SourcePosition(_)) { first.departure } else { first.arrival };
+/// Offsets of a place, evenly over the sphere about the other end of a direct sound on which that has it; `towards` points to that end.
+fn places(first: &Arrival, towards: [f64; 3], direct_m: &[f64], sd_m: f64) -> Vec<[f64; 3]> {
     let radius_m = first.length_m + longer_m(first.length_m, towards, direct_m);
-    let Range { start, .. } = model.layout.nuisance(nuisance).unwrap_or(0..0);
-    let reach_m = (REACH_SD * model.priors[start].sd).min(0.9 * radius_m);
+    let reach_m = (REACH_SD * sd_m).min(0.9 * radius_m);
     let steps = (reach_m / SPACING_M).floor() as i32;
     let [along, u, v] = axes_of(towards);
     let mut found = Vec::new();
@@ -108,7 +107,8 @@ fn places(model: &ArrivalModel<'_>, nuisance: Nuisance, pair: usize, direct_m: &
     found
 }
 
-fn apart_m(a: [f64; 3], b: [f64; 3]) -> f64 {
+/// The distance of two places.
+pub(super) fn apart_m(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
 }
 

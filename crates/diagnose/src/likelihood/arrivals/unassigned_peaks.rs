@@ -1,6 +1,6 @@
 //! Reflections that the mesh does not have: what effects add, where peaks point, and the fit from there.
 
-use super::places::longer_m;
+use super::places::{apart_m, longer_m};
 use super::{ArrivalData, ArrivalModel, At, PEAKS_S, REFLECTION_SD_S, STRAY_SHARE, WIDTHS_S, at_fit, normal};
 use crate::effect::{Case, FittedCase, Nuisance};
 use crate::error::Error;
@@ -14,10 +14,6 @@ use crate::survey::Survey;
 
 /// Images nearer to each other than this are one, in metres.
 const SAME_M: f64 = 0.3;
-
-fn apart_m(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
-}
 
 /// A reflection that an effect adds, and, where slopes are wanted, how its time and its height change with parameters.
 pub(super) struct AddedArrival {
