@@ -4,6 +4,7 @@
 //! (a mixture of normal distributions about the predicted times and an even background).
 
 pub(crate) mod expansion;
+mod peak_origins;
 mod places;
 mod unassigned_peaks;
 
@@ -12,10 +13,11 @@ use crate::error::Error;
 use crate::extend::displaced_surface::{DisplacedSurface, Mirror, mirrors};
 use crate::likelihood::laplace::{LaplaceFit, Model, Prior, Slopes, maximise};
 use crate::likelihood::parameters::{ArrivalLayout, ModelTerm, ModelTerms};
-use crate::observe::observed_response::{Measured, PEAK_FLOOR_DB, PEAKS_S};
+use crate::observe::observed_response::{Measured, PEAKS_S};
 use crate::simulate::traced_pair::Arrival;
 use crate::simulate::views::ArrivalView;
 use crate::survey::Survey;
+use peak_origins::PeakOrigins;
 use sabine_scene::TimeZero;
 
 /// How well the time of a direct sound can be read at [`READ_HZ`]: a third of a sample. Slower recordings are read worse.
@@ -24,12 +26,10 @@ const DIRECT_SD_S: f64 = 2.5e-5;
 const REFLECTION_SD_S: f64 = 5e-5;
 /// Sample rate from which times are read as well as that.
 const READ_HZ: f64 = 16e3;
-/// Share of peaks that belong to no predicted reflection.
-const STRAY_SHARE: f64 = 0.4;
-/// Share of all peaks' worth that one peak has in which a surface that the mesh lacks is seen: two of three responses show it.
+/// Share of responses in which a surface that the mesh lacks is seen.
 const SEEN_SHARE: f64 = 0.65;
 /// Height of such a peak about what reflectance and distance give: its neighbours, and colour, in dB.
-const HEIGHT_SD_DB: f64 = 2.5;
+const ADDED_HEIGHT_SD_DB: f64 = 2.5;
 /// Share of direct sounds whose time was misread.
 const MISREAD_SHARE: f64 = 0.02;
 /// Times at which the fit starts to look for partners of a peak, and how it narrows.
@@ -64,6 +64,8 @@ pub(crate) struct ArrivalModel<'a> {
     priors: Vec<Prior>,
     used: &'a [bool],
     assignment: Vec<usize>,
+    /// By pair.
+    origins: Vec<PeakOrigins>,
     /// Reflections count with this much more than their own width; `None`: only the direct sound counts, and is never misread.
     width_s: Option<f64>,
 }
@@ -107,7 +109,8 @@ impl<'a> ArrivalModel<'a> {
         let cases = cases.iter().copied().enumerate();
         let all = ModelTerms::new(priors, cases, survey, |nuisance| layout.nuisance(nuisance));
         let ModelTerms { priors, terms, assignment, .. } = all;
-        Self { data, layout, terms, priors, used, assignment, width_s: None }
+        let origins = PeakOrigins::of(data, &assignment, used);
+        Self { data, layout, terms, priors, used, assignment, origins, width_s: None }
     }
 
     /// Values, with what their terms make of the mirrors; a step farther, too, where slopes are wanted.
@@ -255,19 +258,15 @@ impl<'a> ArrivalModel<'a> {
         let mut value = (right + wrong).ln();
 
         let sd = (REFLECTION_SD_S * measured.slowness()).hypot(width_s);
-        let amplitudes: Vec<f64> = later.iter().map(|a| a.energy.sqrt()).collect();
-        let amplitude: f64 = amplitudes.iter().sum();
-        if amplitude <= 0.0 {
-            return value;
-        }
+        let origins = &self.origins[pair];
         let times_s: Vec<f64> = later.iter().map(|a| self.time_s(at, pair, a)).collect();
         let mut in_time: Vec<(f64, usize)> = times_s.iter().copied().zip(0..).collect();
         in_time.sort_by(|a, b| a.0.total_cmp(&b.0));
         // Sums over the peaks whose partner each may be.
         let mut sums = vec![[0.0; 2]; later.len()];
         let more = self.added(at, pair);
-        let each = SEEN_SHARE / measured.peaks_s.len().max(1) as f64;
-        let rest = 1.0 - each * more.len() as f64;
+        // Where it should be seen, and is not.
+        value -= SEEN_SHARE * more.len() as f64;
         let mut partners: Vec<(usize, f64)> = Vec::new();
         for (peak, height_db) in measured.peaks_s.iter().zip(&measured.peaks_db) {
             partners.clear();
@@ -275,18 +274,17 @@ impl<'a> ArrivalModel<'a> {
             let near = in_time[first..].iter().take_while(|(time_s, _)| *time_s < peak + FAR_SD * sd);
             partners.extend(near.map(|&(time_s, i)| {
                 let density = normal(peak - time_s, sd);
-                (i, rest * (1.0 - STRAY_SHARE) * amplitudes[i] / amplitude * density)
+                (i, origins.predicted(i, *height_db) * density)
             }));
-            // Heights of other peaks say nothing: anything down to the floor is as probable.
             let added: Vec<f64> = more
                 .iter()
                 .map(|m| {
-                    each * normal(peak - m.time_s, sd)
-                        * normal(height_db - m.level_db, HEIGHT_SD_DB)
-                        * PEAK_FLOOR_DB
+                    SEEN_SHARE
+                        * normal(peak - m.time_s, sd)
+                        * normal(height_db - m.level_db, ADDED_HEIGHT_SD_DB)
                 })
                 .collect();
-            let stray = rest * STRAY_SHARE / PEAKS_S;
+            let stray = origins.stray(peak - measured.direct_s, *height_db);
             let total =
                 partners.iter().map(|(_, density)| density).sum::<f64>() + added.iter().sum::<f64>() + stray;
             value += total.ln();
@@ -304,7 +302,7 @@ impl<'a> ArrivalModel<'a> {
                 let share = density / total;
                 if share > 1e-3 {
                     push(&m.slopes, weighed(peak - m.time_s, sd, share));
-                    push(&m.level_slopes, weighed(height_db - m.level_db, HEIGHT_SD_DB, share));
+                    push(&m.level_slopes, weighed(height_db - m.level_db, ADDED_HEIGHT_SD_DB, share));
                 }
             }
         }

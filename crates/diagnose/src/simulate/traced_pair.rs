@@ -37,7 +37,7 @@ pub(crate) struct Arrival {
     pub length_m: f64,
     pub departure: [f64; 3],
     pub arrival: [f64; 3],
-    /// Energy in the mean over the bands.
+    /// Energy in the mean over all frequencies of the bands: in a sharp peak, a band counts by its width.
     pub energy: f64,
     /// Surfaces (indices) that it meets, from the source on; none where it could not be followed.
     pub surfaces: Vec<usize>,
@@ -129,13 +129,19 @@ impl TracedPair {
     /// The exact paths, the shortest first. Which surfaces they meet is not filled in.
     pub fn arrivals(&self, materials: &[Material], within_s: f64) -> Result<Vec<Arrival>, Error> {
         let energies = self.paths.energies(&Conditions::new(materials, &self.air))?;
+        let bands = materials[0].bands();
+        // All bands are as wide in proportion.
+        let widths: Vec<f64> = (0..bands.len()).map(|band| bands.exact_hz(band)).collect();
+        let all: f64 = widths.iter().sum();
+        let mean =
+            |i: usize| energies.iter().zip(&widths).map(|(e, w)| w * f64::from(e[i])).sum::<f64>() / all;
         let mut found: Vec<Arrival> = (0..self.paths.len())
             .filter(|&i| self.paths.is_exact(i) && f64::from(self.times_s[i]) <= within_s)
             .map(|i| Arrival {
                 length_m: f64::from(self.paths.lengths_m()[i]),
                 departure: self.paths.departure(i),
                 arrival: self.paths.arrival(i),
-                energy: energies.iter().map(|e| f64::from(e[i])).sum::<f64>() / energies.len() as f64,
+                energy: mean(i),
                 surfaces: Vec::new(),
             })
             .collect();

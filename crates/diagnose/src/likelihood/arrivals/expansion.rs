@@ -1,6 +1,7 @@
 //! Arrival times of one response, expanded about some values.
 
-use super::{ArrivalModel, DIRECT_SD_S, MISREAD_SHARE, READ_HZ, REFLECTION_SD_S, STRAY_SHARE, normal};
+use super::peak_origins::PeakOrigins;
+use super::{ArrivalModel, DIRECT_SD_S, MISREAD_SHARE, READ_HZ, REFLECTION_SD_S, normal};
 use crate::likelihood::expansion::Expansion;
 use crate::observe::observed_response::{MAX_PEAKS, PEAK_DISTANCE_S, PEAK_FLOOR_DB, PEAKS_S};
 use crate::simulate::traced_pair::Arrival;
@@ -34,14 +35,16 @@ impl ArrivalModel<'_> {
         let all = &self.data.arrivals[pair];
         let at = self.at(values, true);
         let slowness = (READ_HZ / rate_hz).max(1.0);
-        let amplitude: f64 = all.iter().skip(1).map(|a| a.energy.sqrt()).sum();
+        let origins = PeakOrigins::expected(all, heard);
         let sure = |i: usize| {
             if i == 0 {
                 return (1.0 - MISREAD_SHARE) / (DIRECT_SD_S * slowness).powi(2);
             }
             let sd = REFLECTION_SD_S * slowness;
-            let own = (1.0 - STRAY_SHARE) * all[i].energy.sqrt() / amplitude * normal(0.0, sd);
-            own / (own + STRAY_SHARE / PEAKS_S) / (sd * sd)
+            let level_db = origins.level_db(i - 1);
+            let own = origins.predicted(i - 1, level_db) * normal(0.0, sd);
+            let after_s = (all[i].length_m - all[0].length_m) / self.data.speed_m_s[pair];
+            own / (own + origins.stray(after_s, level_db)) / (sd * sd)
         };
         let timed: Vec<usize> = (0..all.len().min(1)).chain(heard.iter().copied()).collect();
         let mut slopes = DMatrix::zeros(timed.len(), self.priors.len());
@@ -79,7 +82,8 @@ mod tests {
             let heard = heard(&tables.arrivals[pair], speed);
             let s = |i: &usize| tables.arrivals[pair][*i].length_m / speed;
             tables.measured[pair].peaks_s = heard.iter().map(s).collect();
-            tables.measured[pair].peaks_db = vec![-6.0; heard.len()];
+            let origins = PeakOrigins::expected(&tables.arrivals[pair], &heard);
+            tables.measured[pair].peaks_db = heard.iter().map(|i| origins.level_db(i - 1)).collect();
             tables.measured[pair].direct_s = s(&0);
         }
         let data = tables.arrival_data();

@@ -1,7 +1,7 @@
 //! Reflections that the mesh does not have: what effects add, where peaks point, and the fit from there.
 
 use super::places::{apart_m, longer_m};
-use super::{ArrivalData, ArrivalModel, At, PEAKS_S, REFLECTION_SD_S, STRAY_SHARE, WIDTHS_S, at_fit, normal};
+use super::{ArrivalData, ArrivalModel, At, REFLECTION_SD_S, WIDTHS_S, at_fit, normal};
 use crate::effect::{Case, FittedCase, Nuisance};
 use crate::error::Error;
 use crate::extend::model_change::ModelChange;
@@ -89,23 +89,21 @@ impl<'a> ArrivalModel<'a> {
                 if !self.used[pair] {
                     return Vec::new();
                 }
-                let amplitude: f64 = later.iter().map(|a| a.energy.sqrt()).sum();
+                let origins = &self.origins[pair];
                 let times: Vec<f64> = later.iter().map(|a| self.time_s(&at, pair, a)).collect();
                 let direct_s = self.time_s(&at, pair, direct);
                 let measured = &self.data.measured[self.assignment[pair]];
-                let one = |peak: &f64| {
-                    let explained: f64 = later
-                        .iter()
-                        .zip(&times)
-                        .map(|(a, t)| a.energy.sqrt() / amplitude * normal(peak - t, REFLECTION_SD_S))
-                        .sum();
-                    let stray = STRAY_SHARE / PEAKS_S;
+                let one = |(peak, height_db): (&f64, &f64)| {
+                    let predicted = times.iter().enumerate().map(|(i, time_s)| {
+                        origins.predicted(i, *height_db) * normal(peak - time_s, REFLECTION_SD_S)
+                    });
+                    let stray = origins.stray(peak - measured.direct_s, *height_db);
                     UnassignedPeak {
                         length_m: direct.length_m + (peak - direct_s) * self.data.speed_m_s[pair],
-                        stray: stray / (stray + (1.0 - STRAY_SHARE) * explained),
+                        stray: stray / (stray + predicted.sum::<f64>()),
                     }
                 };
-                measured.peaks_s.iter().map(one).collect()
+                measured.peaks_s.iter().zip(&measured.peaks_db).map(one).collect()
             })
             .collect();
         UnassignedPeaks { survey: self.data.survey, peaks }
