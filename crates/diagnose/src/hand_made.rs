@@ -2,6 +2,7 @@
 
 use crate::config::DiagnoseConfig;
 use crate::effect::Case;
+use crate::extend::rigid_motion::RigidMotion;
 use crate::infer::baseline::Baseline;
 use crate::likelihood::arrivals::ArrivalData;
 use crate::likelihood::decay::EnergyData;
@@ -100,12 +101,26 @@ impl Tables {
     }
 
     /// Times as they are if a receiver stands so far from where the survey has it.
-    pub fn with_receiver_moved(mut self, receiver: usize, offset_m: [f64; 3]) -> Self {
+    pub fn with_receiver_moved(self, receiver: usize, offset_m: [f64; 3]) -> Self {
         let mut truth = self.survey.clone();
         let place = &mut truth.receivers[receiver].position_m;
         *place = std::array::from_fn(|k| place[k] + offset_m[k]);
+        self.measured_at(&truth)
+    }
+
+    /// Times as they are if all places stand where a motion brings them.
+    pub fn with_places_moved(self, motion: &RigidMotion) -> Self {
+        let mut truth = self.survey.clone();
+        for place in truth.sources.iter_mut().chain(&mut truth.receivers) {
+            place.position_m = motion.moved(place.position_m);
+        }
+        self.measured_at(&truth)
+    }
+
+    /// Times as they are at the places of another survey.
+    fn measured_at(mut self, truth: &Survey) -> Self {
         for (pair, response) in truth.responses.iter().enumerate() {
-            let found = measured(&truth, pair, &self.states[pair], &arrivals(&truth, response));
+            let found = measured(truth, pair, &self.states[pair], &arrivals(truth, response));
             self.measured[pair] = found;
         }
         self

@@ -106,6 +106,7 @@ pub use extend::extended_room::ExtendedRoom;
 pub use extend::law_file::{read_laws, shipped_laws};
 pub use extend::model_change::ModelChange;
 pub use extend::moved_mesh::DisplacementError;
+pub use extend::rigid_motion::RigidMotion;
 pub use extend::uncertainty::Uncertainty;
 pub use found_parameter::FoundParameter;
 pub use likelihood::multilateration::{UnassignedPeak, UnassignedPeaks};

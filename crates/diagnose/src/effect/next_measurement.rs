@@ -22,6 +22,8 @@ pub enum NextMeasurement {
     Loopback,
     /// Distances by other means than sound.
     Distances,
+    /// From places to walls and floor, by other means than sound.
+    DistancesToWalls,
     /// Again with channels exchanged.
     ExchangedChannel,
     /// Again, quieter.
@@ -62,6 +64,9 @@ impl fmt::Display for NextMeasurement {
             }
             Self::Distances => {
                 "Measure two distances with a laser: between the far walls, and from the loudspeaker to a microphone."
+            }
+            Self::DistancesToWalls => {
+                "Measure with a laser how far the loudspeaker and one microphone are from two walls at right angles and from the floor."
             }
             Self::ExchangedChannel => {
                 "Exchange the microphone's cable and channel with a neighbour's and measure again."

@@ -6,6 +6,7 @@ mod background_noise;
 mod channel_fault;
 mod channel_response;
 mod coherent_reflections;
+mod coordinate_shift;
 mod coupled_volume;
 mod edge_diffraction;
 mod extra_reflector;
@@ -33,6 +34,7 @@ pub use background_noise::BackgroundNoise;
 pub use channel_fault::ChannelFault;
 pub use channel_response::ChannelResponse;
 pub use coherent_reflections::CoherentReflections;
+pub use coordinate_shift::CoordinateShift;
 pub use coupled_volume::CoupledVolume;
 pub use edge_diffraction::MissingDiffraction;
 pub use extra_reflector::ExtraReflector;
@@ -84,6 +86,7 @@ pub fn catalogue() -> Vec<Box<dyn Effect>> {
         Box::new(ChannelResponse),
         Box::new(CoherentReflections),
         Box::new(SurfaceDisplacement),
+        Box::new(CoordinateShift),
     ]
 }
 

@@ -1,6 +1,7 @@
 //! What the changes of a model make of a room, taken together.
 
 use crate::extend::displaced_surface::DisplacedSurface;
+use crate::extend::rigid_motion::RigidMotion;
 use sabine_paths::laws::Law;
 use sabine_scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -48,8 +49,10 @@ pub struct AppliedChanges {
     pub dimensions: Option<Dimensions>,
     /// Surfaces of the mesh that stand elsewhere; each at most once. They are moved before the room is scaled.
     pub surfaces: Vec<DisplacedSurface>,
-    /// Where sources and receivers stand that are not where the room file says, by name, in metres.
+    /// Where sources and receivers stand that are not where the room file says, by name, in metres, in its coordinates.
     pub position_m: BTreeMap<String, [f64; 3]>,
+    /// From the coordinates of the room file to those of the mesh: all places move, and the axes that the room file states.
+    pub coordinate_shift: Option<RigidMotion>,
     /// Latency of all responses in seconds.
     pub latency_s: Option<f64>,
     /// Responses (SOURCE-RECEIVER) whose sign is turned.

@@ -158,19 +158,7 @@ impl AppliedChanges {
         let temperature_c = self.temperature_c.unwrap_or(stated.temperature_c());
         let air = Air::new(temperature_c, humidity, stated.pressure_kpa())
             .map_err(|e| ("temperature_c".to_owned(), e))?;
-        let at = |id: &str, stated: [f64; 3]| self.position_m.get(id).copied().unwrap_or(stated);
-        let moved = |s: &Source| Source {
-            position_m: at(&s.id, s.position_m),
-            axis: self.axis.get(&s.id).copied().or(s.axis),
-            ..s.clone()
-        };
-        let sources: Vec<Source> = room.sources().iter().map(moved).collect();
-        let heard = |r: &Receiver| Receiver {
-            position_m: at(&r.id, r.position_m),
-            axis: self.receiver_axis.get(&r.id).copied().or(r.axis),
-            ..r.clone()
-        };
-        let receivers: Vec<Receiver> = room.receivers().iter().map(heard).collect();
+        let (sources, receivers) = self.placed(room);
         let of_source = |s: &Source| {
             let share = Some(&self.directed_share).filter(|share| !share.is_empty());
             share.map(|share| {
@@ -204,6 +192,30 @@ impl AppliedChanges {
             laws,
             chain,
         })
+    }
+
+    /// Sources and receivers where they stand, with their axes.
+    fn placed(&self, room: &MeasuredRoom) -> (Vec<Source>, Vec<Receiver>) {
+        let motion = self.coordinate_shift;
+        let at = |id: &str, stated: [f64; 3]| {
+            let place_m = self.position_m.get(id).copied().unwrap_or(stated);
+            motion.map_or(place_m, |m| m.moved(place_m))
+        };
+        let turned = |stated: Option<[f64; 3]>| match motion {
+            Some(m) => stated.map(|axis| m.turned(axis)),
+            None => stated,
+        };
+        let moved = |s: &Source| Source {
+            position_m: at(&s.id, s.position_m),
+            axis: self.axis.get(&s.id).copied().or_else(|| turned(s.axis)),
+            ..s.clone()
+        };
+        let heard = |r: &Receiver| Receiver {
+            position_m: at(&r.id, r.position_m),
+            axis: self.receiver_axis.get(&r.id).copied().or_else(|| turned(r.axis)),
+            ..r.clone()
+        };
+        (room.sources().iter().map(moved).collect(), room.receivers().iter().map(heard).collect())
     }
 
     fn scene(&self, stated: &Scene, moved: &Scene, materials: Vec<Material>) -> Result<Scene, Cause> {

@@ -12,4 +12,5 @@ mod model_checks;
 pub(crate) mod moved_mesh;
 mod number_slopes;
 pub(crate) mod recording_chain;
+pub(crate) mod rigid_motion;
 pub(crate) mod uncertainty;

@@ -2,6 +2,7 @@
 
 use crate::extend::applied_changes::{AppliedChanges, CoupledDecay, Dimensions, GainOverTime, ThinPanel};
 use crate::extend::displaced_surface::{DisplacedSurface, put};
+use crate::extend::rigid_motion::RigidMotion;
 use sabine_paths::laws::Law;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -67,7 +68,10 @@ pub enum ModelChange {
     /// Latency of all responses in seconds.
     #[serde(rename = "latency_s")]
     Latency(f64),
-    /// Position of a source or receiver, by name, in metres.
+    /// All sources and receivers stand elsewhere together, with their axes: from the coordinates of the room file to those of the mesh. It
+    /// acts on places that other changes state, too, whatever their order.
+    CoordinateShift(RigidMotion),
+    /// Position of a source or receiver, by name, in metres, in the coordinates of the room file.
     #[serde(rename = "position")]
     Position {
         /// Its name.
@@ -104,7 +108,11 @@ impl ModelChange {
     pub(crate) fn moves_paths(&self) -> bool {
         matches!(
             self,
-            Self::Position { .. } | Self::Temperature(_) | Self::Dimensions(_) | Self::SurfaceDisplacement(_)
+            Self::Position { .. }
+                | Self::CoordinateShift(_)
+                | Self::Temperature(_)
+                | Self::Dimensions(_)
+                | Self::SurfaceDisplacement(_)
         )
     }
 }
@@ -143,6 +151,7 @@ impl AppliedChanges {
             ModelChange::Position { id, position_m } => {
                 self.position_m.insert(id, position_m);
             }
+            ModelChange::CoordinateShift(motion) => self.coordinate_shift = Some(motion),
             ModelChange::Inverted(response) => self.inverted.push(response),
             ModelChange::ResponseGain { response, gain_db } => {
                 self.response_gain_db.insert(response, gain_db);

@@ -71,6 +71,16 @@ impl AppliedChanges {
         for (name, &gain) in &self.response_gain_db {
             check.each(&format!("response_gain.{name}"), &[gain], (-200.0, 200.0), "within 200 dB")?;
         }
+        if let Some(motion) = &self.coordinate_shift {
+            check.each("coordinate_shift.shift_m", &motion.shift_m, (-100.0, 100.0), "within 100 m")?;
+            check.each(
+                "coordinate_shift.turn_deg",
+                &[motion.turn_deg],
+                (-180.0, 180.0),
+                "within 180 degrees",
+            )?;
+            check.each("coordinate_shift.about_m", &motion.about_m, (-1e5, 1e5), "a finite coordinate")?;
+        }
         for surface in &self.surfaces {
             check.each("surface.point_m", &surface.point_m, (-1e5, 1e5), "a finite coordinate")?;
             let length = dot(surface.normal, surface.normal).sqrt();

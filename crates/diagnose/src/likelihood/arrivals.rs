@@ -424,14 +424,16 @@ mod tests {
     use super::*;
     use crate::effect::Effect;
     use crate::effects::{
-        PositionError, RoomDimensions, SamplingClock, SoundSpeed, SurfaceDisplacement, TimeZeroOffset,
+        CoordinateShift, PositionError, RoomDimensions, SamplingClock, SoundSpeed, SurfaceDisplacement,
+        TimeZeroOffset,
     };
     use crate::hand_made::Tables;
     use sabine_scene::Levels;
 
     #[test]
     fn the_gradient_is_that_of_central_differences() {
-        let effects: [&dyn Effect; 6] = [
+        let effects: [&dyn Effect; 7] = [
+            &CoordinateShift,
             &PositionError,
             &RoomDimensions,
             &SamplingClock,

@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::extend::applied_changes::Dimensions;
 use crate::extend::displaced_surface::DisplacedSurface;
 use crate::extend::moved_mesh::find_ranges;
+use crate::extend::rigid_motion::RigidMotion;
 use crate::observe::observations::Observations;
 use crate::observe::observed_response::PEAKS_S;
 use crate::simulate::band_state::BandState;
@@ -70,6 +71,8 @@ pub(crate) struct Simulation {
     dimensions: Option<Dimensions>,
     /// Surfaces that were found to stand elsewhere, by their number.
     pub displaced: Vec<(usize, DisplacedSurface)>,
+    /// The motion of all places that was found: sources and receivers stand where it has brought them.
+    coordinate_shift: Option<RigidMotion>,
     /// The surfaces of the mesh as stated.
     surfaces: Arc<Surfaces>,
     /// Which of them the paths meet in the mesh as it is traced.
@@ -128,6 +131,7 @@ impl Simulation {
             resized: None,
             dimensions: None,
             displaced: Vec::new(),
+            coordinate_shift: None,
             tracer: Arc::clone(tracer),
             prepared,
             edges,
@@ -263,6 +267,7 @@ impl Simulation {
             resized: None,
             dimensions: None,
             displaced: Vec::new(),
+            coordinate_shift: None,
             edges: None,
             sources: survey.sources.iter().map(source).collect::<Result<_, _>>()?,
             receivers: survey.receivers.iter().map(receiver).collect::<Result<_, _>>()?,

@@ -11,7 +11,7 @@ use sabine_propagate::{PathTracer, TracerConfig};
 use sabine_scene::{Levels, MeasuredRoom, Receiver};
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
 
-fn lab(seed: u64) -> Laboratory {
+pub(crate) fn lab(seed: u64) -> Laboratory {
     Laboratory::new(LabConfig { seed, receivers: 8, ..LabConfig::default() }).unwrap()
 }
 
@@ -25,7 +25,7 @@ fn diagnose(lab: &Laboratory, hidden: &[Hidden]) -> Diagnosis {
 }
 
 /// Weighs these effects, and all at night.
-fn diagnose_among(lab: &Laboratory, hidden: &[Hidden], effects: &[&str]) -> Diagnosis {
+pub(crate) fn diagnose_among(lab: &Laboratory, hidden: &[Hidden], effects: &[&str]) -> Diagnosis {
     diagnose_by(&diagnoser_among(few_rays(), effects), lab, hidden)
 }
 
@@ -36,13 +36,14 @@ fn diagnose_by(diagnoser: &Diagnoser, lab: &Laboratory, hidden: &[Hidden]) -> Di
 }
 
 /// What moves arrival times.
-const ON_TIMES: [&str; 7] = [
+pub(crate) const ON_TIMES: [&str; 8] = [
     "time_zero",
     "sound_speed",
     "sampling_clock",
     "position_error",
     "room_dimensions",
     "surface_displacement",
+    "coordinate_shift",
     "extra_reflector",
 ];
 /// What bends decays or lifts their ends, the same for all responses.
@@ -66,7 +67,7 @@ const ON_LEVELS: [&str; 6] = [
 ];
 
 /// The one cause that is named, with a gain at positions not seen.
-fn only_cause(found: &Diagnosis, effect: &str) -> sabine_diagnose::Cause {
+pub(crate) fn only_cause(found: &Diagnosis, effect: &str) -> sabine_diagnose::Cause {
     let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
     assert_eq!(found.verdict, Verdict::Explained, "{named:?} {:?}", found.lack_of_fit);
     assert_eq!(named, [effect]);

@@ -2,6 +2,7 @@
 
 mod any_tracer;
 mod channel_gains;
+mod coordinate_shift;
 mod extended_laws;
 mod extended_model;
 mod hidden_distortion;

@@ -68,6 +68,7 @@ impl Hidden {
                 };
                 position.iter_mut().zip(offset_m).for_each(|(c, o)| *c += o);
             }
+            Self::CoordinateShift { shift_m, turn_deg } => shift_places(truth, *shift_m, *turn_deg),
             Self::TimeZero { latency_s } => {
                 truth.latencies_s.iter_mut().for_each(|l| *l += latency_s);
             }
@@ -127,6 +128,32 @@ fn displace(truth: &mut Truth, face: usize, offset_m: f64) -> Result<(), Error> 
         truth.origin_m[axis] -= offset_m;
     }
     Ok(())
+}
+
+/// Turns all places about the vertical through their mean, with what looks along an axis, and shifts them.
+fn shift_places(truth: &mut Truth, shift_m: [f64; 3], turn_deg: f64) {
+    let (sin, cos) = turn_deg.to_radians().sin_cos();
+    let all: Vec<[f64; 3]> =
+        truth.sources.iter().map(|s| s.position_m).chain(truth.receivers_m.iter().copied()).collect();
+    let mean = |k: usize| all.iter().map(|place| place[k]).sum::<f64>() / all.len() as f64;
+    let (x, y) = (mean(0), mean(1));
+    // What a turn adds, so that none adds nothing.
+    let more = |east: f64, north: f64| [(cos - 1.0) * east - sin * north, sin * east + (cos - 1.0) * north];
+    let places = truth.sources.iter_mut().map(|s| &mut s.position_m).chain(&mut truth.receivers_m);
+    for place in places {
+        let [east, north] = more(place[0] - x, place[1] - y);
+        place
+            .iter_mut()
+            .zip([east, north, 0.0])
+            .zip(shift_m)
+            .for_each(|((c, turn), shift)| *c += turn + shift);
+    }
+    let axes = truth.sources.iter_mut().map(|s| &mut s.axis);
+    for axis in axes.chain(truth.microphones.iter_mut().map(|m| &mut m.axis)) {
+        let [east, north] = more(axis[0], axis[1]);
+        axis[0] += east;
+        axis[1] += north;
+    }
 }
 
 /// Refuses an effect that does not fit the room; those that are not here say so themselves ([`Hidden::apply`]).
@@ -205,6 +232,12 @@ fn check(truth: &Truth, effect: &Hidden) -> Result<(), Error> {
             Ok(offset_m
                 .iter()
                 .try_for_each(|&o| OutOfRange::check("offset (m)", o, -10.0, 10.0, "within 10 m"))?)
+        }
+        Hidden::CoordinateShift { shift_m, turn_deg } => {
+            for shift in shift_m {
+                OutOfRange::check("shift of all places (m)", *shift, -2.0, 2.0, "within 2 m")?;
+            }
+            Ok(OutOfRange::check("turn of all places (deg)", *turn_deg, -30.0, 30.0, "within 30 degrees")?)
         }
         Hidden::TimeZero { latency_s } => {
             Ok(OutOfRange::check("latency (s)", *latency_s, -0.1, 1.0, "between -0.1 and 1 s")?)

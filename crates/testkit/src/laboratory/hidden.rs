@@ -96,6 +96,14 @@ pub enum Hidden {
         /// True position less the declared one, in metres.
         offset_m: [f64; 3],
     },
+    /// All places were measured in coordinates that are not those of the mesh: they are turned about the vertical through their centre, with
+    /// the axes of sources and microphones, and shifted.
+    CoordinateShift {
+        /// True centre of all places less the declared one, in metres, -2 to 2.
+        shift_m: [f64; 3],
+        /// Turn from x towards y in degrees, -30 to 30.
+        turn_deg: f64,
+    },
     /// A latency that the declaration denies (or does not know).
     TimeZero {
         /// Latency of all responses in seconds, -0.1 to 1.
@@ -264,7 +272,7 @@ pub struct Gap {
 
 impl Hidden {
     /// Identifiers of the catalogue's effects.
-    pub const CATALOGUE: [&'static str; 22] = [
+    pub const CATALOGUE: [&'static str; 23] = [
         "transducer_response",
         "air_absorption",
         "source_directivity",
@@ -287,6 +295,7 @@ impl Hidden {
         "receiver_directivity",
         "channel_response",
         "surface_displacement",
+        "coordinate_shift",
     ];
     /// Names of the effects that no catalogue holds.
     pub const OUTSIDE: [&'static str; 4] = ["gain_drift", "dropouts", "foreign_chirp", "grazing_absorption"];
@@ -313,6 +322,7 @@ impl Hidden {
             Self::RoomDimensions { .. } => "room_dimensions",
             Self::SurfaceDisplacement { .. } => "surface_displacement",
             Self::PositionError { .. } => "position_error",
+            Self::CoordinateShift { .. } => "coordinate_shift",
             Self::TimeZero { .. } => "time_zero",
             Self::ChannelFault { .. } => "channel_fault",
             Self::ExtraReflector { .. } => "extra_reflector",

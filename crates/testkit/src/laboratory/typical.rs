@@ -19,7 +19,7 @@ impl Hidden {
     /// proportionate in amplitude; faults of polarity and order: there or not there). Signs and details follow from the seed.
     ///
     /// The id is one of [`Hidden::CATALOGUE`] or [`Hidden::OUTSIDE`]; `channel_fault.polarity`, `channel_fault.gain` and
-    /// `channel_fault.swap` ask for one kind.
+    /// `channel_fault.swap` ask for one kind, `coordinate_shift.shift` for a shift without a turn.
     ///
     /// # Errors
     /// [`Error::UnknownId`]; [`Error::OutOfRange`] for a strength outside 0 to 3; [`Error::Length`] for a swap where there is one
@@ -83,6 +83,8 @@ fn draw(id: &str, strength: f64, lab: &Laboratory, seed: u64, r: &mut Pcg64Mcg) 
         }
         "surface_displacement" => surface_displacement(r, truth, strength),
         "position_error" => position_error(r, truth, strength),
+        "coordinate_shift" => coordinate_shift(r, truth, strength, 3.0),
+        "coordinate_shift.shift" => coordinate_shift(r, truth, strength, 0.0),
         "time_zero" => Hidden::TimeZero { latency_s: 5e-3 * strength },
         "channel_fault" => {
             let kinds = ["channel_fault.polarity", "channel_fault.gain", "channel_fault.swap"];
@@ -227,6 +229,30 @@ fn position_error(r: &mut Pcg64Mcg, truth: &Truth, strength: f64) -> Hidden {
     let way: [f64; 3] = std::array::from_fn(|_| r.sample(StandardNormal));
     let length = way.iter().map(|c| c * c).sum::<f64>().sqrt().max(1e-9);
     Hidden::PositionError { end, index, offset_m: way.map(|c| 0.3 * strength * c / length) }
+}
+
+/// By 0.3 m in any direction and a turn at strength 1, or by as much less as brings no place nearer to a wall than 15 cm.
+fn coordinate_shift(r: &mut Pcg64Mcg, truth: &Truth, strength: f64, turn_deg: f64) -> Hidden {
+    const STEPS: i32 = 20;
+    let way: [f64; 3] = std::array::from_fn(|_| r.sample(StandardNormal));
+    let length = way.iter().map(|c| c * c).sum::<f64>().sqrt().max(1e-9);
+    let turn_deg = turn_deg * sign(r);
+    let of = |strength: f64| Hidden::CoordinateShift {
+        shift_m: way.map(|c| 0.3 * strength * c / length),
+        turn_deg: strength * turn_deg,
+    };
+    let fits = |hidden: &Hidden| {
+        let mut moved = truth.clone();
+        let places = |t: &Truth| -> Vec<[f64; 3]> {
+            t.sources.iter().map(|s| s.position_m).chain(t.receivers_m.iter().copied()).collect()
+        };
+        let is_free = |place: &[f64; 3]| (0..3).all(|k| (0.15..=truth.size_m[k] - 0.15).contains(&place[k]));
+        hidden.apply(&mut moved).is_ok() && places(&moved).iter().all(is_free)
+    };
+    (0..STEPS)
+        .map(|step| of(strength * f64::from(STEPS - step) / f64::from(STEPS)))
+        .find(fits)
+        .unwrap_or_else(|| of(0.0))
 }
 
 fn swap(r: &mut Pcg64Mcg, truth: &Truth, strength: f64) -> Result<Hidden, Error> {

@@ -65,6 +65,7 @@ fn arrivals_are_those_of_the_true_room() {
     let offset_m = [0.2, -0.15, 0.1];
     check_first_arrivals(&lab, &[Hidden::PositionError { end: End::Receiver, index: 2, offset_m }]);
     check_first_arrivals(&lab, &[Hidden::PositionError { end: End::Source, index: 0, offset_m }]);
+    check_first_arrivals(&lab, &[Hidden::CoordinateShift { shift_m: offset_m, turn_deg: -4.0 }]);
     check_first_arrivals(&lab, &[Hidden::SurfaceAbsorption { material: 1, absorption: vec![0.7] }]);
     // What is declared stays as it is.
     let moved = lab.truth(&[Hidden::PositionError { end: End::Source, index: 0, offset_m }]).unwrap();
@@ -121,6 +122,48 @@ fn a_displaced_face_leaves_everything_else_in_its_place() {
         .collect();
     assert!(refused.contains(&true), "no place is within a metre of any face");
     assert!(lab.truth(&[Hidden::SurfaceDisplacement { face: 6, offset_m: 0.1 }]).is_err());
+}
+
+/// Distances and angles between places, and between axes and places, stay; the centre of all places is shifted.
+#[test]
+fn places_in_other_coordinates_move_as_one_body() {
+    let lab = one_octave(5, 6, 48_000);
+    let (shift_m, turn_deg) = ([0.2, -0.15, 0.1], 5.0f64);
+    let declared = lab.truth(&[]).unwrap();
+    let truth = lab.truth(&[Hidden::CoordinateShift { shift_m, turn_deg }]).unwrap();
+    let places = |t: &sabine_testkit::Truth| -> Vec<[f64; 3]> {
+        t.sources.iter().map(|s| s.position_m).chain(t.receivers_m.iter().copied()).collect()
+    };
+    let minus = |a: [f64; 3], b: [f64; 3]| -> [f64; 3] { std::array::from_fn(|k| a[k] - b[k]) };
+    let dot = |a: [f64; 3], b: [f64; 3]| (0..3).map(|k| a[k] * b[k]).sum::<f64>();
+    let (before, after) = (places(&declared), places(&truth));
+    let source = |t: &sabine_testkit::Truth| (t.sources[0].position_m, t.sources[0].axis);
+    let ((from, axis), (to, turned)) = (source(&declared), source(&truth));
+    for (one, other) in before.iter().zip(&after) {
+        let ways = (minus(*one, from), minus(*other, to));
+        assert_close("distance (m)", dot(ways.1, ways.1).sqrt(), dot(ways.0, ways.0).sqrt(), 1e-12, 0.0);
+        assert_close("along the axis (m)", dot(ways.1, turned), dot(ways.0, axis), 1e-12, 0.0);
+        // From above, counter-clockwise.
+        let across = ways.0[0] * ways.1[1] - ways.0[1] * ways.1[0];
+        let level2 = ways.0[0].powi(2) + ways.0[1].powi(2);
+        assert_close("turn", across, level2 * turn_deg.to_radians().sin(), 1e-12, 0.0);
+    }
+    let axes = |t: &sabine_testkit::Truth| [t.microphones[2].axis, t.sources[0].axis];
+    let cosine = |[a, b]: [[f64; 3]; 2]| dot(a, b);
+    assert_close("axes", cosine(axes(&truth)), cosine(axes(&declared)), 1e-12, 0.0);
+    for (k, shift) in shift_m.into_iter().enumerate() {
+        let mean = |all: &[[f64; 3]]| all.iter().map(|p| p[k]).sum::<f64>() / all.len() as f64;
+        assert_close("centre (m)", mean(&after) - mean(&before), shift, 1e-12, 0.0);
+    }
+    // What is declared stays as it is.
+    assert_eq!(
+        lab.sources()[0].position_m,
+        Laboratory::new(lab.config().clone()).unwrap().sources()[0].position_m
+    );
+    for refused in [([2.1, 0.0, 0.0], 0.0), ([0.0; 3], 31.0)] {
+        let hidden = Hidden::CoordinateShift { shift_m: refused.0, turn_deg: refused.1 };
+        assert!(lab.truth(&[hidden]).is_err());
+    }
 }
 
 /// 20 000 ppm, so that the direct sound moves by whole samples.

@@ -32,7 +32,7 @@ pub fn has_a_place(model: &ExtendedModel) -> bool {
     let model = model.applied();
     let axes = model.axis.is_empty() && model.receiver_axis.is_empty();
     let places = model.position_m.is_empty() && model.surfaces.is_empty() && model.sheets.is_empty();
-    !(axes && places && model.dimensions.is_none())
+    !(axes && places && model.dimensions.is_none() && model.coordinate_shift.is_none())
 }
 
 /// One view: the axes of the room that go to the right and up, and where it lies in the drawing.

@@ -106,6 +106,13 @@ fn changed(change: &ModelChange) -> String {
         ModelChange::Diffraction => "paths: sound bends around edges".into(),
         ModelChange::CoherentReflections => "reflections: their pressures add".into(),
         ModelChange::Latency(seconds) => format!("the latency of all responses to {:.3} ms", 1e3 * seconds),
+        ModelChange::CoordinateShift(motion) => {
+            let [x, y, z] = motion.shift_m;
+            format!(
+                "all places: by ({x:+.3}, {y:+.3}, {z:+.3}) m, turned by {:+.2} degrees about their centre",
+                motion.turn_deg
+            )
+        }
         ModelChange::Position { id, position_m: [x, y, z] } => {
             format!("the place of {id} to ({x:.3}, {y:.3}, {z:.3}) m")
         }

@@ -132,7 +132,7 @@ impl<'a> ArrivalModel<'a> {
         for placed in &self.terms {
             let own = placed.own(values);
             let term = placed.case.arrival_term().filter(|term| term.displaces(own).is_none());
-            if let Some(term) = term.filter(|_| !is_warmer(placed.case, own, self.data.survey)) {
+            if let Some(term) = term.filter(|_| !is_in_the_ways(placed.case, own, self.data.survey)) {
                 later_s += term.delay_s(own, &view);
             }
         }
@@ -156,11 +156,15 @@ impl<'a> ArrivalModel<'a> {
     }
 }
 
-/// Whether a case changes the temperature, which is in the times of paths once they are traced again.
-fn is_warmer(case: &Case, own: &[f64], survey: &Survey) -> bool {
+/// Whether a case changes the temperature, or moves all places: both are in the times of paths once they are traced again.
+fn is_in_the_ways(case: &Case, own: &[f64], survey: &Survey) -> bool {
     let stated = survey.air.temperature_c();
     let changes = case.model_changes(&FittedCase::of_values(survey, own));
-    changes.iter().any(|change| matches!(change, ModelChange::Temperature(celsius) if *celsius != stated))
+    changes.iter().any(|change| match change {
+        ModelChange::Temperature(celsius) => *celsius != stated,
+        ModelChange::CoordinateShift(_) => true,
+        _ => false,
+    })
 }
 
 /// Fits without the case at `place`, then with it from wherever the peaks that are left point; the best end counts.

@@ -7,6 +7,7 @@ use crate::extend::applied_changes::Dimensions;
 use crate::extend::displaced_surface::DisplacedSurface;
 use crate::extend::model_change::ModelChange;
 use crate::extend::moved_mesh::{DisplacementError, check_places, displaced_among};
+use crate::extend::rigid_motion::RigidMotion;
 use crate::simulate::edges::Edges;
 use crate::simulate::met_surfaces::MetSurfaces;
 use crate::simulate::scene_tracer::SceneTracer;
@@ -22,14 +23,16 @@ impl Simulation {
     pub fn apply(&mut self, change: &ModelChange, survey: &Survey) -> Result<bool, Error> {
         match change {
             ModelChange::Position { id, position_m } => {
+                let position_m = self.coordinate_shift.map_or(*position_m, |m| m.moved(*position_m));
                 if let Some(i) = self.sources.iter().position(|s| s.id == *id) {
-                    self.sources[i].position_m = *position_m;
+                    self.sources[i].position_m = position_m;
                     self.retrace(Nuisance::SourcePosition(i), survey)?;
                 } else if let Some(i) = self.receivers.iter().position(|r| r.id == *id) {
-                    self.receivers[i].position_m = *position_m;
+                    self.receivers[i].position_m = position_m;
                     self.retrace(Nuisance::ReceiverPosition(i), survey)?;
                 }
             }
+            ModelChange::CoordinateShift(motion) => self.shift(motion, survey)?,
             ModelChange::Temperature(celsius) => {
                 let warmer_k = celsius - survey.air.temperature_c();
                 if warmer_k == 0.0 {
@@ -52,6 +55,21 @@ impl Simulation {
             _ => return Ok(false),
         }
         Ok(true)
+    }
+
+    /// Moves all places from the coordinates of the room file, and traces all pairs again.
+    fn shift(&mut self, motion: &RigidMotion, survey: &Survey) -> Result<(), Error> {
+        let before = self.coordinate_shift.replace(*motion);
+        let in_file = |place_m: [f64; 3]| before.map_or(place_m, |m| m.before(place_m));
+        let turn_deg = motion.turn_deg - before.map_or(0.0, |m| m.turn_deg);
+        let turn = RigidMotion::new([0.0; 3], turn_deg, [0.0; 3]);
+        let sources = self.sources.iter_mut().map(|s| (&mut s.position_m, &mut s.axis));
+        let receivers = self.receivers.iter_mut().map(|r| (&mut r.position_m, &mut r.axis));
+        for (place_m, axis) in sources.chain(receivers) {
+            *place_m = motion.moved(in_file(*place_m));
+            *axis = axis.map(|a| turn.turned(a));
+        }
+        (0..self.sources.len()).try_for_each(|source| self.retrace(Nuisance::SourcePosition(source), survey))
     }
 
     /// Traces all pairs in the room at another size, with surfaces in other places. Nothing changes if there is no such room.

@@ -11,7 +11,7 @@ use sabine_testkit::{Hidden, LabConfig, Laboratory};
 use std::path::Path;
 
 /// All that can be done in the laboratory.
-const ALL: [NextMeasurement; 16] = [
+const ALL: [NextMeasurement; 17] = [
     NextMeasurement::ClockOrThermometer,
     NextMeasurement::OtherHumidity,
     NextMeasurement::LouderAndLonger,
@@ -20,6 +20,7 @@ const ALL: [NextMeasurement; 16] = [
     NextMeasurement::TurnedSource,
     NextMeasurement::Loopback,
     NextMeasurement::Distances,
+    NextMeasurement::DistancesToWalls,
     NextMeasurement::ExchangedChannel,
     NextMeasurement::Quieter,
     NextMeasurement::AlongWalls,
@@ -61,6 +62,7 @@ fn extra(measurement: NextMeasurement, lab: &LabConfig, set: &[String]) -> Extra
         NextMeasurement::Distances => {
             Extra::Without(vec!["position_error", "room_dimensions", "surface_displacement"])
         }
+        NextMeasurement::DistancesToWalls => Extra::Without(vec!["coordinate_shift"]),
         NextMeasurement::ExchangedChannel => Extra::Without(vec!["channel_fault"]),
         NextMeasurement::Quieter => Extra::Without(vec!["nonlinear_distortion"]),
         NextMeasurement::PatchClosed => Extra::Without(vec!["open_patch"]),

@@ -117,7 +117,8 @@ impl Task {
             }
             (outcome, _) => outcome,
         };
-        for cause in found.causes.iter().filter(|c| c.effect == "surface_displacement") {
+        let is_geometry = |c: &&Cause| ["surface_displacement", "coordinate_shift"].contains(&&*c.effect);
+        for cause in found.causes.iter().filter(is_geometry) {
             let values = cause.parameters.iter();
             let values: Vec<String> = values
                 .map(|p| format!("{} {:.3} [{:.3}, {:.3}] {}", p.name, p.value, p.low, p.high, p.unit))
@@ -264,6 +265,10 @@ fn true_parameters(hidden: &Hidden, lab: &Laboratory) -> Result<Vec<(String, f64
             tilts.chain([("offset".to_owned(), *offset_m)]).collect()
         }
         Hidden::PositionError { offset_m, .. } => by_axis("offset", *offset_m),
+        Hidden::CoordinateShift { shift_m, turn_deg } => {
+            let turn = ("turn".to_owned(), *turn_deg);
+            by_axis("shift", *shift_m).into_iter().chain([turn]).collect()
+        }
         Hidden::TimeZero { latency_s } => vec![("latency".into(), 1000.0 * latency_s)],
         Hidden::NonlinearDistortion { sweep_s, from_hz, to_hz, quadratic, cubic, .. } => {
             let level = |name: &str, amplitude: f64| (name.to_owned(), 20.0 * amplitude.abs().log10());
