@@ -33,14 +33,14 @@ const TURN_SD_DEG: f64 = 3.0;
 /// Greatest shift along an axis in metres, and greatest turn in degrees.
 const MAX_SHIFT_M: f64 = 1.5;
 const MAX_TURN_DEG: f64 = 15.0;
-/// Shifts from which a search starts are so far from each other along each axis, in metres: a reflection then lies within a standard
-/// deviation of the search's first width for one of them. Turns move the outermost place by as much.
-const START_M: f64 = 0.12;
+/// Shifts from which a search starts are so far from each other along each axis, in metres: for one of them a reflection over one surface
+/// then lies about a standard deviation of the search's first width off at most. Turns move the outermost place by as much.
+const START_M: f64 = 0.16;
 /// They reach so far, in metres and degrees.
 const START_REACH_M: f64 = 0.65;
 const START_REACH_DEG: f64 = 5.0;
 /// Turns from which it starts are so far from each other, in degrees.
-const START_TURN_DEG: (f64, f64) = (1.25, 2.5);
+const START_TURN_DEG: (f64, f64) = (1.25, 4.0);
 /// A path that cannot be followed is the direct sound if it is no longer than this share beyond the distance of its ends.
 const DIRECT: f64 = 1e-4;
 
@@ -131,7 +131,7 @@ impl ArrivalTerm for Shifted {
         let (survey, pair) = (arrival.survey(), arrival.pair());
         let stated = [survey.sources()[pair.source].position_m, survey.receivers()[pair.receiver].position_m];
         let motion = motion(values, self.about_m);
-        let moved = stated.map(|place| motion.moved(place));
+        let moved = motion.all_moved(stated);
         let longer_m = if arrival.surfaces().is_empty() {
             longer_by_directions_m(stated, moved, arrival)
         } else {

@@ -30,9 +30,18 @@ impl RigidMotion {
 
     /// Where a place comes to be.
     pub fn moved(&self, place_m: [f64; 3]) -> [f64; 3] {
-        let from_axis = std::array::from_fn(|k| place_m[k] - self.about_m[k]);
-        let turned = self.turned(from_axis);
-        std::array::from_fn(|k| self.about_m[k] + turned[k] + self.shift_m[k])
+        let [moved] = self.all_moved([place_m]);
+        moved
+    }
+
+    /// Where several places come to be.
+    pub(crate) fn all_moved<const N: usize>(&self, places_m: [[f64; 3]; N]) -> [[f64; 3]; N] {
+        let (sin, cos) = self.turn_deg.to_radians().sin_cos();
+        places_m.map(|place_m| {
+            let [x, y, z] = std::array::from_fn(|k| place_m[k] - self.about_m[k]);
+            let turned = [cos * x - sin * y, sin * x + cos * y, z];
+            std::array::from_fn(|k| self.about_m[k] + turned[k] + self.shift_m[k])
+        })
     }
 
     /// Where a direction comes to point.

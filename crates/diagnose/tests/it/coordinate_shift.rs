@@ -55,6 +55,44 @@ fn places_that_are_shifted_or_turned_in_several_rooms_are_found() {
     }
 }
 
+/// How many of several rooms for each size of the shift and the turn are given the one right name, and how far off the fit is.
+#[test]
+#[ignore = "nightly: many minutes"]
+fn shifts_from_10_to_60_cm_are_found_with_and_without_a_turn() {
+    const ROOMS: u64 = 6;
+    let (mut right, mut rooms) = (0, 0);
+    for (number, (kind, strength)) in ["coordinate_shift.shift", "coordinate_shift"]
+        .into_iter()
+        .flat_map(|kind| [1.0 / 3.0, 2.0 / 3.0, 4.0 / 3.0, 2.0].map(|strength| (kind, strength)))
+        .enumerate()
+    {
+        for room in 0..ROOMS {
+            let seed = 60_000 + 100 * number as u64 + room;
+            let lab = lab(seed);
+            let hidden = Hidden::random(kind, strength, &lab, seed).unwrap();
+            let Hidden::CoordinateShift { shift_m, turn_deg } = hidden else { panic!("{hidden:?}") };
+            let found = diagnose_among(&lab, &[hidden], &ON_TIMES);
+            let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
+            let is_right = named == ["coordinate_shift"];
+            rooms += 1;
+            right += usize::from(is_right);
+            if is_right {
+                let values: Vec<f64> = found.causes[0].parameters.iter().map(|p| p.value).collect();
+                let off_m = apart_m([values[0], values[1], values[2]], shift_m);
+                println!(
+                    "{kind} {strength:.2} seed {seed}: {off_m:.3} m, {:.2} deg off",
+                    values[3] - turn_deg
+                );
+                assert!(off_m < 0.05 && (values[3] - turn_deg).abs() < 0.5, "{values:?}");
+            } else {
+                println!("{kind} {strength:.2} seed {seed}: {named:?} for {shift_m:.3?} {turn_deg:.1}");
+            }
+        }
+    }
+    println!("{right} of {rooms}");
+    assert!(10 * right >= 9 * rooms, "{right} of {rooms}");
+}
+
 #[test]
 fn a_model_moves_all_places_and_the_axes_that_are_stated_whatever_the_order_of_changes() {
     let folder = tempfile::tempdir().unwrap();

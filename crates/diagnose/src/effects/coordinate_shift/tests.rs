@@ -141,7 +141,8 @@ fn starts_are_all_over_the_ball_and_leave_all_places_in_the_room() {
             continue;
         }
         let is_near = |start: &Vec<f64>| {
-            (0..3).all(|k| (start[k] - wanted[k]).abs() <= START_M) && (start[3] - wanted[3]).abs() <= 2.5
+            (0..3).all(|k| (start[k] - wanted[k]).abs() <= START_M)
+                && (start[3] - wanted[3]).abs() <= START_TURN_DEG.1
         };
         assert!(case.starts.iter().any(is_near), "{wanted:?}");
     }
