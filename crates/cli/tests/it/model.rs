@@ -1,7 +1,7 @@
 //! `sabine model` and what other commands make of an extended model, as a user runs them.
 
 use crate::sabine;
-use sabine::diagnose::{ExtendedModel, ModelCause, ModelChange, read_laws};
+use sabine::diagnose::{ExtendedModel, ModelCause, ModelChange, RigidMotion, read_laws};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -41,6 +41,24 @@ fn model(folder: &Path) -> PathBuf {
     let path = folder.join("model.toml");
     std::fs::write(&path, text).unwrap();
     path
+}
+
+#[test]
+fn a_shift_of_all_places_is_shown_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("shifted.toml");
+    let mut model = ExtendedModel::default();
+    model.centres_hz = vec![125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0];
+    let motion = RigidMotion::new([0.3, -0.2, 0.05], 2.5, [2.0, 1.5, 1.2]);
+    model.causes.push(ModelCause::new("coordinate_shift", vec![ModelChange::CoordinateShift(motion)]));
+    model.write(&path).unwrap();
+    let shown = succeeds("model", &["show", path.to_str().unwrap()]);
+    for words in [
+        "[coordinate_shift]",
+        "all places: by (+0.300, -0.200, +0.050) m, turned by +2.50 degrees about (2.00, 1.50)",
+    ] {
+        assert!(shown.contains(words), "{words}: {shown}");
+    }
 }
 
 #[test]

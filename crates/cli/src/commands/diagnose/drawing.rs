@@ -272,7 +272,23 @@ mod tests {
     use super::*;
     use crate::demo::Demo;
     use crate::room::read_room;
-    use sabine::diagnose::{Dimensions, ModelCause, ModelChange, ThinPanel};
+    use sabine::diagnose::{Dimensions, ModelCause, ModelChange, RigidMotion, ThinPanel};
+
+    #[test]
+    fn places_that_moved_together_are_drawn_where_they_are() {
+        let mut demo = Demo::default();
+        let room = read_room(&demo.or(None, "room").unwrap(), false, None).unwrap();
+        let mut model = ExtendedModel::default();
+        model.centres_hz = room.bands().iter_hz().collect();
+        let motion = RigidMotion::new([0.05, -0.05, 0.02], 1.0, room.sources()[0].position_m);
+        model.causes.push(ModelCause::new("coordinate_shift", vec![ModelChange::CoordinateShift(motion)]));
+        let drawn = svg(&room, &model.room(&room).unwrap());
+        assert!(has_a_place(&model) && drawn.contains("from where it is stated"));
+        // Each place twice, in three views.
+        let (sources, receivers) = (room.sources().len(), room.receivers().len());
+        let count = |shape: &str| drawn.matches(shape).count();
+        assert!(count("<circle") >= 6 * receivers && count("<rect") >= 6 * sources);
+    }
 
     #[test]
     fn what_was_found_is_drawn_where_it_is() {

@@ -107,11 +107,9 @@ fn changed(change: &ModelChange) -> String {
         ModelChange::CoherentReflections => "reflections: their pressures add".into(),
         ModelChange::Latency(seconds) => format!("the latency of all responses to {:.3} ms", 1e3 * seconds),
         ModelChange::CoordinateShift(motion) => {
-            let [x, y, z] = motion.shift_m;
-            format!(
-                "all places: by ({x:+.3}, {y:+.3}, {z:+.3}) m, turned by {:+.2} degrees about their centre",
-                motion.turn_deg
-            )
+            let ([x, y, z], [east, north, _]) = (motion.shift_m, motion.about_m);
+            let turned = format!("turned by {:+.2} degrees about ({east:.2}, {north:.2})", motion.turn_deg);
+            format!("all places: by ({x:+.3}, {y:+.3}, {z:+.3}) m, {turned} m")
         }
         ModelChange::Position { id, position_m: [x, y, z] } => {
             format!("the place of {id} to ({x:.3}, {y:.3}, {z:.3}) m")
