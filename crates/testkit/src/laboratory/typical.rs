@@ -83,8 +83,7 @@ fn draw(id: &str, strength: f64, lab: &Laboratory, seed: u64, r: &mut Pcg64Mcg) 
         }
         "surface_displacement" => surface_displacement(r, truth, strength),
         "position_error" => position_error(r, truth, strength),
-        "coordinate_shift" => coordinate_shift(r, truth, strength, 3.0),
-        "coordinate_shift.shift" => coordinate_shift(r, truth, strength, 0.0),
+        "coordinate_shift" | "coordinate_shift.shift" => coordinate_shift(r, truth, strength, id),
         "time_zero" => Hidden::TimeZero { latency_s: 5e-3 * strength },
         "channel_fault" => {
             let kinds = ["channel_fault.polarity", "channel_fault.gain", "channel_fault.swap"];
@@ -231,12 +230,12 @@ fn position_error(r: &mut Pcg64Mcg, truth: &Truth, strength: f64) -> Hidden {
     Hidden::PositionError { end, index, offset_m: way.map(|c| 0.3 * strength * c / length) }
 }
 
-/// By 0.3 m in any direction and a turn at strength 1, or by as much less as brings no place nearer to a wall than 15 cm.
-fn coordinate_shift(r: &mut Pcg64Mcg, truth: &Truth, strength: f64, turn_deg: f64) -> Hidden {
+/// By 0.3 m in any direction and, but for `coordinate_shift.shift`, by 3 degrees at strength 1, or by as much less as brings no place nearer to a wall than 15 cm.
+fn coordinate_shift(r: &mut Pcg64Mcg, truth: &Truth, strength: f64, id: &str) -> Hidden {
     const STEPS: i32 = 20;
     let way: [f64; 3] = std::array::from_fn(|_| r.sample(StandardNormal));
     let length = way.iter().map(|c| c * c).sum::<f64>().sqrt().max(1e-9);
-    let turn_deg = turn_deg * sign(r);
+    let turn_deg = if id == "coordinate_shift" { 3.0 * sign(r) } else { 0.0 };
     let of = |strength: f64| Hidden::CoordinateShift {
         shift_m: way.map(|c| 0.3 * strength * c / length),
         turn_deg: strength * turn_deg,

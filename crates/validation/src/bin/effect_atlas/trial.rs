@@ -83,6 +83,9 @@ fn usual_rate() -> u32 {
     LabConfig::default().sample_rate_hz
 }
 
+/// Effects whose fitted parameters are printed room by room.
+const IN_SPACE: [&str; 2] = ["surface_displacement", "coordinate_shift"];
+
 impl Task {
     /// Whether a record holds this task.
     pub fn is_done(&self, trials: &[Trial]) -> bool {
@@ -117,8 +120,7 @@ impl Task {
             }
             (outcome, _) => outcome,
         };
-        let is_geometry = |c: &&Cause| ["surface_displacement", "coordinate_shift"].contains(&&*c.effect);
-        for cause in found.causes.iter().filter(is_geometry) {
+        for cause in found.causes.iter().filter(|c| IN_SPACE.contains(&&*c.effect)) {
             let values = cause.parameters.iter();
             let values: Vec<String> = values
                 .map(|p| format!("{} {:.3} [{:.3}, {:.3}] {}", p.name, p.value, p.low, p.high, p.unit))
