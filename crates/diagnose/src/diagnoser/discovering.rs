@@ -73,7 +73,8 @@ impl Diagnoser {
             }
             diagnosis
         };
-        if !diagnosis.laws.is_empty() && diagnosis.verdict == Verdict::Explained {
+        let named = matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
+        if named && !diagnosis.laws.is_empty() {
             diagnosis.verdict = Verdict::Law;
         }
         diagnosis.notes.extend(notes(&told, !diagnosis.laws.is_empty()));

@@ -156,13 +156,13 @@ impl<'a> ArrivalModel<'a> {
     }
 }
 
-/// Whether a case changes the temperature, or moves all places: both are in the times of paths once they are traced again.
+/// Whether a case changes the temperature or the room's size, or moves all places: that is in the times of paths once they are traced again.
 fn is_in_the_ways(case: &Case, own: &[f64], survey: &Survey) -> bool {
     let stated = survey.air.temperature_c();
     let changes = case.model_changes(&FittedCase::of_values(survey, own));
     changes.iter().any(|change| match change {
         ModelChange::Temperature(celsius) => *celsius != stated,
-        ModelChange::CoordinateShift(_) => true,
+        ModelChange::CoordinateShift(_) | ModelChange::Dimensions(_) => true,
         _ => false,
     })
 }
@@ -209,4 +209,42 @@ pub(super) fn fit(
     }
     let firsts = model.terms.iter().map(|p| p.first).collect();
     best.map(|b| (b, firsts)).ok_or(Error::Singular { what: "arrival times" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::Effect;
+    use crate::effects::{CoordinateShift, RoomDimensions, SamplingClock};
+    use crate::hand_made::Tables;
+    use crate::likelihood::laplace::Model;
+    use sabine_scene::{Levels, TimeZero};
+
+    #[test]
+    fn what_paths_are_traced_with_is_not_counted_a_second_time() {
+        let tables = Tables::new(Levels::Common, TimeZero::Emission);
+        let data = tables.arrival_data();
+        let way = &data.arrivals[0][2];
+        let single = IsolatedReflection {
+            length_m: way.length_m,
+            after_direct_s: 0.0,
+            departure: way.departure,
+            arrival: way.arrival,
+            order: 1,
+            surfaces: way.surfaces.clone(),
+        };
+        let effects: [(&dyn Effect, bool); 3] =
+            [(&RoomDimensions, true), (&CoordinateShift, true), (&SamplingClock, false)];
+        for (effect, is_traced) in effects {
+            let case = &effect.cases(&tables.survey)[0];
+            let model = at_fit(&data, &[case], &[true; 3]);
+            let mut values: Vec<f64> = model.priors().iter().map(|p| p.mean).collect();
+            values[model.terms[0].range()].fill(0.5);
+            let delay_s = model.arrival_s(&values, 0, way) - way.length_m / data.speed_m_s[0];
+            assert!(delay_s.abs() > 1e-9, "{}: {delay_s}", effect.id());
+            let later_s = model.later_s(&values, 0, &single);
+            let expected = if is_traced { 0.0 } else { delay_s };
+            assert!((later_s - expected).abs() < 1e-12, "{}: {later_s} {expected}", effect.id());
+        }
+    }
 }
