@@ -11,7 +11,8 @@ use crate::simulate::traced_pair::Arrival;
 
 /// Share of predicted reflections far above the lowest peak that are found as peaks: the others lie beside a louder one.
 const FOUND_SHARE: f64 = 0.9;
-/// From a level that is predicted as high as the lowest peak stands, at which half of them are found, the share changes with this, in dB.
+/// A reflection that is predicted just as high as the lowest peak stands is found half as often as one far above it; the logistic curve
+/// between has this scale, in dB.
 const FOUND_SLOPE_DB: f64 = 2.5;
 /// Height of a found peak about what reflectances and distance give, in dB: its neighbours, and colour.
 const HEIGHT_SD_DB: f64 = 3.0;
@@ -28,7 +29,6 @@ const STRAYS_BEFORE: f64 = 4.0;
 const ROUNDS: usize = 3;
 
 /// Strays of one or several responses: how many in each interval, and the sum of their heights above the lowest peak.
-#[derive(Clone)]
 struct Strays {
     counts: [f64; INTERVALS],
     heights_db: f64,
