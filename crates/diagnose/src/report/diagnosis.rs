@@ -30,7 +30,7 @@ impl fmt::Display for Verdict {
         f.write_str(match self {
             Self::Adequate => "adequate",
             Self::Explained => "explained",
-            Self::PartlyExplained => "partly explained",
+            Self::PartlyExplained => "partly_explained",
             Self::Law => "law",
             Self::Ambiguous => "ambiguous",
             Self::Unexplained => "unexplained",
