@@ -35,7 +35,7 @@ impl ArrivalModel<'_> {
         let all = &self.data.arrivals[pair];
         let at = self.at(values, true);
         let slowness = (READ_HZ / rate_hz).max(1.0);
-        let origins = PeakOrigins::expected(all, heard);
+        let origins = PeakOrigins::expected(all, heard, rate_hz);
         let sure = |i: usize| {
             if i == 0 {
                 return (1.0 - MISREAD_SHARE) / (DIRECT_SD_S * slowness).powi(2);
@@ -82,7 +82,7 @@ mod tests {
             let heard = heard(&tables.arrivals[pair], speed);
             let s = |i: &usize| tables.arrivals[pair][*i].length_m / speed;
             tables.measured[pair].peaks_s = heard.iter().map(s).collect();
-            let origins = PeakOrigins::expected(&tables.arrivals[pair], &heard);
+            let origins = PeakOrigins::expected(&tables.arrivals[pair], &heard, 48_000.0);
             tables.measured[pair].peaks_db = heard.iter().map(|i| origins.level_db(i - 1)).collect();
             tables.measured[pair].direct_s = s(&0);
         }

@@ -5,7 +5,7 @@
 //! order than are predicted one by one come late and low; an early, loud peak that nothing explains is rare, unless it is as common in all of
 //! them, as in a furnished room.
 
-use super::{ArrivalData, REFLECTION_SD_S, normal};
+use super::{ArrivalData, READ_HZ, REFLECTION_SD_S, normal};
 use crate::observe::observed_response::{MAX_PEAKS, PEAK_FLOOR_DB, PEAKS_S};
 use crate::simulate::traced_pair::Arrival;
 
@@ -20,6 +20,8 @@ const HEIGHT_SD_DB: f64 = 3.0;
 const ANY_HEIGHT_SHARE: f64 = 0.3;
 /// Share of peaks that are strays, at least, before other responses are looked at.
 const STRAY_SHARE: f64 = 0.25;
+/// The same in recordings at less than [`READ_HZ`].
+const SLOW_STRAY_SHARE: f64 = 0.4;
 /// Intervals after the direct sound in which strays are counted.
 const INTERVALS: usize = 8;
 /// Mean height of strays above the lowest peak, in dB, before others are looked at: as much as [`STRAYS_BEFORE`] of them say.
@@ -57,6 +59,8 @@ pub(super) struct PeakOrigins {
     /// Strays in each interval.
     strays: [f64; INTERVALS],
     stray_height_db: f64,
+    /// Share of peaks whose height says nothing.
+    any_height_share: f64,
 }
 
 impl PeakOrigins {
@@ -66,8 +70,9 @@ impl PeakOrigins {
             .iter()
             .zip(data.arrivals)
             .map(|(&m, arrivals)| {
-                let peaks_db = &data.measured[m].peaks_db;
-                Self::without_others(arrivals, peaks_db.len(), lowest(peaks_db.iter().copied()))
+                let (peaks_db, rate_hz) = (&data.measured[m].peaks_db, data.measured[m].sample_rate_hz);
+                let least_db = lowest(peaks_db.iter().copied());
+                Self::without_others(arrivals, peaks_db.len(), least_db, f64::from(rate_hz))
             })
             .collect();
         let responses = &data.survey.responses;
@@ -86,7 +91,7 @@ impl PeakOrigins {
                     others.add(&counted[q]);
                     count += 1.0;
                 });
-                if count > 0.0 {
+                if count > 0.0 && origins.any_height_share < 1.0 {
                     origins.learn(&others, count, data.measured[assignment[pair]].peaks_s.len());
                 }
             }
@@ -96,19 +101,19 @@ impl PeakOrigins {
 
     /// Of a response in which just these reflections will be found as peaks (their places among the arrivals, which begin with the direct
     /// sound).
-    pub fn expected(arrivals: &[Arrival], heard: &[usize]) -> Self {
+    pub fn expected(arrivals: &[Arrival], heard: &[usize], rate_hz: f64) -> Self {
         let levels_db = heard.iter().map(|&i| level_db(&arrivals[i], &arrivals[0]));
-        Self::without_others(arrivals, heard.len(), lowest(levels_db))
+        Self::without_others(arrivals, heard.len(), lowest(levels_db), rate_hz)
     }
 
-    fn without_others(arrivals: &[Arrival], peaks: usize, least_db: f64) -> Self {
+    fn without_others(arrivals: &[Arrival], peaks: usize, least_db: f64, rate_hz: f64) -> Self {
         let levels_db: Vec<f64> = arrivals.iter().skip(1).map(|a| level_db(a, &arrivals[0])).collect();
-        let found =
-            levels_db.iter().map(|level| FOUND_SHARE / (1.0 + ((least_db - level) / FOUND_SLOPE_DB).exp()));
-        let found: Vec<f64> = found.collect();
+        let is_slow = rate_hz < READ_HZ;
+        let found = if is_slow { slowly_found(&levels_db, peaks) } else { found(&levels_db, least_db) };
         let rest = peaks as f64 - found.iter().sum::<f64>();
-        let strays = rest.max(least_strays(peaks)) / INTERVALS as f64;
-        Self { found, levels_db, least_db, strays: [strays; INTERVALS], stray_height_db: STRAY_HEIGHT_DB }
+        let strays = [rest.max(least_strays(peaks)) / INTERVALS as f64; INTERVALS];
+        let any_height_share = if is_slow { 1.0 } else { ANY_HEIGHT_SHARE };
+        Self { found, levels_db, least_db, strays, stray_height_db: STRAY_HEIGHT_DB, any_height_share }
     }
 
     /// Peaks of a pair as far as they are strays, everything being where it is stated.
@@ -151,16 +156,33 @@ impl PeakOrigins {
     /// How many peaks of a height a predicted reflection is, for each dB.
     pub fn predicted(&self, reflection: usize, height_db: f64) -> f64 {
         let own = normal(height_db - self.levels_db[reflection], HEIGHT_SD_DB);
-        self.found[reflection] * ((1.0 - ANY_HEIGHT_SHARE) * own + ANY_HEIGHT_SHARE / PEAK_FLOOR_DB)
+        self.found[reflection] * self.with_any_height(own)
     }
 
     /// How many strays of a height there are so long after the direct sound, for each dB and second.
     pub fn stray(&self, after_s: f64, height_db: f64) -> f64 {
         let above_db = (height_db - self.least_db).max(0.0);
         let low = (-above_db / self.stray_height_db).exp() / self.stray_height_db;
-        let density = (1.0 - ANY_HEIGHT_SHARE) * low + ANY_HEIGHT_SHARE / PEAK_FLOOR_DB;
-        self.strays[interval(after_s)] * INTERVALS as f64 / PEAKS_S * density
+        self.strays[interval(after_s)] * INTERVALS as f64 / PEAKS_S * self.with_any_height(low)
     }
+
+    fn with_any_height(&self, density: f64) -> f64 {
+        (1.0 - self.any_height_share) * density + self.any_height_share / PEAK_FLOOR_DB
+    }
+}
+
+/// How often each of the predicted reflections is found.
+fn found(levels_db: &[f64], least_db: f64) -> Vec<f64> {
+    let one = |level_db: &f64| FOUND_SHARE / (1.0 + ((least_db - level_db) / FOUND_SLOPE_DB).exp());
+    levels_db.iter().map(one).collect()
+}
+
+/// The same at a slow rate. Pulses are so long there that neighbours merge: heights say nothing, strays are as likely at any time, and what is
+/// not a stray is a reflection in proportion to its amplitude.
+fn slowly_found(levels_db: &[f64], peaks: usize) -> Vec<f64> {
+    let amplitudes: Vec<f64> = levels_db.iter().map(|level_db| 10f64.powf(level_db / 20.0)).collect();
+    let all = amplitudes.iter().sum::<f64>().max(1e-30);
+    amplitudes.iter().map(|a| (1.0 - SLOW_STRAY_SHARE) * peaks as f64 * a / all).collect()
 }
 
 fn least_strays(peaks: usize) -> f64 {
@@ -199,7 +221,7 @@ mod tests {
     #[test]
     fn a_peak_as_high_as_predicted_says_more_and_none_counts_twice() {
         let arrivals = [arrival(3.0, 1.0), arrival(5.0, 0.25), arrival(6.0, 1e-4)];
-        let origins = PeakOrigins::expected(&arrivals, &[1, 2]);
+        let origins = PeakOrigins::expected(&arrivals, &[1, 2], 48_000.0);
         assert!((origins.level_db(0) + 6.02).abs() < 0.01);
         // Four and a half sd off, nothing but the share of any height is left: 0.3 over 26 dB.
         let ratio = origins.predicted(0, -6.02) / origins.predicted(0, -19.5);
@@ -211,6 +233,14 @@ mod tests {
         for (i, share) in [(0, 0.9), (1, 0.9 / (1.0 + (14.0f64 / 2.5).exp()))] {
             assert!((all(i) - share * (1.0 + any)).abs() < 1e-3, "{i}: {}", all(i));
         }
+    }
+
+    #[test]
+    fn in_a_slow_recording_heights_say_nothing() {
+        let arrivals = [arrival(3.0, 1.0), arrival(5.0, 0.25)];
+        let slow = PeakOrigins::expected(&arrivals, &[1], 6000.0);
+        assert_eq!(slow.predicted(0, -6.0), slow.predicted(0, -25.0));
+        assert_eq!(slow.stray(1e-3, -6.0), slow.stray(39e-3, -25.0));
     }
 
     #[test]
