@@ -297,7 +297,6 @@ function diagnose() {
 const VERDICTS = {
   adequate: "The simulation explains the measurement within its expected spread.",
   explained: "A cause is named.",
-  partly_explained: "A cause is named, and something else is wrong, too.",
   law: "A law that no catalogue lists is named.",
   ambiguous: "Several causes explain the misfit equally well.",
   unexplained: "Something is wrong that no listed cause explains.",

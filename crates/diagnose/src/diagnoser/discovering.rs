@@ -73,8 +73,7 @@ impl Diagnoser {
             }
             diagnosis
         };
-        let named = matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
-        if named && !diagnosis.laws.is_empty() {
+        if !diagnosis.laws.is_empty() && diagnosis.verdict == Verdict::Explained {
             diagnosis.verdict = Verdict::Law;
         }
         diagnosis.notes.extend(notes(&told, !diagnosis.laws.is_empty()));

@@ -100,8 +100,6 @@ pub(crate) fn confirm(
         if lack_before.p_value < config.significance { Verdict::Unexplained } else { Verdict::Adequate }
     } else if !found.rivals.is_empty() {
         Verdict::Ambiguous
-    } else if lack_after.as_ref().is_some_and(|left| left.p_value < config.significance) {
-        Verdict::PartlyExplained
     } else {
         Verdict::Explained
     };

@@ -165,6 +165,7 @@ fn notes_on(
         verdict: confirmed.verdict,
         held_out: confirmed.predicted.held_out.is_some(),
         converged: base.energy.converged && state.energy.converged && state.arrivals.converged,
+        misfit_left: confirmed.lack_after.p_value < search.baseline.config.significance,
         hopeless: confirmed.hopeless,
         scattered: first_dispersion.iter().any(|d| *d > WARN_DISPERSION),
         unseated: &confirmed.unseated,

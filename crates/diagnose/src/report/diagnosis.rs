@@ -13,10 +13,8 @@ use std::fmt;
 pub enum Verdict {
     /// The simulation explains the measurement within its expected spread.
     Adequate,
-    /// One or more causes are named, and what is left beside them is no more than chance.
+    /// One or more causes are named.
     Explained,
-    /// One or more causes are named, and chance does not explain what is left beside them.
-    PartlyExplained,
     /// A law that no catalogue lists is named, by itself or beside causes that are listed; see [`Diagnosis::laws`].
     Law,
     /// Several causes explain the misfit alike; see [`Diagnosis::alternatives`] and [`Diagnosis::would_decide`].
@@ -30,7 +28,6 @@ impl fmt::Display for Verdict {
         f.write_str(match self {
             Self::Adequate => "adequate",
             Self::Explained => "explained",
-            Self::PartlyExplained => "partly_explained",
             Self::Law => "law",
             Self::Ambiguous => "ambiguous",
             Self::Unexplained => "unexplained",

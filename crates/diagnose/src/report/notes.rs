@@ -12,6 +12,8 @@ pub(crate) struct Circumstances<'a> {
     pub held_out: bool,
     /// Whether all fits came to rest.
     pub converged: bool,
+    /// Whether chance does not explain what the causes leave.
+    pub misfit_left: bool,
     pub hopeless: bool,
     /// Whether bins scatter far more than they should.
     pub scattered: bool,
@@ -58,7 +60,7 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
     if !about.converged {
         notes.push("A fit had not come to rest after its last step: take its figures with caution.".into());
     }
-    if about.verdict == Verdict::PartlyExplained {
+    if about.verdict == Verdict::Explained && about.misfit_left {
         notes.push("A significant misfit is left that none of the named causes explains.".into());
     }
     if let Some((rms_db, largest)) = &about.levels {

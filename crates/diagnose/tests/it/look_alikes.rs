@@ -2,7 +2,6 @@
 //! causes at once, which it can.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
-use crate::rivals::diagnoser_among;
 use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, Verdict};
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
 
@@ -62,21 +61,6 @@ fn two_causes_are_both_found() {
     for cause in &found.causes {
         assert!(cause.held_out_gain.as_ref().unwrap().low > 0.0, "{cause:?}");
     }
-}
-
-/// Gains that drift are in no catalogue: beside them a latency is named, and not as all that is wrong.
-#[test]
-fn a_cause_beside_one_without_a_name_explains_in_part() {
-    let lab = lab(901, 8);
-    let hidden = ["time_zero", "gain_drift"].map(|id| Hidden::random(id, 1.0, &lab, 901).unwrap());
-    let folder = tempfile::tempdir().unwrap();
-    let room = lab.write(&hidden, &folder.path().join("room"), None).unwrap();
-    let found =
-        diagnoser_among(few_rays(), &["time_zero", "sampling_clock"]).diagnose(&room, &[], &()).unwrap();
-    assert_eq!(found.verdict, Verdict::PartlyExplained, "{:?} {:?}", named(&found), found.lack_of_fit);
-    assert_eq!(named(&found), ["time_zero"]);
-    assert!(found.lack_of_fit.p_value_explained < 0.01);
-    assert!(found.notes.iter().any(|note| note.contains("misfit is left")), "{:?}", found.notes);
 }
 
 /// A clock that runs fast and air that is colder stretch all arrival times alike.

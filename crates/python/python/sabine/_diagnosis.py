@@ -25,7 +25,7 @@ class Diagnosis:
 
     @property
     def verdict(self) -> str:
-        """The answer in one word: ``adequate``, ``explained``, ``partly_explained``, ``law``, ``ambiguous`` or ``unexplained``."""
+        """The answer in one word: ``adequate``, ``explained``, ``law``, ``ambiguous`` or ``unexplained``."""
         return self.data["verdict"]
 
     @property

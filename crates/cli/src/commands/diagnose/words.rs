@@ -54,7 +54,6 @@ pub fn headline(findings: &Findings) -> String {
     match findings.verdict {
         Verdict::Adequate => "The simulation explains this measurement.".to_owned(),
         Verdict::Explained => format!("Found: {}.", names.join("; ")),
-        Verdict::PartlyExplained => format!("Found: {}; and more that has no name.", names.join("; ")),
         Verdict::Law => format!("A law that no catalogue lists: {}.", names.join("; ")),
         Verdict::Ambiguous => {
             format!(
@@ -88,7 +87,7 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
             "What is left between simulation and measurement is no more than chance leaves in such a measurement ({}). Nothing needs to be added.",
             p_value(fit.p_value)
         )),
-        Verdict::Explained | Verdict::PartlyExplained | Verdict::Law => {
+        Verdict::Explained | Verdict::Law => {
             told.push(if fit.p_value < UNLIKELY {
                 format!("Chance does not explain what was measured ({}).", p_value(fit.p_value))
             } else {
@@ -151,8 +150,9 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
     if !failed.is_empty() && fit.p_value_explained < UNLIKELY {
         told.push(format!("What chance does not explain: {}.", failed.join("; ")));
     }
-    let place = worst_place(findings, findings.verdict == Verdict::Unexplained);
-    if let Some(place) = place.filter(|_| findings.verdict != Verdict::Adequate) {
+    if let (Verdict::Unexplained | Verdict::Ambiguous | Verdict::Explained | Verdict::Law, Some(place)) =
+        (findings.verdict, worst_place(findings, findings.verdict == Verdict::Unexplained))
+    {
         told.push(place);
     }
     told

@@ -107,7 +107,7 @@ fn concluded(
     folder: &Path,
 ) -> Result<Option<String>, AnyError> {
     let one = |found: &Diagnosis| match (&found.verdict, &named(found)[..]) {
-        (Verdict::Explained | Verdict::PartlyExplained, [name]) => Some((*name).to_owned()),
+        (Verdict::Explained, [name]) => Some((*name).to_owned()),
         _ => None,
     };
     match extra {

@@ -188,7 +188,7 @@ impl Task {
 
 fn answer(found: &Diagnosis) -> String {
     match found.verdict {
-        Verdict::Explained | Verdict::PartlyExplained | Verdict::Law => named(found).join(" + "),
+        Verdict::Explained | Verdict::Law => named(found).join(" + "),
         Verdict::Ambiguous => {
             // The last cause stands for the set.
             let sure = found.causes.iter().rev().skip(1).map(|c| c.effect.clone());
@@ -210,7 +210,7 @@ fn outcome(found: &Diagnosis, hidden: &[Hidden], positive_reflections: bool) -> 
         Verdict::Adequate => Outcome::Missed,
         Verdict::Unexplained if outside => Outcome::Right,
         Verdict::Unexplained => Outcome::Unnamed,
-        Verdict::Explained | Verdict::PartlyExplained | Verdict::Law if named == truth => Outcome::Right,
+        Verdict::Explained | Verdict::Law if named == truth => Outcome::Right,
         Verdict::Ambiguous
             if truth.iter().all(|t| named.contains(t) || found.alternatives.iter().any(|a| a == t))
                 && !truth.is_empty() =>
@@ -218,11 +218,7 @@ fn outcome(found: &Diagnosis, hidden: &[Hidden], positive_reflections: bool) -> 
             Outcome::Set
         }
         _ if !truth.is_empty() && truth.iter().all(|t| named.contains(t)) => Outcome::Extra,
-        Verdict::Explained | Verdict::PartlyExplained | Verdict::Law
-            if named.iter().all(|n| truth.contains(n)) =>
-        {
-            Outcome::Part
-        }
+        Verdict::Explained | Verdict::Law if named.iter().all(|n| truth.contains(n)) => Outcome::Part,
         _ => Outcome::Wrong,
     }
 }

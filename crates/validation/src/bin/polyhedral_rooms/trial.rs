@@ -239,7 +239,7 @@ impl Task {
 
 fn answer(found: &Diagnosis) -> String {
     match found.verdict {
-        Verdict::Explained | Verdict::PartlyExplained => {
+        Verdict::Explained => {
             let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
             named.join(" + ")
         }
