@@ -6,7 +6,7 @@ use crate::effect::{ArrivalTerm, Case, Effect, Parameter};
 use crate::extend::model_change::ModelChange;
 use crate::extend::rigid_motion::RigidMotion;
 use crate::simulate::views::ArrivalView;
-use crate::survey::planes::dot;
+use crate::survey::planes::{apart_m, dot};
 use crate::survey::surfaces::{minus, mirrored_in};
 use crate::survey::{Place, Survey};
 
@@ -18,7 +18,7 @@ use crate::survey::{Place, Survey};
 /// and both ends are taken to move across it at right angles to each other. Reflections that the motion hides or makes are those of the
 /// stated places until the cause is named; then the room is traced again.
 ///
-/// Mark: all reflections come elsewhere than predicted, those over one surface by what the shift towards it says, at all places alike; the
+/// Mark: all reflections come elsewhere than predicted, those over one surface by what the shift towards it says, by the same rule at all places; the
 /// direct sound comes when it should. Mimicked by: another size of the room with a shift of its own (`room_dimensions`), one wall that
 /// stands elsewhere (`surface_displacement`) where the shift is along its normal, and wrong places (`position_error`), which change
 /// distances between places.
@@ -61,12 +61,12 @@ impl Effect for CoordinateShift {
 
     fn cases(&self, survey: &Survey) -> Vec<Case> {
         let about_m = centre(survey);
-        let sd = |name: String| {
+        let shift = |name: String| {
             let bounds = (-MAX_SHIFT_M, MAX_SHIFT_M);
             Parameter::new(name, "m", 0.0, SHIFT_SD_M, bounds).typically(0.2)
         };
         let turn = Parameter::new("turn", "deg", 0.0, TURN_SD_DEG, (-MAX_TURN_DEG, MAX_TURN_DEG));
-        let shifts = ["x", "y", "z"].map(|axis| sd(format!("shift_{axis}")));
+        let shifts = ["x", "y", "z"].map(|axis| shift(format!("shift_{axis}")));
         let parameters = shifts.into_iter().chain([turn.typically(2.0)]).collect();
         vec![
             Case::arrivals(parameters, Shifted { about_m })
@@ -146,11 +146,6 @@ impl ArrivalTerm for Shifted {
         };
         longer_m / arrival.speed_m_s()
     }
-}
-
-fn apart_m(a: [f64; 3], b: [f64; 3]) -> f64 {
-    let way = minus(a, b);
-    dot(way, way).sqrt()
 }
 
 /// By how much a path grows whose directions alone are known. From its end, each end sees the image of the other in its direction; the path

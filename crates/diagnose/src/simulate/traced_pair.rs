@@ -37,7 +37,7 @@ pub(crate) struct Arrival {
     pub length_m: f64,
     pub departure: [f64; 3],
     pub arrival: [f64; 3],
-    /// Energy in the mean over all frequencies of the bands: in a sharp peak, a band counts by its width.
+    /// Mean energy over all frequencies of the bands: in a sharp peak, a band counts by its width.
     pub energy: f64,
     /// Surfaces (indices) that it meets, from the source on; none where it could not be followed.
     pub surfaces: Vec<usize>,

@@ -3,6 +3,7 @@
 use super::{ArrivalModel, WIDTHS_S};
 use crate::effect::Nuisance;
 use crate::simulate::traced_pair::Arrival;
+use crate::survey::planes::apart_m;
 use crate::survey::surfaces::axes_of;
 
 /// From so many responses on, their direct sounds alone say where a place is: three distances leave a place and its mirror image.
@@ -105,11 +106,6 @@ fn places(first: &Arrival, towards: [f64; 3], direct_m: &[f64], sd_m: f64) -> Ve
         }
     }
     found
-}
-
-/// The distance of two places.
-pub(super) fn apart_m(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Reflections that the mesh does not have: what effects add, where peaks point, and the fit from there.
 
-use super::places::{apart_m, longer_m};
+use super::places::longer_m;
 use super::{ArrivalData, ArrivalModel, At, REFLECTION_SD_S, WIDTHS_S, at_fit, normal};
 use crate::effect::{Case, FittedCase, Nuisance};
 use crate::error::Error;
@@ -11,6 +11,7 @@ use crate::likelihood::parameters::ModelTerm;
 use crate::simulate::traced_pair::{Arrival, IsolatedReflection};
 use crate::simulate::views::ArrivalView;
 use crate::survey::Survey;
+use crate::survey::planes::apart_m;
 
 /// Images nearer to each other than this are one, in metres.
 const SAME_M: f64 = 0.3;
