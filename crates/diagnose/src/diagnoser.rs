@@ -11,7 +11,7 @@ use crate::extend::extension::extended_model;
 use crate::infer::arrival_fits::ArrivalFits;
 use crate::infer::baseline::Baseline;
 use crate::infer::candidates::{self, CatalogueCase};
-use crate::infer::confirmation::{Confirmation, Doubt, confirm, is_of_decays_alone};
+use crate::infer::confirmation::{Confirmation, Doubt, confirm};
 use crate::infer::ray_dependence::{could_be_chance, more_with_half};
 use crate::infer::search::Search;
 use crate::infer::selection::{Selection, give, select};
@@ -47,6 +47,8 @@ pub struct Diagnoser {
     laws: Vec<Law>,
     /// Causes that are at work from the beginning.
     given: Vec<GivenCause>,
+    /// Whether laws are looked for only where nothing else explains the room.
+    only_unexplained: bool,
 }
 
 /// A cause of a model from which a diagnosis starts.
@@ -72,7 +74,14 @@ impl Diagnoser {
     pub fn new(config: DiagnoseConfig) -> Result<Self, Error> {
         config.check()?;
         let tracer = Arc::new(Rays { config: config.tracer() });
-        Ok(Self { config, effects: catalogue(), tracer, laws: Vec::new(), given: Vec::new() })
+        Ok(Self {
+            config,
+            effects: catalogue(),
+            tracer,
+            laws: Vec::new(),
+            given: Vec::new(),
+            only_unexplained: false,
+        })
     }
 
     /// With these effects instead.
@@ -126,6 +135,14 @@ impl Diagnoser {
         self
     }
 
+    /// As [`discovering`](Self::discovering), but only where the rest of the diagnosis ends [`Verdict::Unexplained`] without a name, and six or
+    /// more receivers are measured. Everywhere else the answer is that of a diagnosis that looks for no law, and so is what a name must reach
+    /// ([`threshold_nats`](Self::threshold_nats)).
+    #[must_use]
+    pub fn discovering_if_unexplained(self) -> Self {
+        Self { only_unexplained: true, ..self.discovering() }
+    }
+
     /// Starting from an extended model: its causes are at work from the beginning, their parameters and the absorption fitted anew to the data
     /// at hand, and the search goes on beside them. One for which these data do not speak is dropped, and a note says so. What is known of the
     /// parameters beforehand is what the catalogue knows, not what the model found: data that it was fitted to may be given again.
@@ -176,7 +193,8 @@ impl Diagnoser {
 
     /// What a name must reach, in nats: the odds that are asked for, and the number of effects that are tried.
     pub fn threshold_nats(&self) -> f64 {
-        self.config.naming_nats + (self.effects.len().max(1) as f64).ln()
+        let tried = if self.only_unexplained { self.without_laws() } else { self.effects.len() };
+        self.config.naming_nats + (tried.max(1) as f64).ln()
     }
 
     /// Diagnoses a measured room. Receivers in `hold_out` are never fitted and only predicted; without any, each group of
@@ -192,12 +210,22 @@ impl Diagnoser {
         observer: &dyn Observer,
     ) -> Result<Diagnosis, Error> {
         let held = held_receivers(room, hold_out)?;
-        if self.looks_for_laws() {
-            return self.discovered(room, &held, observer);
+        if self.looks_for_laws() && !self.only_unexplained {
+            return self.discovered(room, &held, None, observer);
         }
-        let task = Task { room, held: &held, vault: &[], laws: false, effects: self.effects.len() };
+        let task = self.without_search(room, &held);
         let (weighed, confirmed) = self.found(&task, observer)?;
-        self.composed(&weighed, confirmed, task.effects, observer)
+        let calls_for_laws = self.only_unexplained && confirmed.leaves_all_unexplained();
+        let plain = self.composed(&weighed, confirmed, task.effects, observer)?;
+        if calls_for_laws && !self.vault(room, &held).is_empty() {
+            return self.discovered(room, &held, Some(plain), observer);
+        }
+        Ok(plain)
+    }
+
+    /// The diagnosis of all positions by the effects alone.
+    fn without_search<'a>(&self, room: &'a MeasuredRoom, held: &'a [usize]) -> Task<'a> {
+        Task { room, held, vault: &[], laws: false, effects: self.without_laws() }
     }
 
     /// Searches for causes, and says which of them stand.
@@ -221,12 +249,8 @@ impl Diagnoser {
             let mut confirmed = weighed.confirmed((&*tracer, held), effects, observer)?;
             let fallen: Vec<usize> = confirmed.dropped.iter().map(|(candidate, _)| *candidate).collect();
             dropped.append(&mut confirmed.dropped);
-            let of_decays = {
-                let search = weighed.search(effects);
-                fallen.iter().all(|&c| is_of_decays_alone(&search.candidates[c]))
-            };
             let nothing_stands = confirmed.state.chosen.is_empty() && weighed.given.is_empty();
-            if fallen.is_empty() || !of_decays || !nothing_stands || dropped.len() > MOST_FALLEN {
+            if fallen.is_empty() || !nothing_stands || dropped.len() > MOST_FALLEN {
                 confirmed.dropped = dropped;
                 return Ok((weighed, confirmed));
             }
@@ -289,8 +313,8 @@ impl Diagnoser {
     /// # Errors
     /// As [`Diagnoser::diagnose`].
     pub fn refit(&self, room: &MeasuredRoom, observer: &dyn Observer) -> Result<ExtendedModel, Error> {
-        let effects = self.effects.len();
-        let task = Task { room, held: &[], vault: &[], laws: false, effects };
+        let task = self.without_search(room, &[]);
+        let effects = task.effects;
         let Prepared { mut baseline, cases, given, used } = self.prepare(&task, &self.tracer, observer)?;
         let arrival_fits = Arc::default();
         give(&mut baseline, &cases, effects, (&used, &arrival_fits), &given)?;

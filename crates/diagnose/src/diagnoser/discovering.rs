@@ -27,16 +27,27 @@ impl Diagnoser {
         self.law_effect().is_some()
     }
 
+    /// Number of effects but that which stands for laws.
+    pub(super) fn without_laws(&self) -> usize {
+        self.effects.len() - usize::from(self.looks_for_laws())
+    }
+
+    /// Receivers that are set aside.
+    pub(super) fn vault(&self, room: &MeasuredRoom, held: &[usize]) -> Vec<usize> {
+        let measured = room.responses().iter().map(|r| r.receiver).filter(|r| !held.contains(r));
+        vault::draw(measured, self.config.seed)
+    }
+
     /// Looks for laws beside the catalogue with the vault left out of everything, and opens it for those that were named. Where none stands,
-    /// the answer is that of a diagnosis of all positions that looks for none.
+    /// the answer is that of a diagnosis of all positions that looks for none: `plain`, where that is known.
     pub(super) fn discovered(
         &self,
         room: &MeasuredRoom,
         held: &[usize],
+        plain: Option<Diagnosis>,
         observer: &dyn Observer,
     ) -> Result<Diagnosis, Error> {
-        let measured = room.responses().iter().map(|r| r.receiver).filter(|r| !held.contains(r));
-        let vault = vault::draw(measured, self.config.seed);
+        let vault = self.vault(room, held);
         let names = |receivers: &[usize]| receivers.iter().map(|&r| room.receivers()[r].id.clone()).collect();
         let mut told = LawSearch { vault: names(&vault), fallen: Vec::new() };
         let task = Task { room, held, vault: &vault, laws: true, effects: self.effects.len() };
@@ -57,9 +68,14 @@ impl Diagnoser {
         told.fallen.extend(doubted(&weighed, &confirmed));
         let still = laws_among(&weighed, &confirmed.state.chosen);
         let mut diagnosis = if still.is_empty() && !vault.is_empty() {
-            let task = Task { room, held, vault: &[], laws: false, effects: effects - 1 };
-            let (weighed, confirmed) = self.found(&task, observer)?;
-            self.composed(&weighed, confirmed, task.effects, observer)?
+            match plain {
+                Some(plain) => plain,
+                None => {
+                    let task = self.without_search(room, held);
+                    let (weighed, confirmed) = self.found(&task, observer)?;
+                    self.composed(&weighed, confirmed, task.effects, observer)?
+                }
+            }
         } else {
             let state = confirmed.state.clone();
             let mut diagnosis = self.composed(&weighed, confirmed, effects, observer)?;

@@ -55,6 +55,13 @@ pub(crate) struct Confirmation {
     pub testing_s: f64,
 }
 
+impl Confirmation {
+    /// Whether no cause stands, chance is no explanation, and the baseline meets the data well enough for a name to be trusted.
+    pub fn leaves_all_unexplained(&self) -> bool {
+        self.verdict == Verdict::Unexplained && self.state.chosen.is_empty() && !self.hopeless
+    }
+}
+
 /// Tests the fit, drops causes that do not help at positions left out, and decides on the verdict.
 pub(crate) fn confirm(
     search: &Search<'_>,
@@ -210,7 +217,7 @@ fn resting_on_modes(search: &Search<'_>, state: &State) -> Result<Option<usize>,
 }
 
 /// Whether decays alone speak for a cause, and paths explain it.
-pub(crate) fn is_of_decays_alone(candidate: &Candidate<'_>) -> bool {
+fn is_of_decays_alone(candidate: &Candidate<'_>) -> bool {
     let case = candidate.case;
     candidate.id != RoomModes.id()
         && case.observable() == Observable::Decay

@@ -20,7 +20,7 @@ use crate::failure::Failure;
 use crate::laws::naming_laws;
 use crate::output::OutputFolder;
 use crate::room::RoomArguments;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use findings::Findings;
 use sabine::acoustics::Error as ValueError;
 use sabine::diagnose::{DiagnoseConfig, Diagnoser, Error as DiagnoseError, ExtendedModel, read_laws};
@@ -41,9 +41,10 @@ pub struct Arguments {
     /// Formulas to weigh as causes beside the catalogue, `[[laws]]` in TOML: a file, or a folder of such files
     #[arg(long, value_name = "FILE|DIR")]
     laws: Option<PathBuf>,
-    /// Look for a law beside the catalogue: what the misfit goes with (angles, lengths, directions, time), and by how much
-    #[arg(long)]
-    discover: bool,
+    /// When to look for a law beside the catalogue: what the misfit goes with (angles, lengths, directions, time), and by how much. Without
+    /// a word after it: always [default: unexplained; never with --effects]
+    #[arg(long, value_enum, value_name = "WHEN", num_args = 0..=1, require_equals = true, default_missing_value = "always")]
+    discover: Option<Discover>,
     /// extended_model.toml of an earlier diagnosis to start from: its causes are at work, fitted anew, and the search goes on
     #[arg(long, value_name = "F.toml")]
     model: Option<PathBuf>,
@@ -62,6 +63,25 @@ pub struct Arguments {
     /// Folder for diagnosis.json, report.html, extended_model.toml and extended_mesh.obj
     #[arg(long, value_name = "DIR", default_value = "out/diagnose")]
     out: PathBuf,
+}
+
+/// When a law is looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Discover {
+    /// Beside the catalogue, in any room
+    Always,
+    /// Where no cause of the catalogue explains the room
+    Unexplained,
+    /// Not at all
+    Never,
+}
+
+impl Arguments {
+    /// A law could take the place of a cause that is not to be tried.
+    fn discover(&self) -> Discover {
+        let some = !self.effects.is_empty();
+        self.discover.unwrap_or(if some { Discover::Never } else { Discover::Unexplained })
+    }
 }
 
 /// Runs the command.
@@ -85,9 +105,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let file = arguments.laws.as_deref();
     diagnoser = diagnoser.with_laws(laws).map_err(|error| naming_laws(error.into(), file))?;
-    if arguments.discover {
-        diagnoser = diagnoser.discovering();
-    }
+    diagnoser = match arguments.discover() {
+        Discover::Always => diagnoser.discovering(),
+        Discover::Unexplained => diagnoser.discovering_if_unexplained(),
+        Discover::Never => diagnoser,
+    };
     if let Some(model) = &arguments.model {
         diagnoser = diagnoser.starting_from(&ExtendedModel::read(model)?)?;
     }

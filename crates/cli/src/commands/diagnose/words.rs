@@ -129,9 +129,14 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
                 let names: Vec<String> = findings.causes.iter().map(named).collect();
                 told.push(format!("This was found, and does not suffice: {}.", names.join("; ")));
             }
-            if findings.law_search.is_none() {
-                told.push("The option --discover looks for a formula that no list of causes has.".to_owned());
-            }
+            told.push(
+                if findings.law_search.is_some() {
+                    "A formula beyond the list of causes was looked for, and none stands."
+                } else {
+                    "The option --discover looks for a formula that no list of causes has."
+                }
+                .to_owned(),
+            );
         }
     }
     let slight: Vec<String> = findings.causes.iter().filter(|c| c.slight).map(named).collect();
