@@ -225,7 +225,7 @@ impl Diagnoser {
 
     /// The diagnosis of all positions by the effects alone.
     fn without_search<'a>(&self, room: &'a MeasuredRoom, held: &'a [usize]) -> Task<'a> {
-        Task { room, held, vault: &[], laws: false, effects: self.without_laws() }
+        Task { room, held, vault: &[], laws: None, effects: self.without_laws() }
     }
 
     /// Searches for causes, and says which of them stand.
@@ -304,7 +304,7 @@ impl Diagnoser {
             could_be_chance: false,
         };
         let weighed = weighed.searched(task.effects, Vec::new(), observer)?;
-        if task.laws { self.searched_beside(weighed, task, observer) } else { Ok(weighed) }
+        if task.laws.is_some() { self.searched_beside(weighed, task, observer) } else { Ok(weighed) }
     }
 
     /// The model from which the diagnosis starts, its parameters and the absorption fitted anew to a room's responses: nothing is looked for,
@@ -348,8 +348,8 @@ impl Diagnoser {
         let given = self.given.iter().map(place).collect::<Result<_, Error>>()?;
         baseline.calibrate_scatter(&[], &used)?;
         let mut prepared = Prepared { baseline, cases, given, used };
-        if task.laws {
-            self.shortlist_laws(&mut prepared, task.effects)?;
+        if task.laws.is_some() {
+            self.shortlist_laws(&mut prepared, task)?;
         }
         Ok(prepared)
     }
@@ -363,8 +363,8 @@ struct Task<'a> {
     held: &'a [usize],
     /// Those that the search for laws leaves out.
     vault: &'a [usize],
-    /// Whether laws are looked for.
-    laws: bool,
+    /// What laws inherit, in nats; none where they are not looked for.
+    laws: Option<f64>,
     /// Number of effects, for the correction for how many were tried.
     effects: usize,
 }

@@ -50,9 +50,11 @@ impl Diagnoser {
         let vault = self.vault(room, held);
         let names = |receivers: &[usize]| receivers.iter().map(|&r| room.receivers()[r].id.clone()).collect();
         let mut told = LawSearch { vault: names(&vault), fallen: Vec::new() };
-        let task = Task { room, held, vault: &vault, laws: true, effects: self.effects.len() };
+        // Where every effect has been weighed in vain, what is beyond them all is as probable as all together were.
+        let inherited_nats = if plain.is_some() { (self.effects.len() as f64).ln() } else { 0.0 };
+        let effects = self.effects.len();
+        let task = Task { room, held, vault: &vault, laws: Some(inherited_nats), effects };
         let (mut weighed, mut confirmed) = self.found(&task, observer)?;
-        let effects = task.effects;
         let laws: Vec<usize> = laws_among(&weighed, &confirmed.state.chosen);
         let tried = trials(&weighed.search(effects), &confirmed.state, &laws, &vault, observer)?;
         let (standing, fallen): (Vec<Trial>, Vec<Trial>) =
@@ -103,12 +105,13 @@ impl Diagnoser {
     }
 
     /// Adds the most promising laws beside the baseline to the cases.
-    pub(super) fn shortlist_laws(&self, prepared: &mut Prepared, effects: usize) -> Result<(), Error> {
-        let Some(effect) = self.law_effect() else { return Ok(()) };
+    pub(super) fn shortlist_laws(&self, prepared: &mut Prepared, task: &Task<'_>) -> Result<(), Error> {
+        let (Some(effect), Some(inherited_nats)) = (self.law_effect(), task.laws) else { return Ok(()) };
         let Prepared { baseline, cases, used, .. } = prepared;
-        let state = Search::new(baseline, cases, effects, used.clone()).state(&[], None)?;
+        let state = Search::new(baseline, cases, task.effects, used.clone()).state(&[], None)?;
         let slot = baseline.simulation.tables.len();
-        let more = shortlist(baseline, cases, &state, used, (effect, &UnknownLaw.id(), slot))?;
+        let own = (effect, &UnknownLaw.id(), slot, inherited_nats);
+        let more = shortlist(baseline, cases, &state, used, own)?;
         baseline.add_slots(more.len());
         cases.extend(more);
         baseline.prepare_rest(cases)
@@ -121,7 +124,7 @@ impl Diagnoser {
         task: &Task<'_>,
         observer: &dyn Observer,
     ) -> Result<Weighed, Error> {
-        let Some(effect) = self.law_effect() else { return Ok(weighed) };
+        let (Some(effect), Some(inherited_nats)) = (self.law_effect(), task.laws) else { return Ok(weighed) };
         let chosen = weighed.found.chosen.clone();
         let room_left = chosen.len() < weighed.given.len() + self.config.most_causes;
         if chosen.is_empty() || !room_left || !weighed.found.rivals.is_empty() {
@@ -130,7 +133,8 @@ impl Diagnoser {
         let state = weighed.search(task.effects).state(&chosen, None)?;
         let Weighed { baseline, cases, used, found, arrival_fits, given, .. } = &mut weighed;
         let slot = baseline.simulation.tables.len();
-        let more = shortlist(baseline, cases, &state, used, (effect, &UnknownLaw.id(), slot))?;
+        let own = (effect, &UnknownLaw.id(), slot, inherited_nats);
+        let more = shortlist(baseline, cases, &state, used, own)?;
         if more.is_empty() {
             return Ok(weighed);
         }

@@ -440,7 +440,7 @@ mod tests {
             let mut case = Case::decay(Vec::new(), Counted(Arc::clone(count)));
             // Slots have gaps: cases that refused to be prepared are gone.
             case.slot = Some(2 * effect + 1);
-            CatalogueCase { effect, id: "counted".into(), case, formula: None }
+            CatalogueCase { effect, id: "counted".into(), case, formula: None, inherited_nats: 0.0 }
         };
         let cases: Vec<CatalogueCase> = counts.iter().enumerate().map(one).collect();
         let mut baseline =

@@ -12,6 +12,8 @@ pub(crate) struct Candidate<'a> {
     pub case: &'a Case,
     /// The formula that it is, for a law that was searched for.
     pub formula: Option<Formula>,
+    /// Logarithm of how much more probable it is beforehand, because others that were weighed are not: of a formula.
+    pub inherited_nats: f64,
 }
 
 /// A case with the number and identifier of its effect.
@@ -22,6 +24,8 @@ pub(crate) struct CatalogueCase {
     pub case: Case,
     /// The formula that it is, for a law that was searched for.
     pub formula: Option<Formula>,
+    /// As in [`Candidate`].
+    pub inherited_nats: f64,
 }
 
 /// All cases of some effects, each with a slot for its tables.
@@ -31,7 +35,7 @@ pub(crate) fn cases(effects: &[Box<dyn Effect>], survey: &Survey) -> Vec<Catalog
         let id = own.id();
         for mut case in own.cases(survey) {
             case.slot = Some(all.len());
-            all.push(CatalogueCase { effect, id: id.clone(), case, formula: None });
+            all.push(CatalogueCase { effect, id: id.clone(), case, formula: None, inherited_nats: 0.0 });
         }
     }
     all
@@ -40,18 +44,18 @@ pub(crate) fn cases(effects: &[Box<dyn Effect>], survey: &Survey) -> Vec<Catalog
 /// The cases as candidates.
 pub(crate) fn candidates<'a>(cases: &'a [CatalogueCase]) -> Vec<Candidate<'a>> {
     let one = |own: &'a CatalogueCase| {
-        let CatalogueCase { effect, id, case, formula } = own;
-        Candidate { effect: *effect, id, case, formula: *formula }
+        let CatalogueCase { effect, id, case, formula, inherited_nats } = own;
+        Candidate { effect: *effect, id, case, formula: *formula, inherited_nats: *inherited_nats }
     };
     cases.iter().map(one).collect()
 }
 
 /// What a candidate pays for being one of many, in nats: each case of an effect is as probable beforehand as the others, and a formula as
-/// probable as the grammar says.
+/// probable as the grammar says, and more so where it inherits.
 pub(crate) fn price(candidates: &[Candidate<'_>], candidate: usize) -> f64 {
     let own = &candidates[candidate];
     let count = || candidates.iter().filter(|c| c.effect == own.effect).count() as f64;
-    own.formula.map_or_else(|| count().ln(), |formula| -formula.ln_prior)
+    own.formula.map_or_else(|| count().ln(), |formula| -formula.ln_prior - own.inherited_nats)
 }
 
 /// The chosen cases that take part in one fit, in their order.

@@ -16,13 +16,13 @@ const MAX_FITTED: usize = 10;
 const MAX_BEHIND_NATS: f64 = 25.0;
 
 /// The most promising laws beside the chosen cases of a state, as cases of an effect (its number and identifier), with slots from `slot` on;
-/// none that is among the cases already.
+/// none that is among the cases already. They inherit `inherited_nats`.
 pub(crate) fn shortlist(
     baseline: &Baseline,
     cases: &[CatalogueCase],
     state: &State,
     used: &[bool],
-    (effect, id, slot): (usize, &Cow<'static, str>, usize),
+    (effect, id, slot, inherited_nats): (usize, &Cow<'static, str>, usize, f64),
 ) -> Result<Vec<CatalogueCase>, Error> {
     let survey = baseline.survey();
     let grammar = Grammar::of(survey);
@@ -46,7 +46,7 @@ pub(crate) fn shortlist(
         // A formula that is no law (a name of a surface that none may have) is not weighed.
         let Ok(mut case) = grammar.case(&formula, survey) else { continue };
         case.slot = Some(slot + found.len());
-        found.push(CatalogueCase { effect, id: id.clone(), case, formula: Some(formula) });
+        found.push(CatalogueCase { effect, id: id.clone(), case, formula: Some(formula), inherited_nats });
     }
     Ok(found)
 }
