@@ -41,7 +41,10 @@ fn checked(out: &Path) -> Value {
     let mut names: Vec<String> =
         std::fs::read_dir(out).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
     names.sort();
-    assert_eq!(names, ["diagnosis.json", "extended_mesh.obj", "extended_model.toml", "report.html"]);
+    assert_eq!(
+        names,
+        ["diagnosis.json", "extended_mesh.glb", "extended_mesh.obj", "extended_model.toml", "report.html"]
+    );
     let json: Value = serde_json::from_slice(&std::fs::read(out.join("diagnosis.json")).unwrap()).unwrap();
     let verdict = json["verdict"].as_str().unwrap();
     assert!(["adequate", "explained", "ambiguous", "unexplained"].contains(&verdict));

@@ -29,8 +29,9 @@ fn in_rooms(hidden: impl Fn(u64, &Laboratory) -> Vec<Hidden>) -> Vec<(Vec<Hidden
             let room = lab.write(&hidden, &folder.path().join("room"), None).unwrap();
             let config = DiagnoseConfig { rays: 1000, ..DiagnoseConfig::default() };
             let rivals = RIVALS.map(str::to_owned);
-            let diagnoser = Diagnoser::new(config).unwrap().with_only(&rivals).unwrap().discovering();
-            let found = diagnoser.diagnose(&room, &[], &()).unwrap();
+            // As the command does it.
+            let diagnoser = Diagnoser::new(config).unwrap().with_only(&rivals).unwrap();
+            let found = diagnoser.discovering_if_unexplained().diagnose(&room, &[], &()).unwrap();
             let materials = room.scene().materials().iter().map(|m| m.name.clone()).collect();
             let causes: Vec<(&str, Option<&str>)> =
                 found.causes.iter().map(|c| (c.effect.as_str(), c.subject.as_deref())).collect();

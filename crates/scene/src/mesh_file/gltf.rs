@@ -6,6 +6,7 @@
 
 mod buffers;
 mod extras;
+mod glb;
 
 use super::MeshDraft;
 use crate::error::Error;

@@ -34,7 +34,7 @@ impl UpAxis {
     }
 
     /// What a point that was read with this axis up would be with the other.
-    #[cfg(feature = "rooms")]
+    #[cfg(any(feature = "rooms", feature = "gltf"))]
     pub(crate) fn to_other(self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         match self {
             Self::Z => [x, -z, y],

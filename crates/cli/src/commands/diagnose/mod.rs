@@ -60,7 +60,7 @@ pub struct Arguments {
     /// Stop after so many seconds, write nothing, and say how far it came
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..))]
     time_limit: Option<u64>,
-    /// Folder for diagnosis.json, report.html, extended_model.toml and extended_mesh.obj
+    /// Folder for diagnosis.json, report.html, extended_model.toml, extended_mesh.obj and extended_mesh.glb
     #[arg(long, value_name = "DIR", default_value = "out/diagnose")]
     out: PathBuf,
 }
@@ -156,6 +156,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     out.write("extended_model.toml", model.as_bytes())?;
     if let Ok(found) = &found {
         out.write("extended_mesh.obj", found.scene.to_obj().as_bytes())?;
+        out.write("extended_mesh.glb", &found.scene.to_glb()?)?;
     }
     out.finish()?;
     print_findings(&findings, &arguments.out);

@@ -53,7 +53,7 @@ pub fn html(findings: &Findings, drawing: Option<&str>) -> Result<String> {
     if let Some(drawing) = drawing {
         page.heading("Where to look in the room");
         page.markup(drawing);
-        page.paragraph("The mesh as found is in extended_mesh.obj, in metres and z up.");
+        page.paragraph("The mesh as found is in extended_mesh.obj, in metres and z up, and with its materials in extended_mesh.glb (glTF).");
     }
     held_out::section(&mut page, findings);
     residuals(&mut page, findings)?;
