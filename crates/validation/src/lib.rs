@@ -1,8 +1,14 @@
 //! The programs behind the tables of `docs/validation`: how often hidden effects are found, how well materials are fitted, what is
 //! rendered from speech in real rooms, whether memory stays flat. Not published; run them with `cargo run --release -p sabine-validation --bin NAME`.
 
+pub mod hiding;
+pub mod record;
+
 use std::fmt::Display;
 use std::process::ExitCode;
+
+/// Any error; what it says is printed.
+pub type AnyError = Box<dyn std::error::Error + Send + Sync>;
 
 /// How a program ends; an error is printed.
 #[must_use]

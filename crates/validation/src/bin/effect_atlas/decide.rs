@@ -1,13 +1,14 @@
 //! Whether the measurement that a set of causes asks for does decide between them.
 
-use crate::AnyError;
-use crate::task::{Task, named};
+use crate::task::Task;
 use rand::seq::IndexedRandom;
 use rand::{SeedableRng, rngs::SmallRng};
 use sabine::diagnose::{
     Diagnosis, EffectInfo, NextMeasurement, Verdict, catalogue, discriminating_measurement,
 };
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
+use sabine_validation::AnyError;
+use sabine_validation::hiding::named;
 use std::path::Path;
 
 /// All that can be done in the laboratory.

@@ -14,14 +14,12 @@ mod trial;
 use clap::Parser;
 use sabine::diagnose::DiagnoseConfig;
 use sabine_testkit::Hidden;
+use sabine_validation::{AnyError, hiding, record};
 use shards::{Built, Shards};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use task::Task;
 use trial::Trial;
-
-type AnyError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Hide effects in laboratory rooms and count what is found of them.
 #[derive(Parser)]
@@ -103,7 +101,7 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
         return share(arguments, out, &scratch);
     }
     let mut trials = match &arguments.record {
-        Some(path) if path.exists() => read(path)?,
+        Some(path) if path.exists() => record::read(path)?,
         _ => Vec::new(),
     };
     for task in tasks(arguments) {
@@ -112,8 +110,7 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
         }
         trials.push(diagnose(&task, &scratch)?);
         if let Some(path) = &arguments.record {
-            let text = csv_text(&trials)?;
-            sabine::acoustics::write_atomically(path, |file| file.write_all(text.as_bytes()))?;
+            record::write(path, &trials)?;
         }
     }
     tables::print(&trials);
@@ -169,7 +166,7 @@ fn tasks(arguments: &Arguments) -> Vec<Task> {
         for &strength in &arguments.strengths {
             for effect in &effects {
                 tasks.push(Task {
-                    hidden: effect.split('+').filter(|e| *e != "none").map(str::to_owned).collect(),
+                    hidden: hiding::effects(effect),
                     strength,
                     seed: seeds.next().unwrap_or(u64::MAX),
                     receivers: arguments.receivers,
@@ -190,19 +187,4 @@ fn tasks(arguments: &Arguments) -> Vec<Task> {
     }
     let (first, each) = arguments.part;
     tasks.into_iter().skip(first - 1).step_by(each).collect()
-}
-
-fn read(path: &Path) -> Result<Vec<Trial>, AnyError> {
-    let mut reader = csv::Reader::from_path(path)?;
-    let trials: Result<Vec<Trial>, csv::Error> = reader.deserialize().collect();
-    trials.map_err(|error| format!("{}: {error}", path.display()).into())
-}
-
-fn csv_text(trials: &[Trial]) -> Result<String, csv::Error> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for trial in trials {
-        writer.serialize(trial)?;
-    }
-    let bytes = writer.into_inner().map_err(|error| error.into_error())?;
-    String::from_utf8(bytes).map_err(|error| std::io::Error::other(error).into())
 }

@@ -7,6 +7,7 @@
 use crate::task::Task;
 use crate::trial::Trial;
 use sabine::acoustics::write_atomically;
+use sabine_validation::record;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::io::Write;
@@ -118,7 +119,7 @@ impl<'a> Shards<'a> {
             }
             let trial = Trial { seconds: None, ..diagnose(task)? };
             let record =
-                crate::csv_text(&[trial]).map_err(|source| Error::Csv { path: path.clone(), source })?;
+                record::text(&[trial]).map_err(|source| Error::Csv { path: path.clone(), source })?;
             let record_sha256 = hash(record.as_bytes());
             let piece = Piece { plan_sha256: self.plan_sha256.clone(), record_sha256, record };
             write(&path, &json(&path, &piece)?)?;
@@ -246,7 +247,7 @@ mod tests {
         // The record is that of the same rooms in the file that they were looked up in, less the times.
         let record = std::fs::read_to_string(alone.join("record.csv")).unwrap();
         let wanted: Vec<Trial> = trials[..5].iter().map(|t| Trial { seconds: None, ..t.clone() }).collect();
-        assert_eq!(record, crate::csv_text(&wanted).unwrap());
+        assert_eq!(record, record::text(&wanted).unwrap());
     }
 
     #[test]

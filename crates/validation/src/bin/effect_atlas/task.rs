@@ -1,11 +1,10 @@
 //! What is to be diagnosed: a laboratory room, what is hidden in it, and how it is asked.
 
-use crate::AnyError;
 use crate::sham::{IDS, Sham};
 use sabine::acoustics::Bands;
 use sabine::diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, catalogue};
-use sabine::scene::TimeZero;
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
+use sabine_validation::{AnyError, hiding};
 use serde::Serialize;
 use std::path::Path;
 
@@ -39,14 +38,11 @@ pub struct Task {
 impl Task {
     /// Name of what is hidden, as the record has it.
     pub fn name(&self) -> String {
-        if self.hidden.is_empty() { "none".to_owned() } else { self.hidden.join("+") }
+        hiding::name(&self.hidden)
     }
 
     /// The laboratory room that it is done in.
     pub fn lab(&self) -> Result<LabConfig, AnyError> {
-        // A recording that begins before the emission must say so.
-        let early = self.hidden.iter().any(|id| id == "nonlinear_distortion");
-        let time_zero = if early { TimeZero::Common } else { TimeZero::Emission };
         let all =
             if self.bands_per_octave == 1 { Bands::T60 } else { Bands::third_octaves(100.0, 10_000.0)? };
         let highest = (0..all.len()).rfind(|&b| 2.0 * all.edges_hz(b).1 <= f64::from(self.sample_rate_hz));
@@ -58,7 +54,7 @@ impl Task {
             sessions: self.sessions,
             sample_rate_hz: self.sample_rate_hz,
             bands: all.part(0..highest + 1),
-            time_zero,
+            time_zero: hiding::time_zero(&self.hidden),
             positive_reflections: self.positive_reflections,
             ..LabConfig::default()
         })
@@ -87,12 +83,4 @@ impl Task {
         std::fs::remove_dir_all(folder)?;
         Ok(found)
     }
-}
-
-/// Names of the causes found, each once, in alphabetical order.
-pub fn named(found: &Diagnosis) -> Vec<&str> {
-    let mut named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
-    named.sort_unstable();
-    named.dedup();
-    named
 }

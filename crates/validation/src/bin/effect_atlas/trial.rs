@@ -1,10 +1,11 @@
 //! One laboratory room, diagnosed blind, and its truth beside what was found.
 
-use crate::AnyError;
 use crate::decide;
-use crate::task::{Task, named};
+use crate::task::Task;
 use sabine::diagnose::{Cause, Diagnosis, Verdict};
 use sabine_testkit::{Fault, Hidden, LabConfig, Laboratory};
+use sabine_validation::AnyError;
+use sabine_validation::hiding::{answer, hide, named};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -103,12 +104,7 @@ impl Task {
     pub fn run(&self, folder: &Path) -> Result<Trial, AnyError> {
         let config = self.lab()?;
         let lab = Laboratory::new(config.clone())?;
-        let hidden: Vec<Hidden> = self
-            .hidden
-            .iter()
-            .zip(0..)
-            .map(|(id, k)| Hidden::random(id, self.strength, &lab, self.seed + 7919 * k))
-            .collect::<Result<_, _>>()?;
+        let hidden = hide(&self.hidden, self.strength, &lab, self.seed)?;
         let started = std::time::Instant::now();
         let found = self.diagnose(&lab, &hidden, folder)?;
         let seconds = started.elapsed().as_secs_f64();
@@ -183,18 +179,6 @@ impl Task {
             other: follow_up.as_ref().map(|f| format!("{:?}", f.other.0)),
             other_decides: follow_up.as_ref().map(|f| f.other.1),
         })
-    }
-}
-
-fn answer(found: &Diagnosis) -> String {
-    match found.verdict {
-        Verdict::Explained | Verdict::Law => named(found).join(" + "),
-        Verdict::Ambiguous => {
-            // The last cause stands for the set.
-            let sure = found.causes.iter().rev().skip(1).map(|c| c.effect.clone());
-            sure.chain([found.alternatives.join(" or ")]).collect::<Vec<_>>().join(" + ")
-        }
-        other => other.to_string(),
     }
 }
 
