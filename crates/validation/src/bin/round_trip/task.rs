@@ -18,6 +18,17 @@ pub const FITTED: usize = 8;
 const FRESH: usize = 12;
 /// An effect that is no [`Hidden`] of the laboratory but a setting of the room: reflections keep their sign.
 pub const COHERENT: &str = "coherent_reflections";
+/// Effects that a measured room can state and that bear on its decays: air, surfaces, and where things are. A panel or a hole is no such: in
+/// the laboratory it takes part in early reflections alone.
+const IN_ROOM: [&str; 7] = [
+    "air_absorption",
+    "scattering",
+    "sound_speed",
+    "room_dimensions",
+    "surface_displacement",
+    "position_error",
+    "coordinate_shift",
+];
 /// Seeds that are tried until an effect of single positions concerns one that is fitted: each misses with a probability of 0.6 or less.
 const TRIES: u64 = 200;
 /// Steps between these seeds.
@@ -143,30 +154,31 @@ impl Task {
         hiding::named(found) == wanted
     }
 
-    /// The true model, absorption fitted at the same positions with the right causes at work: as found where they were named, else with the
-    /// best case of each, whether or not these data need it.
+    /// The true model, absorption fitted at the same positions: with what is true of the room in the place of what is stated, and beside the
+    /// other hidden effects, whether or not these data need them.
     fn true_model(
         &self,
         truth: &TrueModel,
         fitted: &MeasuredRoom,
         (found, model): (&Diagnosis, &ExtendedModel),
     ) -> Result<ExtendedModel, AnyError> {
-        let known = if self.is_right(found) {
-            model.clone()
-        } else {
-            let mut given = model.clone();
-            given.causes = self.ids().map(|id| best_case(id, found)).collect();
-            self.diagnoser()?.with_effects(Vec::new()).starting_from(&given)?.refit(fitted, &())?
-        };
-        let mut absorption = known.absorption.clone();
-        absorption.extend(truth.absorption.iter().cloned());
-        let mut model = with_absorption(&known, absorption);
         let mut changes = truth.changes.clone();
         changes.extend(
             self.hidden.iter().filter(|id| *id == COHERENT).map(|_| ModelChange::CoherentReflections),
         );
-        model.causes = vec![ModelCause::new("truth", changes)];
-        Ok(model)
+        let mut true_model = with_absorption(model, BTreeMap::new());
+        true_model.causes = vec![ModelCause::new("truth", changes)];
+        let mut in_room = true_model.clone();
+        in_room.causes[0].changes.retain(|change| !matches!(change, ModelChange::Panel(_)));
+        let as_is = in_room.room(fitted)?.measured_room(fitted)?;
+
+        let mut others = with_absorption(model, BTreeMap::new());
+        others.causes =
+            self.ids().filter(|id| !IN_ROOM.contains(id)).map(|id| best_case(id, found)).collect();
+        let known = self.diagnoser()?.with_effects(Vec::new()).starting_from(&others)?.refit(&as_is, &())?;
+        let mut absorption = known.absorption;
+        absorption.extend(truth.absorption.iter().cloned());
+        Ok(with_absorption(&true_model, absorption))
     }
 }
 

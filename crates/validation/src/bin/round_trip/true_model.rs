@@ -219,8 +219,8 @@ fn in_recording(hidden: &Hidden, lab: &Laboratory, fitted: usize) -> Vec<ModelCh
     }
 }
 
-/// Noise by octave: energy per second relative to that of a pulse of amplitude 1, which the direct sound is at 1 m. It is what responses with
-/// noise have and the same without it have not.
+/// Noise by octave: energy per second relative to that of the direct sound at 1 m, which is a pulse as high as the gain of the recording. It
+/// is what responses with noise have and the same without it have not.
 fn noise_per_s(lab: &Laboratory, with: &[Hidden], without: &[Hidden]) -> Result<Vec<f64>, AnyError> {
     let (noisy, clean) = (lab.responses(with)?, lab.responses(without)?);
     let (bands, rate_hz) = (lab.config().bands, lab.config().sample_rate_hz);
@@ -233,8 +233,11 @@ fn noise_per_s(lab: &Laboratory, with: &[Hidden], without: &[Hidden]) -> Result<
     pulse[rate_hz as usize / 2] = 1.0;
     let of_pulse = energies(&pulse);
     let (mut sums, mut seconds) = (vec![0.0; bands.len()], 0.0);
-    for (noisy, clean) in noisy.iter().zip(&clean) {
-        let rest: Vec<f32> = noisy.samples().iter().zip(clean.samples()).map(|(n, c)| n - c).collect();
+    let gains_db = lab.truth(with)?.gains_db;
+    for ((noisy, clean), gain_db) in noisy.iter().zip(&clean).zip(gains_db) {
+        let gain = 10f64.powf(gain_db / 20.0) as f32;
+        let rest = noisy.samples().iter().zip(clean.samples());
+        let rest: Vec<f32> = rest.map(|(n, c)| (n - c) / gain).collect();
         seconds += rest.len() as f64 / f64::from(rate_hz);
         sums.iter_mut().zip(energies(&rest)).for_each(|(sum, energy)| *sum += energy);
     }
