@@ -105,7 +105,9 @@ fn fitted_case<'s>(search: &'s Search<'_>, state: &'s State, candidate: usize) -
         (nuisance, of_decays.or_else(of_arrivals).unwrap_or_default().to_vec())
     });
     let width_s = |band: usize| baseline.simulation.states[0][band].bins.width_s;
-    let level_per_s = |band: usize| baseline.simulation.reference[band] / width_s(band);
+    // What is added is fitted as it was recorded; the model has it relative to the direct sound, which was recorded with the common gain.
+    let gain = decays.common_gain().map_or(1.0, |index| 10f64.powf(state.energy.values[index] / 10.0));
+    let level_per_s = |band: usize| baseline.simulation.reference[band] / width_s(band) / gain;
     let has_auxiliary = state.own.iter().any(|(c, _)| *c == candidate);
     FittedCase {
         survey,
@@ -196,7 +198,10 @@ mod tests {
         // Two terms of the decays: the first has no parameters, so that the noise follows the nuisances.
         let width_s = baseline.simulation.states[0][1].bins.width_s;
         let level = baseline.simulation.reference[1] / width_s;
-        let noise = level * 10f64.powf(energy.values[decays.len() + 1] / 10.0);
+        // Relative to the direct sound, which the common gain makes louder or softer as it was recorded.
+        let gain_db = energy.values[decays.common_gain().expect("a gain that is open")];
+        assert!(gain_db.abs() > 1e-3, "{gain_db}");
+        let noise = level * 10f64.powf((energy.values[decays.len() + 1] - gain_db) / 10.0);
         assert!((all.noise_per_s[1] / noise - 1.0).abs() < 1e-12);
         assert_eq!(all.inverted, ["s0-r0"]);
         assert_eq!(model.absorption["plaster"], energy.values[decays.material(1)]);
