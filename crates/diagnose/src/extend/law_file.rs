@@ -84,6 +84,29 @@ const SHIPPED: [(&str, &str); 10] = [
     ("time_zero.toml", include_str!("../../laws/time_zero.toml")),
 ];
 
+/// The file of a law that needs the name of a material.
+const BY_ANGLE: (&str, &str) =
+    ("absorption_by_angle.toml", include_str!("../../laws/absorption_by_angle.toml"));
+
+/// The law `absorption_by_angle` that comes with this crate, of a material: how much more it takes of sound that grazes it, by octave and angle.
+/// It is none of [`shipped_laws`], which fit every room.
+///
+/// ```
+/// let law = sabine_diagnose::absorption_by_angle("floor_by_angle", "floor")?;
+/// assert_eq!((law.id(), law.surface()), ("floor_by_angle", Some("floor")));
+/// # Ok::<(), sabine_diagnose::Error>(())
+/// ```
+///
+/// # Errors
+/// [`Error::Acoustics`] naming the law for an identifier that is none (1 to 64 letters, digits and `_-.`).
+pub fn absorption_by_angle(id: &str, material: &str) -> Result<Law, Error> {
+    let (name, text) = BY_ANGLE;
+    let laws = parse(Path::new(name), text)?;
+    // The file has one law.
+    let law = laws[0].on_surface(id, material).map_err(Cause::from)?;
+    Ok(law)
+}
+
 /// The laws that come with this crate, in `laws/*.toml`: what effects of the catalogue do, as formulas to start from. None is weighed unless it
 /// is asked for; each file says how it differs from the effect whose name it has.
 ///

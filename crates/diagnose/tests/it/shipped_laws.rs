@@ -1,7 +1,7 @@
 //! Laws that come with the crate, held against the effects whose files they are, in the same hidden rooms.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
-use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, shipped_laws};
+use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, absorption_by_angle, shipped_laws};
 use sabine_paths::laws::Law;
 use sabine_scene::{Levels, MeasuredRoom};
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
@@ -150,11 +150,44 @@ fn the_law_of_directional_microphones_finds_them() {
     assert!(found.law("a").1 > 0.0, "{:?}", found.law);
 }
 
+/// `absorption_by_angle` of each material of a room.
+fn by_angle(room: &MeasuredRoom) -> Vec<Law> {
+    let materials = room.scene().materials().iter().enumerate();
+    materials.map(|(m, own)| absorption_by_angle(&format!("by_angle_{m}"), &own.name).unwrap()).collect()
+}
+
+#[test]
+fn the_law_of_absorption_by_angle_finds_the_material_and_how_much_it_takes() {
+    const HIDDEN_DB: f64 = 10.0;
+    let lab = lab(LabConfig::default());
+    let from_hz = lab.config().bands.nominal_hz(0);
+    let hidden = Hidden::GrazingAbsorption { material: 0, db: HIDDEN_DB, from_hz };
+    let folder = tempfile::tempdir().unwrap();
+    let room = lab.write(&[hidden], &folder.path().join("room"), None).unwrap();
+    let rivals = ["surface_absorption", "scattering", "angle_dependent_absorption", "air_absorption"];
+    let found = diagnose(&room, &rivals, by_angle(&room));
+    let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
+    assert_eq!(named, ["by_angle_0"], "{:?}", found.candidates);
+    let parameters = &found.causes[0].parameters;
+    println!("{:.1} nats {parameters:?}", found.causes[0].nats);
+    assert!(parameters.iter().any(|p| p.name == "a" && p.low > 0.0), "{parameters:?}");
+    let own = found.model.causes[0].law().unwrap();
+    assert_eq!(own.surface(), Some(room.scene().materials()[0].name.as_str()));
+    // At 60 and at 73 degrees, in all octaves alike. What is taken comes out low, by up to a quarter (docs/validation/laws.md).
+    for cosine in [0.5, 0.3] {
+        for hz in [500.0, 1000.0, 4000.0] {
+            let taken_db = -own.value(|name| Some(if name == "frequency_hz" { hz } else { cosine })).unwrap();
+            let expected_db = HIDDEN_DB * (1.0 - cosine).powi(2);
+            assert!((taken_db / expected_db - 1.0).abs() < 0.25, "{cosine} {hz}: {taken_db} {expected_db}");
+        }
+    }
+}
+
 #[test]
 fn no_shipped_law_is_named_where_nothing_is_hidden() {
     let lab = lab(LabConfig { microphone_axes: true, levels: Levels::Absolute, ..LabConfig::default() });
     let folder = tempfile::tempdir().unwrap();
     let room = lab.write(&[], &folder.path().join("room"), None).unwrap();
-    let found = diagnose(&room, &[], shipped_laws().unwrap());
+    let found = diagnose(&room, &[], [shipped_laws().unwrap(), by_angle(&room)].concat());
     assert!(found.causes.is_empty(), "{:?}", found.causes);
 }

@@ -275,6 +275,23 @@ impl Law {
         Ok(law.with_words(self.words.clone()))
     }
 
+    /// The same law of another material, under another identifier.
+    ///
+    /// ```
+    /// use sabine_paths::laws::{Law, LawParameter, LawTarget};
+    /// let a = [("a", LawParameter::new(3.0, [0.0, 9.0], "dB"))];
+    /// let law = Law::new("carpet", LawTarget::Reflection, Some("carpet"), "-a * (1 - cos_incidence)", a)?;
+    /// assert_eq!(law.on_surface("curtain", "heavy curtain")?.surface(), Some("heavy curtain"));
+    /// # Ok::<(), sabine_paths::laws::LawError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Law::new`]: for an identifier that is none, and for a law of anything but reflections, which has no surface.
+    pub fn on_surface(&self, id: &str, surface: &str) -> Result<Self, LawError> {
+        let own = self.names.iter().cloned().zip(self.parameters.iter().cloned());
+        Ok(Self::new(id, self.target, Some(surface), &self.text, own)?.with_words(self.words.clone()))
+    }
+
     /// Its identifier.
     pub fn id(&self) -> &str {
         &self.id
