@@ -164,4 +164,17 @@ fn laws_that_cannot_be_weighed_say_why() {
     assert_eq!(said(nothing), "law `no`: the interval of `a` is zero alone: nothing is left to fit");
     let elsewhere = law("velvet", LawTarget::Reflection, Some("velvet"), "-a", "dB");
     assert!(said(elsewhere).contains("velvet"));
+    // A fit may go to the ends of the intervals, and so the law must have a value there.
+    let dies = |seconds| LawParameter::new(1.0, seconds, "s");
+    let second_decay = |seconds| {
+        let level = ("l", LawParameter::new(-20.0, [-40.0, 0.0], "dB"));
+        let fall = ("d", LawParameter::new(60.0, [60.0, 60.0], "dB"));
+        let formula = "l - d * time_after_direct_s / t";
+        Law::new("second", LawTarget::Added, None, formula, [level, fall, ("t", dies(seconds))]).unwrap()
+    };
+    assert_eq!(
+        said(second_decay([0.0, 2.0])),
+        "law `second`: with l = -40, t = 0 it has no value at 125 Hz: narrow the interval"
+    );
+    assert!(diagnose(&room, vec![second_decay([0.5, 2.0])]).is_ok());
 }

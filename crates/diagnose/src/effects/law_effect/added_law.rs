@@ -3,10 +3,14 @@
 use super::free_parameters::FittedLaw;
 use crate::effect::{DecayTerm, Stage};
 use crate::effects::add_energy;
+use crate::simulate::tables::{Tables, Unprepared};
+use crate::simulate::traced_views::TracedRoomView;
 use crate::simulate::views::BandView;
-use crate::survey::Survey;
+use crate::survey::{Survey, SurveyedResponse};
 use sabine_paths::laws::LawVariable;
 
+/// Equal steps of a response at which a law is looked at beforehand.
+const CHECKED: usize = 32;
 /// Least level that is added, in dB: what has no value adds nothing.
 const LEAST_DB: f64 = -300.0;
 
@@ -19,19 +23,43 @@ impl AddedLaw {
     pub fn stage(&self) -> Stage {
         if self.0.law.is_uniform() { Stage::Noise } else { Stage::Added }
     }
+
+    /// Its levels in dB at times after the direct sound in seconds; none where a variable is not known.
+    fn levels_db(
+        &self,
+        fitted: &[f64],
+        (survey, response): (&Survey, &SurveyedResponse),
+        hz: f64,
+        times_s: &[f64],
+    ) -> Vec<f64> {
+        let variable = |name: &str| match name {
+            "frequency_hz" => Some(LawVariable::Same(hz)),
+            "time_after_direct_s" => Some(LawVariable::Each(times_s)),
+            other => of_survey(survey, (response.source, response.receiver), other).map(LawVariable::Same),
+        };
+        self.0.law.values(&self.0.values(fitted), times_s.len(), variable).unwrap_or_default()
+    }
 }
 
 impl DecayTerm for AddedLaw {
+    /// Computes nothing: looks at the ends of the intervals of the parameters, where a fit may go, from the direct sound to the end of each
+    /// response.
+    fn prepare(&self, room: &TracedRoomView<'_>) -> Result<Tables, Unprepared> {
+        let survey = room.survey();
+        for response in survey.responses() {
+            let end_s = response.sounds_until_s;
+            let times: Vec<f64> = (0..=CHECKED).map(|i| end_s * i as f64 / CHECKED as f64).collect();
+            for hz in survey.bands().iter_hz() {
+                self.0.check(hz, |fitted| self.levels_db(fitted, (survey, response), hz, &times))?;
+            }
+        }
+        Ok(Tables::default())
+    }
+
     fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
-        let (survey, pair) = (view.survey(), view.pair());
         let times: Vec<f64> = (0..ln_energy.len()).map(|bin| view.after_direct_s(bin).max(0.0)).collect();
-        let hz = survey.bands().nominal_hz(view.band());
-        let variable = |name: &str| match name {
-            "frequency_hz" => Some(LawVariable::Same(hz)),
-            "time_after_direct_s" => Some(LawVariable::Each(&times)),
-            other => of_survey(survey, (pair.source, pair.receiver), other).map(LawVariable::Same),
-        };
-        let Ok(levels) = self.0.law.values(&self.0.values(values), times.len(), variable) else { return };
+        let hz = view.survey().bands().nominal_hz(view.band());
+        let levels = self.levels_db(values, (view.survey(), view.pair()), hz, &times);
         for (ln, db) in ln_energy.iter_mut().zip(levels) {
             *ln = add_energy(*ln, view.bin_s() * 10f64.powf(db.max(LEAST_DB) / 10.0));
         }

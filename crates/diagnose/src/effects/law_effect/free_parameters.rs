@@ -1,6 +1,7 @@
 //! Which parameters of a law are fitted, and what is known of them beforehand.
 
 use crate::effect::{FittedCase, Parameter};
+use crate::error::Error;
 use crate::extend::model_change::ModelChange;
 use crate::found_parameter::HALF_90;
 use sabine_paths::laws::{Law, LawError, LawParameter, LawTarget};
@@ -11,6 +12,10 @@ pub(super) const MAX_FREE: usize = 10;
 const SOUGHT: [f64; 3] = [0.5, 0.2, 0.8];
 /// Most parameters that start from several places each.
 const MAX_SPREAD: usize = 3;
+/// Most that a law may add, in dB.
+const MAX_GAIN_DB: f64 = 200.0;
+/// Most combinations of ends of intervals at which a law is looked at beforehand.
+const MAX_CORNERS: usize = 256;
 /// Shares of the farther end from which an amplitude is sought.
 const AMPLITUDE_STARTS: [f64; 2] = [0.1, 0.6];
 
@@ -112,6 +117,35 @@ impl FittedLaw {
             of_others.iter().map(move |others| [own.clone(), others.clone()].concat()).collect::<Vec<_>>()
         };
         shares.iter().flat_map(with).collect()
+    }
+
+    /// Values of all parameters at the ends of all intervals.
+    fn corners(&self) -> Vec<Vec<f64>> {
+        let mut corners = vec![Vec::new()];
+        for (low, high) in self.ranges() {
+            let both = |one: &Vec<f64>| [low, high].map(|end| [one.clone(), vec![end]].concat());
+            corners = corners.iter().flat_map(both).take(MAX_CORNERS).collect();
+        }
+        corners
+    }
+
+    /// That the law has a value, and adds no more than it may, at all ends of the intervals: `levels_db` says its levels with some values of
+    /// the parameters that are fitted.
+    pub fn check(&self, hz: f64, levels_db: impl Fn(&[f64]) -> Vec<f64>) -> Result<(), Error> {
+        self.corners().iter().try_for_each(|corner| {
+            let levels = levels_db(corner);
+            let worst = levels.iter().copied().find(|db| !(db.is_finite() && *db <= MAX_GAIN_DB));
+            let Some(worst) = worst else { return Ok(()) };
+            let at: Vec<String> =
+                self.names().iter().zip(corner).map(|(name, value)| format!("{name} = {value}")).collect();
+            let what = if worst.is_finite() {
+                format!("it adds {worst:.0} dB, more than {MAX_GAIN_DB} dB,")
+            } else {
+                "it has no value".to_owned()
+            };
+            let reason = format!("with {} {what} at {hz} Hz: narrow the interval", at.join(", "));
+            Err(Error::LawNotWeighed { id: self.law.id().to_owned(), reason })
+        })
     }
 
     /// Values of all parameters of the law where those that are fitted have these.

@@ -17,12 +17,8 @@ use std::sync::Arc;
 
 /// Natural logarithm of the energy per decibel.
 const NEPERS_PER_DB: f64 = std::f64::consts::LN_10 / 10.0;
-/// Most that a law may add, in dB.
-const MAX_GAIN_DB: f64 = 200.0;
 /// Least logarithm of a share of energy that counts.
 const LEAST_NEPERS: f64 = -600.0;
-/// Most combinations of ends of intervals at which a law is looked at beforehand.
-const MAX_CORNERS: usize = 256;
 
 /// A law of paths, reflections or the recorder whose parameters are fitted, whatever their part in the formula.
 #[derive(Clone, Debug)]
@@ -42,16 +38,6 @@ struct Sketch {
 }
 
 impl SketchedLaw {
-    /// Values of all parameters at the ends of all intervals.
-    fn corners(&self) -> Vec<Vec<f64>> {
-        let mut corners = vec![Vec::new()];
-        for (low, high) in self.0.ranges() {
-            let both = |one: &Vec<f64>| [low, high].map(|end| [one.clone(), vec![end]].concat());
-            corners = corners.iter().flat_map(both).take(MAX_CORNERS).collect();
-        }
-        corners
-    }
-
     /// Sketches of all bands of a pair. Where the law has no value on some path as it was written, or at an end of an interval, is an error.
     fn sketches(&self, pair: &TracedPairView<'_>) -> Result<Vec<Sketch>, Error> {
         let (law, survey) = (&self.0.law, pair.room().survey());
@@ -75,7 +61,7 @@ impl SketchedLaw {
             };
             let hz = survey.bands().nominal_hz(band);
             let checked = |sketch: Sketch| {
-                self.corners().iter().try_for_each(|corner| self.check(&sketch, corner, hz))?;
+                self.0.check(hz, |corner| self.levels_db(&sketch, corner, hz))?;
                 Ok(sketch)
             };
             if width == 1 && sketched.paths.count == 1 {
@@ -93,22 +79,6 @@ impl SketchedLaw {
             checked(sketch)
         };
         energies.iter().enumerate().map(of_band).collect()
-    }
-
-    /// That the law has a value everywhere, and adds no more than it may.
-    fn check(&self, sketch: &Sketch, fitted: &[f64], hz: f64) -> Result<(), Error> {
-        let levels = self.levels_db(sketch, fitted, hz);
-        let worst = levels.iter().copied().find(|db| !(db.is_finite() && *db <= MAX_GAIN_DB));
-        let Some(worst) = worst else { return Ok(()) };
-        let at: Vec<String> =
-            self.0.names().iter().zip(fitted).map(|(name, value)| format!("{name} = {value}")).collect();
-        let what = if worst.is_finite() {
-            format!("it adds {worst:.0} dB, more than {MAX_GAIN_DB} dB,")
-        } else {
-            "it has no value".to_owned()
-        };
-        let reason = format!("with {} {what} at {hz} Hz: narrow the interval", at.join(", "));
-        Err(Error::LawNotWeighed { id: self.0.law.id().to_owned(), reason })
     }
 
     /// The level of the law in each cell, in dB; one number where it is the same in all; none where a variable is not known.
