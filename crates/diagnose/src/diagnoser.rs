@@ -136,8 +136,8 @@ impl Diagnoser {
     }
 
     /// As [`discovering`](Self::discovering), but only where the rest of the diagnosis ends
-    /// [`Verdict::Unexplained`](crate::Verdict::Unexplained) without a name, and six or more receivers are measured. Everywhere else the answer is that of a diagnosis that looks for no law, and so is what a name must reach
-    /// ([`threshold_nats`](Self::threshold_nats)).
+    /// [`Verdict::Unexplained`](crate::Verdict::Unexplained) without a name, and six or more receivers are measured. Everywhere
+    /// else the answer is that of a diagnosis that looks for no law, and so is what a name must reach ([`threshold_nats`](Self::threshold_nats)).
     #[must_use]
     pub fn discovering_if_unexplained(self) -> Self {
         Self { only_unexplained: true, ..self.discovering() }

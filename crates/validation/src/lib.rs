@@ -42,6 +42,19 @@ pub fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
+/// Prints a row of a table: how many of all, and their exact 95 % interval; nothing where there are none.
+pub fn print_share(what: &str, hits: impl Iterator<Item = bool>) {
+    let hits: Vec<bool> = hits.collect();
+    if hits.is_empty() {
+        return;
+    }
+    let count = hits.iter().filter(|h| **h).count();
+    let (low, high) = exact_interval(count, hits.len());
+    let percent = 100.0 * count as f64 / hits.len() as f64;
+    let (low, high) = (100.0 * low, 100.0 * high);
+    println!("| {what} | {count} of {} ({percent:.0} %) | {low:.0}-{high:.0} % |", hits.len());
+}
+
 /// Exact 95 % interval of a share (Clopper and Pearson, Biometrika 26, 1934): no smaller and no larger true share would leave so many, or so
 /// few, hits to chance.
 #[must_use]

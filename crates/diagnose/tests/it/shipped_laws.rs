@@ -173,7 +173,7 @@ fn the_law_of_absorption_by_angle_finds_the_material_and_how_much_it_takes() {
     assert!(parameters.iter().any(|p| p.name == "a" && p.low > 0.0), "{parameters:?}");
     let own = found.model.causes[0].law().unwrap();
     assert_eq!(own.surface(), Some(room.scene().materials()[0].name.as_str()));
-    // At 60 and at 73 degrees, in all octaves alike. What is taken comes out low, by up to a quarter (docs/validation/laws.md).
+    // At 60 and at 73 degrees, the same in all octaves. What is taken comes out low, by up to a quarter (docs/validation/laws.md).
     for cosine in [0.5, 0.3] {
         for hz in [500.0, 1000.0, 4000.0] {
             let taken_db = -own.value(|name| Some(if name == "frequency_hz" { hz } else { cosine })).unwrap();

@@ -4,6 +4,8 @@
 
 #[cfg(all(unix, feature = "rooms"))]
 mod faults;
+#[cfg(feature = "gltf")]
+mod glb_files;
 #[cfg(all(feature = "rooms", feature = "gltf"))]
 mod gltf_files;
 #[cfg(target_os = "linux")]

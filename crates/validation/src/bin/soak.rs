@@ -9,11 +9,10 @@ use sabine::acoustics::{Channel, Signal, read_audio};
 use sabine::propagate::TracerConfig;
 use sabine::scene::MeasuredRoom;
 use sabine::{MatchConfig, MatchInput, Recording, match_room};
+use sabine_validation::AnyError;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
-
-type AnyError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Match a room many times and watch the memory.
 #[derive(Parser)]

@@ -217,3 +217,28 @@ fn print_findings(findings: &Findings, out: &Path) {
     }
     println!("{:.1} s; look at {}", findings.total_s(), out.join("report.html").display());
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Words {
+        #[command(flatten)]
+        arguments: Arguments,
+    }
+
+    #[test]
+    fn a_law_is_looked_for_where_nothing_explains_the_room_unless_causes_are_listed() {
+        let when = |more: &[&str]| {
+            let words = ["diagnose", "--room", "room"].iter().chain(more);
+            Words::try_parse_from(words).map(|w| w.arguments.discover()).map_err(|error| error.to_string())
+        };
+        assert_eq!(when(&[]), Ok(Discover::Unexplained));
+        assert_eq!(when(&["--effects", "scattering"]), Ok(Discover::Never));
+        assert_eq!(when(&["--effects", "scattering", "--discover"]), Ok(Discover::Always));
+        assert_eq!(when(&["--discover=never"]), Ok(Discover::Never));
+        assert!(when(&["--discover=often"]).is_err_and(|said| said.contains("unexplained")));
+    }
+}

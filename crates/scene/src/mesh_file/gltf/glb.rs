@@ -112,3 +112,25 @@ fn container(mut json: Vec<u8>, mut binary: Vec<u8>) -> Vec<u8> {
 fn length(bytes: &[u8]) -> [u8; 4] {
     (bytes.len() as u32).to_le_bytes()
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)] // a panic is how a test fails
+    use super::*;
+    use sabine_acoustics::{Bands, Material};
+
+    /// By the crate `gltf`, which checks every index, type and required bound; our own reader does not ask it to.
+    #[test]
+    fn another_reader_finds_nothing_amiss() {
+        let wall = Material::uniform(Bands::T60, 0.1, 0.1).unwrap();
+        let room = Scene::shoebox([4.5, 3.0, 2.0], std::array::from_fn(|_| wall.clone())).unwrap();
+        let bytes = room.to_glb().unwrap();
+        let gltf::Gltf { document, blob } = gltf::Gltf::from_slice(&bytes).unwrap();
+        assert_eq!(document.buffers().next().unwrap().length(), blob.unwrap().len());
+        let mesh = document.meshes().next().unwrap();
+        let faces: usize = mesh.primitives().map(|p| p.indices().unwrap().count() / 3).sum();
+        let bounds = mesh.primitives().next().unwrap().bounding_box();
+        // y is up, and what was y points towards the viewer.
+        assert_eq!((faces, bounds.min, bounds.max), (12, [0.0, 0.0, -3.0], [4.5, 2.0, 0.0]));
+    }
+}

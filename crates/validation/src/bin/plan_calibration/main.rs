@@ -13,12 +13,11 @@ use clap::Parser;
 use rand::{Rng, SeedableRng, rngs::SmallRng};
 use sabine::diagnose::{DiagnoseConfig, Hypothesis, OpenQuestion, PlanConfig, PlannedMeasurement, Planner};
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
+use sabine_validation::AnyError;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// Any error, to be printed.
-type AnyError = Box<dyn std::error::Error + Send + Sync>;
-
 /// Microphones that are measured before the plan.
 const MEASURED: usize = 3;
 /// Microphones in all.

@@ -9,11 +9,10 @@ mod trial;
 use clap::Parser;
 use sabine::diagnose::DiagnoseConfig;
 use sabine_testkit::{Planted, PolyhedralConfig, Polyhedron};
+use sabine_validation::AnyError;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use trial::{Task, Trial};
-
-type AnyError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Diagnose rooms of the second laboratory and count what is named.
 #[derive(Parser)]

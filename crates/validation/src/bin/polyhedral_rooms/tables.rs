@@ -2,7 +2,7 @@
 
 use crate::trial::{Outcome, Trial, shape_name};
 use sabine_testkit::{Planted, Polyhedron};
-use sabine_validation::{exact_interval, median};
+use sabine_validation::{median, print_share as share};
 
 /// Prints all tables as Markdown. Intervals are exact, over rooms.
 pub fn print(trials: &[Trial]) {
@@ -79,16 +79,4 @@ pub fn print(trials: &[Trial]) {
 
 fn world(nuisances: bool) -> &'static str {
     if nuisances { "nuisances" } else { "plain" }
-}
-
-fn share(what: &str, hits: impl Iterator<Item = bool>) {
-    let hits: Vec<bool> = hits.collect();
-    if hits.is_empty() {
-        return;
-    }
-    let count = hits.iter().filter(|h| **h).count();
-    let (low, high) = exact_interval(count, hits.len());
-    let percent = 100.0 * count as f64 / hits.len() as f64;
-    let (low, high) = (100.0 * low, 100.0 * high);
-    println!("| {what} | {count} of {} ({percent:.0} %) | {low:.0}-{high:.0} % |", hits.len());
 }

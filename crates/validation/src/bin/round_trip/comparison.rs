@@ -159,9 +159,9 @@ fn prediction(
     curve_db: f64,
 ) -> Prediction {
     let known = |band: usize, stretch: usize| {
-        let of = |alike: &dyn Fn(&LevelErrors) -> bool| -> Vec<f64> {
+        let of = |belongs: &dyn Fn(&LevelErrors) -> bool| -> Vec<f64> {
             let all = levels[..fitted].iter().flatten();
-            all.filter(|e| alike(e)).map(|e| e.errors_db[model]).collect()
+            all.filter(|e| belongs(e)).map(|e| e.errors_db[model]).collect()
         };
         let own = of(&|e| e.band == band && e.stretch == stretch);
         // Where few of the fitted responses sound, those of the whole octave stand for them.

@@ -1,7 +1,7 @@
 //! What a record comes to.
 
 use crate::trial::Trial;
-use sabine_validation::{exact_interval, median};
+use sabine_validation::{median, print_share as share};
 
 /// Prints all tables as Markdown: medians over rooms.
 pub fn print(trials: &[Trial]) {
@@ -82,14 +82,4 @@ fn row(name: &str, own: &[&Trial]) {
 /// The name that a value has in the record.
 fn serde_name(value: &impl serde::Serialize) -> String {
     serde_json::to_string(value).unwrap_or_default()
-}
-
-fn share(what: &str, hits: impl Iterator<Item = bool>) {
-    let hits: Vec<bool> = hits.collect();
-    if hits.is_empty() {
-        return;
-    }
-    let count = hits.iter().filter(|h| **h).count();
-    let (low, high) = exact_interval(count, hits.len());
-    println!("| {what} | {count} of {} | {:.0}-{:.0} % |", hits.len(), 100.0 * low, 100.0 * high);
 }

@@ -131,7 +131,7 @@ impl Task {
         Ok(Diagnoser::new(config)?)
     }
 
-    /// The effects, drawn anew until those of single positions concern positions that are fitted.
+    /// The effects, drawn again until those of single positions concern positions that are fitted.
     fn hide(&self, lab: &Laboratory) -> Result<Vec<Hidden>, AnyError> {
         let ids: Vec<String> = self.hidden.iter().filter(|id| *id != COHERENT).cloned().collect();
         for number in 0..TRIES {
@@ -149,7 +149,7 @@ impl Task {
     }
 
     fn is_right(&self, found: &Diagnosis) -> bool {
-        let mut wanted: Vec<&str> = self.hidden.iter().map(|id| id.split('.').next().unwrap_or(id)).collect();
+        let mut wanted: Vec<&str> = self.ids().collect();
         wanted.sort_unstable();
         hiding::named(found) == wanted
     }

@@ -73,7 +73,7 @@ impl TrueModel {
             Hidden::ExtraReflector { .. } => {
                 self.less(
                     Statement::Nearest,
-                    "a panel of the model lets no sound through, and absorbs alike in all octaves",
+                    "a panel of the model lets no sound through, and absorbs the same in all octaves",
                 );
             }
             Hidden::CoupledVolume { .. } => {

@@ -19,12 +19,11 @@ use sabine::paths::{Conditions, PathSet, Propagator};
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use sabine::scene::MaterialPrior;
 use sabine_cli::output::OutputFolder;
+use sabine_validation::AnyError;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
-
-type AnyError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Sweep reverberation times over five rooms and compare the three objectives.
 #[derive(Parser)]
