@@ -29,13 +29,19 @@ fn in_rooms(hidden: impl Fn(u64, &Laboratory) -> Vec<Hidden>) -> Vec<(Vec<Hidden
             let room = lab.write(&hidden, &folder.path().join("room"), None).unwrap();
             let config = DiagnoseConfig { rays: 1000, ..DiagnoseConfig::default() };
             let rivals = RIVALS.map(str::to_owned);
-            // As the command does it.
             let diagnoser = Diagnoser::new(config).unwrap().with_only(&rivals).unwrap();
-            let found = diagnoser.discovering_if_unexplained().diagnose(&room, &[], &()).unwrap();
+            // As the command does it, or as `--discover`.
+            let always = std::env::var_os("SABINE_DISCOVER_ALWAYS").is_some();
+            let diagnoser =
+                if always { diagnoser.discovering() } else { diagnoser.discovering_if_unexplained() };
+            let found = diagnoser.diagnose(&room, &[], &()).unwrap();
             let materials = room.scene().materials().iter().map(|m| m.name.clone()).collect();
             let causes: Vec<(&str, Option<&str>)> =
                 found.causes.iter().map(|c| (c.effect.as_str(), c.subject.as_deref())).collect();
             println!("{seed}: hidden {hidden:?}: {} {causes:?}", found.verdict);
+            for test in found.lack_of_fit.tests.iter().filter(|test| test.p_value < 0.01) {
+                println!("  p {:.1e}: {} ({:?})", test.p_value, test.name, test.subject);
+            }
             for law in &found.laws {
                 println!(
                     "  {} | {:?} | evidence {:.1}, prior {:.1}, p {:.4}, vault {:.1?}, sham {:.1?}, not told from {}",

@@ -56,12 +56,17 @@ impl DecayTerm for AddedLaw {
         Ok(Tables::default())
     }
 
+    /// Its level is relative to the direct sound at 1 m, and so as loud in a recording as the gain makes that.
+    fn adds_sound_of_source(&self) -> bool {
+        true
+    }
+
     fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
         let times: Vec<f64> = (0..ln_energy.len()).map(|bin| view.after_direct_s(bin).max(0.0)).collect();
         let hz = view.survey().bands().nominal_hz(view.band());
         let levels = self.levels_db(values, (view.survey(), view.pair()), hz, &times);
         for (ln, db) in ln_energy.iter_mut().zip(levels) {
-            *ln = add_energy(*ln, view.bin_s() * 10f64.powf(db.max(LEAST_DB) / 10.0));
+            *ln = add_energy(*ln, view.gain() * view.bin_s() * 10f64.powf(db.max(LEAST_DB) / 10.0));
         }
     }
 }
@@ -81,4 +86,58 @@ pub(super) fn of_survey(survey: &Survey, (source, receiver): (usize, usize), nam
         "relative_humidity_percent" => survey.air().relative_humidity_percent(),
         _ => return None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::effect::Effect;
+    use crate::effects::LawEffect;
+    use crate::hand_made::Tables;
+    use crate::likelihood::decay::EnergyModel;
+    use crate::likelihood::laplace::{Model, Slopes};
+    use sabine_paths::laws::{Law, LawParameter, LawTarget};
+    use sabine_scene::{Levels, TimeZero};
+
+    #[test]
+    fn what_is_added_is_recorded_with_the_gain_of_the_response() {
+        let tables = Tables::new(Levels::Common, TimeZero::Emission);
+        let data = tables.energy_data();
+        let parameters = [
+            ("level", LawParameter::new(13.0, [-40.0, 30.0], "dB")),
+            ("slope", LawParameter::new(-20.0, [-90.0, -5.0], "dB/s")),
+        ];
+        let formula = "level + slope * time_after_direct_s";
+        let law = Law::new("hum", LawTarget::Added, None, formula, parameters).unwrap();
+        let cases = LawEffect::new(law).unwrap().cases(&tables.survey);
+        let cases: Vec<_> = cases.iter().collect();
+        let used = vec![true; 3];
+        let model = EnergyModel::new(&data, &cases, &used);
+        let mut values = model.start(None);
+        let own = model.first_of(0);
+        values[own..own + 2].copy_from_slice(&[13.0, -20.0]);
+        let before = model.prediction(&values, 1);
+        // Neither of the gains tells the sound of the paths from what is added.
+        let common = model.layout.common_gain().unwrap();
+        for (index, gain_db) in [(common, 7.0), (model.layout.gain(1), -1.5)] {
+            let mut louder = values.clone();
+            louder[index] += gain_db;
+            let change = (model.prediction(&louder, 1) - &before) * (10.0 / std::f64::consts::LN_10);
+            assert!(change.iter().all(|db| (db - gain_db).abs() < 1e-6), "{change}");
+        }
+        // It does add something.
+        let mut without = values.clone();
+        without[own] = -40.0;
+        assert!((before - model.prediction(&without, 1)).amax() > 0.1);
+        // And the likelihood knows what a gain changes.
+        let mut slopes = Slopes::zero(values.len());
+        model.log_likelihood(&values, Some(&mut slopes));
+        let at = |gain_db: f64| {
+            let mut moved = values.clone();
+            moved[common] += gain_db;
+            model.log_likelihood(&moved, None)
+        };
+        let expected = (at(1e-3) - at(-1e-3)) / 2e-3;
+        let found = slopes.gradient[common];
+        assert!((found - expected).abs() < 1e-3 * expected.abs().max(1.0), "{found} {expected}");
+    }
 }
