@@ -47,8 +47,8 @@ pub struct Diagnoser {
     laws: Vec<Law>,
     /// Causes that are at work from the beginning.
     given: Vec<GivenCause>,
-    /// Whether laws are looked for only where nothing else explains the room.
-    only_unexplained: bool,
+    /// Whether laws are looked for only where the rest of the diagnosis asks for it.
+    only_if_needed: bool,
 }
 
 /// A cause of a model from which a diagnosis starts.
@@ -80,7 +80,7 @@ impl Diagnoser {
             tracer,
             laws: Vec::new(),
             given: Vec::new(),
-            only_unexplained: false,
+            only_if_needed: false,
         })
     }
 
@@ -135,12 +135,13 @@ impl Diagnoser {
         self
     }
 
-    /// As [`discovering`](Self::discovering), but only where the rest of the diagnosis ends
-    /// [`Verdict::Unexplained`](crate::Verdict::Unexplained) without a name, and six or more receivers are measured. Everywhere
-    /// else the answer is that of a diagnosis that looks for no law, and so is what a name must reach ([`threshold_nats`](Self::threshold_nats)).
+    /// As [`discovering`](Self::discovering), but only where the rest of the diagnosis asks for it, and six or more receivers are measured: where
+    /// it ends [`Verdict::Unexplained`](crate::Verdict::Unexplained) without a name, and where it names causes, but one formula would explain
+    /// the decays as well as all of them, or what they leave, and by chance none would. Everywhere else the answer is that of a diagnosis that
+    /// looks for no law, and so it is where none stands; what a name must reach is the same, too ([`threshold_nats`](Self::threshold_nats)).
     #[must_use]
-    pub fn discovering_if_unexplained(self) -> Self {
-        Self { only_unexplained: true, ..self.discovering() }
+    pub fn discovering_if_needed(self) -> Self {
+        Self { only_if_needed: true, ..self.discovering() }
     }
 
     /// Starting from an extended model: its causes are at work from the beginning, their parameters and the absorption fitted anew to the data
@@ -193,7 +194,7 @@ impl Diagnoser {
 
     /// What a name must reach, in nats: the odds that are asked for, and the number of effects that are tried.
     pub fn threshold_nats(&self) -> f64 {
-        let tried = if self.only_unexplained { self.without_laws() } else { self.effects.len() };
+        let tried = if self.only_if_needed { self.without_laws() } else { self.effects.len() };
         self.config.naming_nats + (tried.max(1) as f64).ln()
     }
 
@@ -210,12 +211,13 @@ impl Diagnoser {
         observer: &dyn Observer,
     ) -> Result<Diagnosis, Error> {
         let held = held_receivers(room, hold_out)?;
-        if self.looks_for_laws() && !self.only_unexplained {
+        if self.looks_for_laws() && !self.only_if_needed {
             return self.discovered(room, &held, None, observer);
         }
         let task = self.without_search(room, &held);
         let (weighed, confirmed) = self.found(&task, observer)?;
-        let calls_for_laws = self.only_unexplained && confirmed.leaves_all_unexplained();
+        let (significance, naming_nats) = (self.config.significance, self.config.naming_nats);
+        let calls_for_laws = self.only_if_needed && confirmed.calls_for_laws(significance, naming_nats);
         let plain = self.composed(&weighed, confirmed, task.effects, observer)?;
         if calls_for_laws && !self.vault(room, &held).is_empty() {
             return self.discovered(room, &held, Some(plain), observer);

@@ -12,7 +12,7 @@ use crate::infer::ray_dependence::could_be_chance;
 use crate::infer::search::Search;
 use crate::infer::selection::select;
 use crate::report::diagnosis::{Diagnosis, FallenLaw, LawSearch, Verdict};
-use crate::report::found_laws::{found_law, law_of, reason};
+use crate::report::found_laws::{found_law, reason};
 use sabine_acoustics::Observer;
 use sabine_scene::MeasuredRoom;
 
@@ -51,7 +51,8 @@ impl Diagnoser {
         let names = |receivers: &[usize]| receivers.iter().map(|&r| room.receivers()[r].id.clone()).collect();
         let mut told = LawSearch { vault: names(&vault), fallen: Vec::new() };
         // Where every effect has been weighed in vain, what is beyond them all is as probable as all together were.
-        let inherited_nats = if plain.is_some() { (self.effects.len() as f64).ln() } else { 0.0 };
+        let in_vain = plain.as_ref().is_some_and(|plain| plain.causes.is_empty());
+        let inherited_nats = if in_vain { (self.effects.len() as f64).ln() } else { 0.0 };
         let effects = self.effects.len();
         let task = Task { room, held, vault: &vault, laws: Some(inherited_nats), effects };
         let (mut weighed, mut confirmed) = self.found(&task, observer)?;
@@ -60,11 +61,11 @@ impl Diagnoser {
         let (standing, fallen): (Vec<Trial>, Vec<Trial>) =
             tried.into_iter().partition(|trial| trial.fault().is_none());
         if !fallen.is_empty() {
-            let search = weighed.search(effects);
-            told.fallen.extend(fallen.iter().filter_map(|trial| {
-                let formula = law_of(&search, &confirmed.state, trial.candidate)?.printed();
-                Some(FallenLaw { formula, reason: reason(trial) })
-            }));
+            let told_of = |trial: &Trial| FallenLaw {
+                goes_with: weighed.goes_with(trial.candidate),
+                reason: reason(trial),
+            };
+            told.fallen.extend(fallen.iter().map(told_of));
             confirmed = weighed.confirmed_without(&fallen, confirmed, (held, effects), observer)?;
         }
         told.fallen.extend(doubted(&weighed, &confirmed));
@@ -155,7 +156,7 @@ impl Diagnoser {
 fn doubted(weighed: &Weighed, confirmed: &Confirmation) -> Vec<FallenLaw> {
     let laws = confirmed.dropped.iter().filter(|(candidate, _)| is_law(&weighed.cases[*candidate].id));
     let one = |(candidate, doubt): &(usize, Doubt)| FallenLaw {
-        formula: weighed.cases[*candidate].case.subject.clone().unwrap_or_default(),
+        goes_with: weighed.goes_with(*candidate),
         reason: match doubt {
             Doubt::Modes => "octaves below the Schroeder frequency alone speak for it",
             Doubt::Rays => "it is less probable the more rays are traced",
@@ -172,6 +173,11 @@ fn laws_among(weighed: &Weighed, chosen: &[usize]) -> Vec<usize> {
 }
 
 impl Weighed {
+    /// What decays go with under a law among the candidates, in words.
+    fn goes_with(&self, candidate: usize) -> String {
+        self.cases[candidate].case.subject.clone().unwrap_or_default()
+    }
+
     /// What stands without some laws.
     fn confirmed_without(
         &mut self,
@@ -195,7 +201,7 @@ fn notes(told: &LawSearch, named: bool) -> Vec<String> {
     let mut notes: Vec<String> = told
         .fallen
         .iter()
-        .map(|law| format!("A law was found and is not named, for {}: {}.", law.reason, law.formula))
+        .map(|law| format!("A law was found and is not named, for {}: {}.", law.reason, law.goes_with))
         .collect();
     if told.vault.is_empty() {
         notes.push(

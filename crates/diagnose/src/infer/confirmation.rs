@@ -6,9 +6,9 @@ use crate::error::Error;
 use crate::infer::candidates::Candidate;
 use crate::infer::cross_validation::{Folds, Predicted, predict};
 use crate::infer::lack_of_fit::{self, Lack};
-use crate::infer::law_search::best::Formulas;
+use crate::infer::law_search::best::{BestFormula, Formulas};
 use crate::infer::ray_dependence::unsettled;
-use crate::infer::search::{Search, State};
+use crate::infer::search::{RIVAL_NATS, Search, State};
 use crate::infer::selection::Selection;
 use crate::likelihood::decay::WarmStart;
 use crate::report::diagnosis::Verdict;
@@ -56,10 +56,32 @@ pub(crate) struct Confirmation {
 }
 
 impl Confirmation {
-    /// Whether no cause stands, chance is no explanation, and the baseline meets the data well enough for a name to be trusted.
-    pub fn leaves_all_unexplained(&self) -> bool {
-        self.verdict == Verdict::Unexplained && self.state.chosen.is_empty() && !self.hopeless
+    /// Whether a law is worth a search, which holds where the baseline meets the data well enough for a name to be trusted: no cause stands
+    /// and chance is no explanation; or causes stand and a formula would explain the decays as well as all of them, or what they leave, and
+    /// by chance none would. `significance` and `naming_nats` are those of the configuration.
+    pub fn calls_for_laws(&self, significance: f64, naming_nats: f64) -> bool {
+        if self.hopeless {
+            return false;
+        }
+        if self.state.chosen.is_empty() {
+            return self.verdict == Verdict::Unexplained;
+        }
+        let by_causes = self.state.energy.log_evidence - self.base.energy.log_evidence;
+        let formulas = [self.lack_before.formula, self.lack_after.formula];
+        rivals_causes(formulas, by_causes, (significance, naming_nats))
     }
+}
+
+/// Whether the best formula beside the baseline explains the decays as well as causes do (`by_causes`, in nats), or the best beside them (the
+/// second) what they leave.
+fn rivals_causes(
+    formulas: [Option<BestFormula>; 2],
+    by_causes: f64,
+    (significance, naming_nats): (f64, f64),
+) -> bool {
+    let speaks = |best: BestFormula| best.p_value < significance && best.nats > naming_nats;
+    let [instead, beside] = formulas.map(|best| best.filter(|best| speaks(*best)));
+    instead.is_some_and(|best| best.nats > by_causes - RIVAL_NATS) || beside.is_some()
 }
 
 /// Tests the fit, drops causes that do not help at positions left out, and decides on the verdict.
@@ -275,6 +297,22 @@ mod tests {
     use crate::infer::cross_validation::DecayChange;
     use crate::report::diagnosis::HeldOutGain;
     use sabine_scene::{Levels, TimeZero};
+
+    #[test]
+    fn a_formula_rivals_causes_that_it_could_replace_or_that_leave_it_something() {
+        let best = |nats, p_value| Some(BestFormula { nats, p_value });
+        let asked = (0.01, 3.0);
+        // As good as the causes within what tells rivals apart, and no chance.
+        assert!(rivals_causes([best(22.0, 1e-4), None], 24.0, asked));
+        assert!(!rivals_causes([best(22.0, 1e-4), best(0.5, 0.4)], 26.0, asked));
+        assert!(!rivals_causes([best(22.0, 0.02), None], 13.0, asked));
+        // Causes that do not bear on decays leave it everything; little is not worth a search.
+        assert!(rivals_causes([best(8.0, 1e-4), None], 0.0, asked));
+        assert!(!rivals_causes([best(2.5, 1e-4), None], 0.0, asked));
+        // What causes leave counts by itself.
+        assert!(rivals_causes([best(22.0, 1e-4), best(5.0, 1e-3)], 90.0, asked));
+        assert!(!rivals_causes([None, best(5.0, 0.03)], 90.0, asked));
+    }
 
     #[test]
     fn what_only_the_octave_of_few_modes_says_is_known_for_that() {

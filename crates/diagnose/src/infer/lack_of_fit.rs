@@ -11,7 +11,7 @@ pub(crate) use scatter::odd_bins;
 use crate::effect::Observable;
 use crate::error::Error;
 use crate::infer::baseline::Baseline;
-use crate::infer::law_search::best::Formulas;
+use crate::infer::law_search::best::{BestFormula, Formulas};
 use crate::infer::search::{Search, State};
 use crate::likelihood::arrivals::ArrivalModel;
 use crate::likelihood::decay::{BinResidual, EnergyModel};
@@ -47,6 +47,8 @@ pub(crate) struct Lack {
     pub discrepancy_nats: f64,
     /// The responses' own levels by octave.
     pub levels: Levels,
+    /// What the search for laws would make of what is left.
+    pub formula: Option<BestFormula>,
     /// What was tested.
     pub tests: Vec<Test>,
 }
@@ -77,10 +79,12 @@ pub(crate) fn test(search: &Search<'_>, state: &State, formulas: &Formulas) -> R
     tests.push(Test { name, subject: farthest, p_value: levels.p_value });
     tests.extend(what_levels_go_with(baseline, &residuals));
     tests.extend(against_statements(search, state));
-    tests.extend(goes_with(search, state, formulas));
+    let found = formulas.best(baseline, &cases, &state.energy, &search.used);
+    let (subject, formula) = found.unzip();
+    tests.extend(formula.map(|best: BestFormula| goes_with(subject, best.p_value)));
     // Corrected for their number (Bonferroni).
     let worst = tests.iter().map(|t| t.p_value).fold(1.0, f64::min);
-    Ok(Lack { p_value: (tests.len() as f64 * worst).min(1.0), discrepancy_nats, levels, tests })
+    Ok(Lack { p_value: (tests.len() as f64 * worst).min(1.0), discrepancy_nats, levels, formula, tests })
 }
 
 fn place(baseline: &Baseline, pair: usize, band: usize) -> String {
@@ -185,10 +189,8 @@ fn what_levels_go_with(baseline: &Baseline, residuals: &[BinResidual]) -> Vec<Te
 
 /// Whether what is left goes with an angle, a length, a direction or a time: whether the best of all formulas of the search for laws is better
 /// than chance makes the best of them.
-fn goes_with(search: &Search<'_>, state: &State, formulas: &Formulas) -> Option<Test> {
-    let cases = search.cases_of(&state.chosen, Observable::Decay);
-    let (subject, p_value) = formulas.best(search.baseline, &cases, &state.energy, &search.used)?;
-    Some(Test { name: "decays go with a quantity of paths or places", subject: Some(subject), p_value })
+fn goes_with(subject: Option<String>, p_value: f64) -> Test {
+    Test { name: "decays go with a quantity of paths or places", subject, p_value }
 }
 
 /// Whether fitted absorption, gains and places contradict the room file.

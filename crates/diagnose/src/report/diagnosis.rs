@@ -199,7 +199,7 @@ pub struct LawPoint {
 pub struct LawSearch {
     /// Receivers, by name, that no fit of the search saw; none where fewer than six are measured.
     pub vault: Vec<String>,
-    /// Laws that were chosen and did not stand: formula, and why.
+    /// Laws that were chosen and did not stand, and why.
     pub fallen: Vec<FallenLaw>,
 }
 
@@ -207,8 +207,8 @@ pub struct LawSearch {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct FallenLaw {
-    /// The formula.
-    pub formula: String,
+    /// What decays seemed to go with, in words.
+    pub goes_with: String,
     /// Why it is not named, in words.
     pub reason: String,
 }

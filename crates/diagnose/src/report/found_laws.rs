@@ -11,7 +11,7 @@ use crate::report::diagnosis::FoundLaw;
 use sabine_paths::laws::{Law, LawParameter};
 
 /// The law of a chosen candidate, as the fit left it.
-pub(crate) fn law_of(search: &Search<'_>, state: &State, candidate: usize) -> Option<Law> {
+fn law_of(search: &Search<'_>, state: &State, candidate: usize) -> Option<Law> {
     changes(search, state, candidate).into_iter().find_map(|change| match change {
         ModelChange::Law(law) => Some(*law),
         _ => None,

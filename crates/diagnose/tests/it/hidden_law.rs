@@ -104,7 +104,7 @@ fn what_a_hidden_law_goes_with_is_discovered() {
     let hidden = Hidden::GrazingAbsorption { material: 0, db: HIDDEN_DB, from_hz: 1000.0 };
     let (_folder, room) = room(&[hidden]);
     // No cause stands, and so the search begins by itself.
-    let diagnoser = diagnoser(Vec::new(), 10_000).unwrap().discovering_if_unexplained();
+    let diagnoser = diagnoser(Vec::new(), 10_000).unwrap().discovering_if_needed();
     let found = diagnoser.diagnose(&room, &[], &()).unwrap();
     let named: Vec<(&str, Option<&str>)> =
         found.causes.iter().map(|c| (c.effect.as_str(), c.subject.as_deref())).collect();
@@ -134,8 +134,7 @@ fn where_no_law_is_at_work_none_is_named() {
     assert!(found.causes.is_empty() && found.model.causes.is_empty() && found.laws.is_empty());
     assert_eq!(found.law_search.unwrap().vault.len(), 2);
     // An adequate room does not call for a search.
-    let diagnoser =
-        diagnoser(Vec::new(), 1000).unwrap().with_effects(Vec::new()).discovering_if_unexplained();
+    let diagnoser = diagnoser(Vec::new(), 1000).unwrap().with_effects(Vec::new()).discovering_if_needed();
     let found = diagnoser.diagnose(&room, &[], &()).unwrap();
     assert!(found.verdict == Verdict::Adequate && found.law_search.is_none(), "{:?}", found.law_search);
 }

@@ -37,8 +37,8 @@ pub fn section(page: &mut Page, findings: &Findings) -> Result<(), Failure> {
     }
     for fallen in &search.fallen {
         page.markup(&format!(
-            "<p>Found, and not named: <code>{}</code>. {}.</p>",
-            escape(&fallen.formula),
+            "<p>Found, and not named: {}. {}.</p>",
+            escape(&super::words::capital(&fallen.goes_with)),
             escape(&super::words::capital(&fallen.reason))
         ));
     }

@@ -42,7 +42,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE|DIR")]
     laws: Option<PathBuf>,
     /// When to look for a law beside the catalogue: what the misfit goes with (angles, lengths, directions, time), and by how much. Without
-    /// a word after it: always [default: unexplained; never with --effects]
+    /// a word after it: always [default: if-needed; never with --effects]
     #[arg(long, value_enum, value_name = "WHEN", num_args = 0..=1, require_equals = true, default_missing_value = "always")]
     discover: Option<Discover>,
     /// extended_model.toml of an earlier diagnosis to start from: its causes are at work, fitted anew, and the search goes on
@@ -70,8 +70,8 @@ pub struct Arguments {
 enum Discover {
     /// Beside the catalogue, in any room
     Always,
-    /// Where no cause of the catalogue explains the room
-    Unexplained,
+    /// Where no cause of the catalogue explains the room, or a formula would explain it as well
+    IfNeeded,
     /// Not at all
     Never,
 }
@@ -80,7 +80,7 @@ impl Arguments {
     /// A law could take the place of a cause that is not to be tried.
     fn discover(&self) -> Discover {
         let some = !self.effects.is_empty();
-        self.discover.unwrap_or(if some { Discover::Never } else { Discover::Unexplained })
+        self.discover.unwrap_or(if some { Discover::Never } else { Discover::IfNeeded })
     }
 }
 
@@ -107,7 +107,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     diagnoser = diagnoser.with_laws(laws).map_err(|error| naming_laws(error.into(), file))?;
     diagnoser = match arguments.discover() {
         Discover::Always => diagnoser.discovering(),
-        Discover::Unexplained => diagnoser.discovering_if_unexplained(),
+        Discover::IfNeeded => diagnoser.discovering_if_needed(),
         Discover::Never => diagnoser,
     };
     if let Some(model) = &arguments.model {
@@ -235,10 +235,10 @@ mod tests {
             let words = ["diagnose", "--room", "room"].iter().chain(more);
             Words::try_parse_from(words).map(|w| w.arguments.discover()).map_err(|error| error.to_string())
         };
-        assert_eq!(when(&[]), Ok(Discover::Unexplained));
+        assert_eq!(when(&[]), Ok(Discover::IfNeeded));
         assert_eq!(when(&["--effects", "scattering"]), Ok(Discover::Never));
         assert_eq!(when(&["--effects", "scattering", "--discover"]), Ok(Discover::Always));
         assert_eq!(when(&["--discover=never"]), Ok(Discover::Never));
-        assert!(when(&["--discover=often"]).is_err_and(|said| said.contains("unexplained")));
+        assert!(when(&["--discover=often"]).is_err_and(|said| said.contains("if-needed")));
     }
 }

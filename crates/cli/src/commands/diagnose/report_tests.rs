@@ -86,7 +86,7 @@ fn a_law_is_told_with_its_trials_and_drawn_through_what_is_left_without_it() {
     let law = json!({ "id": "grazing_carpet", "target": "reflection", "surface": "carpet", "formula": "-a * (1 - cos_incidence)^2",
         "words": "Each meeting with <carpet> loses.", "parameters": [amplitude], "evidence_nats": 30.0, "prior_nats": 5.0, "family_p": 0.0025,
         "vault_gain_nats": 7.25, "sham_nats": 12.0, "not_told_from": ["cos_incidence^2"], "points": points });
-    let search = json!({ "vault": ["r2", "r5"], "fallen": [{ "formula": "-b * x", "reason": "a sham does as well" }] });
+    let search = json!({ "vault": ["r2", "r5"], "fallen": [{ "goes_with": "decays go with <x>", "reason": "a sham does as well" }] });
     let page = html(&findings("law", &json!({ "laws": [law], "law_search": search })), None).unwrap();
     for part in [
         "A law that no catalogue lists",
@@ -98,7 +98,7 @@ fn a_law_is_told_with_its_trials_and_drawn_through_what_is_left_without_it() {
         "12.0 nats",
         "Formulas that do as well at these positions: 1<",
         "positions set aside",
-        "A sham does as well.",
+        "Decays go with &lt;x&gt;. A sham does as well.",
         "to confirm what it finds: r2, r5.",
     ] {
         assert!(page.contains(part), "{part}");
