@@ -160,6 +160,7 @@ fn doubted(weighed: &Weighed, confirmed: &Confirmation) -> Vec<FallenLaw> {
         reason: match doubt {
             Doubt::Modes => "octaves below the Schroeder frequency alone speak for it",
             Doubt::Rays => "it is less probable the more rays are traced",
+            Doubt::Misfit => "more speaks against what is left than for it",
             Doubt::Elsewhere => "it does not help to predict positions that are left out in turn",
         }
         .to_owned(),

@@ -43,6 +43,8 @@ pub(crate) struct Test {
 pub(crate) struct Lack {
     /// Probability of as much by chance.
     pub p_value: f64,
+    /// The same of how decays fit alone, whatever was stated.
+    pub decays_p_value: f64,
     /// Evidence for a smooth discrepancy, in nats.
     pub discrepancy_nats: f64,
     /// The responses' own levels by octave.
@@ -78,13 +80,18 @@ pub(crate) fn test(search: &Search<'_>, state: &State, formulas: &Formulas) -> R
     let name = "levels of single responses by octave";
     tests.push(Test { name, subject: farthest, p_value: levels.p_value });
     tests.extend(what_levels_go_with(baseline, &residuals));
-    tests.extend(against_statements(search, state));
     let found = formulas.best(baseline, &cases, &state.energy, &search.used);
     let (subject, formula) = found.unzip();
     tests.extend(formula.map(|best: BestFormula| goes_with(subject, best.p_value)));
-    // Corrected for their number (Bonferroni).
+    let decays_p_value = corrected(&tests);
+    tests.extend(against_statements(search, state));
+    Ok(Lack { p_value: corrected(&tests), decays_p_value, discrepancy_nats, levels, formula, tests })
+}
+
+/// The least probability of several tests, corrected for their number (Bonferroni).
+fn corrected(tests: &[Test]) -> f64 {
     let worst = tests.iter().map(|t| t.p_value).fold(1.0, f64::min);
-    Ok(Lack { p_value: (tests.len() as f64 * worst).min(1.0), discrepancy_nats, levels, formula, tests })
+    (tests.len() as f64 * worst).min(1.0)
 }
 
 fn place(baseline: &Baseline, pair: usize, band: usize) -> String {

@@ -90,6 +90,9 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
             Doubt::Rays => "is less probable the more rays are traced, and would not be named with very many: those that were traced do \
                             not settle it, try more (`rays`)"
                 .into(),
+            Doubt::Misfit => {
+                "makes the simulation fail less, but more speaks against what is left than for it (`lack_of_fit`)".into()
+            }
         };
         notes.push(format!("{id} {why}: it is not named."));
     }
