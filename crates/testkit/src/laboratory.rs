@@ -24,15 +24,21 @@
 
 mod at_work;
 mod box_decay;
+mod column_loudspeaker;
 mod columns;
 mod config;
 mod coupled_tail;
 mod distortion;
+mod fog;
+mod helmholtz;
 mod hidden;
 mod image_field;
+mod layered_air;
+mod limp_wall;
 mod missing_surfaces;
 mod modal_field;
 mod noise;
+mod octave_mean;
 mod panel;
 mod patch;
 pub(crate) mod random_room;
@@ -45,6 +51,7 @@ pub(crate) mod stream;
 mod truth;
 mod typical;
 mod unfolded;
+mod warming;
 
 pub use config::LabConfig;
 pub use hidden::{End, Fault, Gap, Hidden};
@@ -296,7 +303,7 @@ impl Laboratory {
                 name: format!("{source}_{receiver}"),
                 air: several.then(|| self.truth.in_session(session).air()).transpose()?,
                 session: several.then(|| format!("session {}", session + 1)),
-                recorded_at: None,
+                recorded_at: self.config.recording_order.then(|| self.truth.recorded_at[index]),
                 samples,
             })
         };

@@ -1,9 +1,12 @@
 //! What an effect changes of the truth, if it fits the room.
 
+use super::fog;
 use super::hidden::{End, Fault, Hidden};
+use super::layered_air;
 use super::panel::{self, Panel};
 use super::patch::Patch;
 use super::truth::Truth;
+use super::warming;
 use sabine_acoustics::{Air, Error, OutOfRange};
 
 impl Hidden {
@@ -80,6 +83,16 @@ impl Hidden {
             }
             Self::ChannelFault { fault: Fault::Gain { response, gain_db } } => {
                 truth.gains_db[*response] += gain_db;
+            }
+            Self::WarmingLoudspeaker { final_db, time_constant } => {
+                warming::apply(truth, *final_db, *time_constant)?;
+            }
+            Self::Fog { water_g_m3, radius_um } => fog::check(*water_g_m3, *radius_um)?,
+            Self::TemperatureGradient { k_per_m, stated_at_m } => {
+                layered_air::check(truth, *k_per_m, *stated_at_m)?;
+            }
+            Self::HelmholtzAbsorber { .. } | Self::LimpWall { .. } | Self::ColumnLoudspeaker { .. } => {
+                check_wall_or_column(truth, self)?;
             }
             Self::ChannelFault { fault: Fault::Swap { .. } }
             | Self::BackgroundNoise { .. }
@@ -321,6 +334,36 @@ fn check(truth: &Truth, effect: &Hidden) -> Result<(), Error> {
                 OutOfRange::check("frequency (Hz)", *frequency_hz, 10.0, 96e3, "between 10 Hz and 96 kHz")?;
             }
             Ok(OutOfRange::check("level (dB)", *level_db, -300.0, 60.0, "between -300 and 60 dB")?)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Refuses a wall or a column that there is not.
+fn check_wall_or_column(truth: &Truth, effect: &Hidden) -> Result<(), Error> {
+    let ranges: &[(&'static str, f64, f64, f64, &'static str)] = match effect {
+        Hidden::HelmholtzAbsorber { share, f0_hz, q, resistance, .. } => &[
+            ("share of resonators", *share, 0.0, 0.99, "between 0 and 0.99"),
+            ("frequency of resonators (Hz)", *f0_hz, 20.0, 2e4, "between 20 Hz and 20 kHz"),
+            ("reactance of resonators", *q, 0.1, 20.0, "between 0.1 and 20"),
+            ("resistance of resonators", *resistance, 0.05, 20.0, "between 0.05 and 20"),
+        ],
+        Hidden::LimpWall { kg_m2, .. } => {
+            &[("mass of a wall (kg/m2)", *kg_m2, 0.1, 100.0, "between 0.1 and 100 kg/m2")]
+        }
+        Hidden::ColumnLoudspeaker { length_m } => {
+            &[("length of a column (m)", *length_m, 0.01, 3.0, "between 0.01 and 3 m")]
+        }
+        _ => &[],
+    };
+    ranges
+        .iter()
+        .try_for_each(|&(what, value, low, high, range)| OutOfRange::check(what, value, low, high, range))?;
+    match *effect {
+        Hidden::HelmholtzAbsorber { material, .. } | Hidden::LimpWall { material, .. }
+            if material >= truth.materials.len() =>
+        {
+            Err(Error::Index { what: "material", index: material, count: truth.materials.len() })
         }
         _ => Ok(()),
     }

@@ -28,6 +28,8 @@ pub struct LabConfig {
     pub orientation: bool,
     /// Whether the microphones' axes are declared.
     pub microphone_axes: bool,
+    /// Whether it is declared in which order the responses were recorded; each has a random place in it.
+    pub recording_order: bool,
     /// Whether reflections keep the sign of the sound, as in most programs of image sources: they add in phase, and standing waves arise.
     /// Every image is summed then, which takes longer.
     pub positive_reflections: bool,
@@ -47,6 +49,7 @@ impl Default for LabConfig {
             levels: Levels::Common,
             orientation: true,
             microphone_axes: false,
+            recording_order: false,
             positive_reflections: false,
         }
     }

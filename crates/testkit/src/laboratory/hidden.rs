@@ -209,6 +209,52 @@ pub enum Hidden {
         /// Its quality, 0.05 to 20.
         q: f64,
     },
+    /// Outside the catalogue: resonators on a share of a material's area take sound about a frequency, beside what the material absorbs.
+    HelmholtzAbsorber {
+        /// Index of the material.
+        material: usize,
+        /// Share of its area, 0 to 0.99.
+        share: f64,
+        /// Frequency of the resonance in Hz, 20 to 20000.
+        f0_hz: f64,
+        /// How the specific reactance rises about it, 0.1 to 20.
+        q: f64,
+        /// Specific resistance, 0.05 to 20: 1 absorbs all of what meets the resonator squarely at its frequency.
+        resistance: f64,
+    },
+    /// Outside the catalogue: a material is a light wall, which lets low sound out (mass law), beside what it absorbs.
+    LimpWall {
+        /// Index of the material.
+        material: usize,
+        /// Mass in kg/m2, 0.1 to 100.
+        kg_m2: f64,
+    },
+    /// Outside the catalogue: droplets in the air.
+    Fog {
+        /// Water in g/m3 of air, 0 to 20.
+        water_g_m3: f64,
+        /// Radius of the droplets in micrometres, 0.5 to 100.
+        radius_um: f64,
+    },
+    /// Outside the catalogue: the air is warmer the higher it is. Travel times alone.
+    TemperatureGradient {
+        /// Rise of the temperature in K/m, -10 to 10.
+        k_per_m: f64,
+        /// Height in metres at which it is as stated.
+        stated_at_m: f64,
+    },
+    /// Outside the catalogue: the loudspeaker warms up from response to response, and its level falls.
+    WarmingLoudspeaker {
+        /// By how much in the end, in dB, 0 to 20.
+        final_db: f64,
+        /// Time constant of the temperature, in responses, 0.1 to 1000.
+        time_constant: f64,
+    },
+    /// Outside the catalogue: the loudspeaker is an upright line, its middle where the source is. Particles that rough walls send do not know.
+    ColumnLoudspeaker {
+        /// Length of the line in metres, 0.01 to 3.
+        length_m: f64,
+    },
     /// Outside the catalogue: a sweep that is none of the measurement's, in every response.
     ForeignChirp {
         /// Its beginning in seconds from the first sample.
@@ -337,6 +383,12 @@ impl Hidden {
             Self::ForeignChirp { .. } => "foreign_chirp",
             Self::GrazingAbsorption { .. } => "grazing_absorption",
             Self::SeatDip { .. } => "seat_dip",
+            Self::HelmholtzAbsorber { .. } => "helmholtz_absorber",
+            Self::LimpWall { .. } => "limp_wall",
+            Self::Fog { .. } => "fog",
+            Self::TemperatureGradient { .. } => "temperature_gradient",
+            Self::WarmingLoudspeaker { .. } => "warming_loudspeaker",
+            Self::ColumnLoudspeaker { .. } => "column_loudspeaker",
         }
     }
 }

@@ -1,7 +1,9 @@
 //! What mirrors send: image sources, each with a sign of its own or all with the same.
 
 use super::box_decay::BoxDecay;
+use super::column_loudspeaker::ColumnLoudspeaker;
 use super::columns::Columns;
+use super::layered_air::LayeredAir;
 use super::panel::{self, Panel};
 use super::patch::{self, Patch};
 use super::reflection_by_angle::ReflectionByAngle;
@@ -60,6 +62,8 @@ fn add_images_of<const LANES: usize>(
     let (panels, patches) = (Panel::all(truth), Patch::all(truth));
     panel::add_reflections(truth, medium, &panels, pair, columns);
     let reflection = ReflectionByAngle::of(truth);
+    let layers = LayeredAir::of(truth);
+    let column = column_of(truth);
     let weights = decay.weights::<LANES>(medium);
     let mut row = [0.0; LANES];
     let mut by_angle = [1.0; LANES];
@@ -79,7 +83,9 @@ fn add_images_of<const LANES: usize>(
                     continue;
                 }
                 let length_m = square.sqrt();
-                let time_s = length_m / medium.speed_m_s;
+                let time_s = layers
+                    .as_ref()
+                    .map_or(length_m / medium.speed_m_s, |air| air.time_s(length_m, receiver[2], z.offset_m));
                 let hash = mix(row_seed ^ z.index as u64);
                 let mut worth = *weights.at(time_s);
                 let offset = [x.offset_m, y.offset_m, z.offset_m];
@@ -115,6 +121,10 @@ fn add_images_of<const LANES: usize>(
                     amplitudes[b] =
                         scale * energy.sqrt() * gains[b] * source.gain(b, cosine) * microphone.gain(b, heard);
                 }
+                if let Some(column) = &column {
+                    let sine = z.departure / length_m;
+                    amplitudes.iter_mut().enumerate().for_each(|(b, a)| *a *= column.gain(b, sine));
+                }
                 if !panels.is_empty() && panel::concerns([x.index, y.index, z.index]) {
                     panel::shade(truth, &panels, receiver, offset, &mut amplitudes);
                 }
@@ -126,6 +136,13 @@ fn add_images_of<const LANES: usize>(
             }
         }
     }
+}
+
+/// The column that the loudspeakers are, if they are.
+fn column_of(truth: &Truth) -> Option<ColumnLoudspeaker> {
+    let bands = truth.bands().ok()?;
+    let edges: Vec<(f64, f64)> = (0..bands.len()).map(|b| bands.edges_hz(b)).collect();
+    ColumnLoudspeaker::of(truth, &edges)
 }
 
 /// The images of a source along one axis.

@@ -4,6 +4,7 @@ use super::box_decay::BoxDecay;
 use super::config::LabConfig;
 use super::stream::{Purpose, stream};
 use super::truth::{TrueMaterial, TrueMicrophone, TrueSession, TrueSource, Truth};
+use super::warming::recording_order;
 use rand::Rng;
 use rand::seq::SliceRandom;
 use rand_distr::StandardNormal;
@@ -97,6 +98,7 @@ pub(crate) fn draw(config: &LabConfig) -> Result<(Declared, Truth), Error> {
             gains_db: Vec::new(),
             channel_gains_db: Vec::new(),
             inverted: Vec::new(),
+            recorded_at: Vec::new(),
             materials: materials(&declared),
             sources: Vec::new(),
             sessions: Vec::new(),
@@ -178,6 +180,7 @@ fn measure(config: &LabConfig, truth: &mut Truth, sources_m: &[[f64; 3]], receiv
     truth.sessions = SESSIONS[..config.sessions].iter().map(|&s| session(truth, s)).collect();
     let responses = sources_m.len() * receivers_m.len();
     truth.inverted = vec![false; responses];
+    truth.recorded_at = recording_order(config.seed, responses);
     truth.channel_gains_db = vec![vec![0.0; truth.bands_hz.len()]; responses];
     let mut random = stream(config.seed, Purpose::Gain, 0);
     truth.gains_db = (0..responses).map(|_| GAIN_SD_DB * normal(&mut random)).collect();

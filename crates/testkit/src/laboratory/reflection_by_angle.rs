@@ -4,7 +4,9 @@
 //! the pressure (z cos - 1) / (z cos + 1) of a plane wave. Its random-incidence absorption is the mean over all directions, weighed by the
 //! cosine.
 
+use super::helmholtz;
 use super::hidden::Hidden;
+use super::limp_wall;
 use super::truth::Truth;
 
 /// Angles at which the mean over directions is taken, and at which reflection is tabulated.
@@ -28,12 +30,17 @@ impl ReflectionByAngle {
                 Hidden::AngleDependentAbsorption { .. }
                     | Hidden::GrazingAbsorption { .. }
                     | Hidden::SeatDip { .. }
+                    | Hidden::HelmholtzAbsorber { .. }
+                    | Hidden::LimpWall { .. }
             )
         };
         let effects: Vec<&Hidden> = truth.effects.iter().filter(by_angle).collect();
+        let bands = truth.bands().ok()?;
         let face = |band: usize, face: usize| {
             let mut by_angle = vec![0.0; ANGLES];
-            effects.iter().for_each(|effect| add(truth, effect, (band, face), &mut by_angle));
+            effects
+                .iter()
+                .for_each(|effect| add(truth, effect, (band, face, bands.edges_hz(band)), &mut by_angle));
             by_angle
         };
         let tables = (0..truth.bands_hz.len()).map(|b| std::array::from_fn(|f| face(b, f))).collect();
@@ -48,7 +55,12 @@ impl ReflectionByAngle {
 }
 
 /// Adds what an effect does to the logarithm of what a face reflects in a band, at all angles.
-fn add(truth: &Truth, effect: &Hidden, (band, face): (usize, usize), by_angle: &mut [f64]) {
+fn add(
+    truth: &Truth,
+    effect: &Hidden,
+    (band, face, edges_hz): (usize, usize, (f64, f64)),
+    by_angle: &mut [f64],
+) {
     let own = truth.faces[face];
     let cosines = (0..ANGLES).map(|angle| (angle as f64 + 0.5) / ANGLES as f64);
     match effect {
@@ -72,6 +84,14 @@ fn add(truth: &Truth, effect: &Hidden, (band, face): (usize, usize), by_angle: &
             by_angle.iter_mut().zip(cosines).for_each(|(sum, cosine)| {
                 *sum -= depth * (1.0 - 2.0 * cosine + cosine * cosine);
             });
+        }
+        Hidden::HelmholtzAbsorber { material, share, f0_hz, q, resistance } if *material == own => {
+            let left = |cosine: f64| helmholtz::left(*share, (*f0_hz, *q, *resistance), cosine, edges_hz);
+            by_angle.iter_mut().zip(cosines).for_each(|(sum, cosine)| *sum += left(cosine).ln());
+        }
+        Hidden::LimpWall { material, kg_m2 } if *material == own => {
+            let left = |cosine: f64| limp_wall::left(*kg_m2, cosine, edges_hz);
+            by_angle.iter_mut().zip(cosines).for_each(|(sum, cosine)| *sum += left(cosine).ln());
         }
         _ => {}
     }

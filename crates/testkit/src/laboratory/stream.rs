@@ -22,6 +22,7 @@ pub(crate) enum Purpose {
     Effect,
     Panel,
     Axes,
+    Order,
 }
 
 /// Random numbers of a seed for one purpose, and one of many things that need them.

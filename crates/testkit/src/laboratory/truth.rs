@@ -1,5 +1,6 @@
 //! The room as it really is.
 
+use super::fog;
 use super::hidden::Hidden;
 use crate::own_air::{energy_exponent_per_m, speed_of_sound_m_s};
 use sabine_acoustics::{Air, Bands, Error, write_atomically};
@@ -49,6 +50,9 @@ pub struct Truth {
     pub channel_gains_db: Vec<Vec<f64>>,
     /// Whether each response is turned over.
     pub inverted: Vec<bool>,
+    /// When each response is recorded: places in the order of recording, from 0.
+    #[serde(default)]
+    pub recorded_at: Vec<f64>,
     /// Materials, in the order of the scene.
     pub materials: Vec<TrueMaterial>,
     /// Sources.
@@ -180,9 +184,11 @@ impl Truth {
 
     pub(crate) fn medium(&self) -> Result<Medium, Error> {
         let (bands, air) = (self.bands()?, self.air()?);
-        let exponents_per_m =
-            (0..bands.len()).map(|b| energy_exponent_per_m(&air, bands.exact_hz(b))).collect();
-        Ok(Medium { speed_m_s: speed_of_sound_m_s(&air), exponents_per_m })
+        let speed_m_s = speed_of_sound_m_s(&air);
+        let exponent =
+            |hz: f64| energy_exponent_per_m(&air, hz) + fog::energy_exponent_per_m(self, speed_m_s, hz);
+        let exponents_per_m = (0..bands.len()).map(|b| exponent(bands.exact_hz(b))).collect();
+        Ok(Medium { speed_m_s, exponents_per_m })
     }
 
     /// Logarithm of the energy that each face reflects like a mirror, `[band][face]`.

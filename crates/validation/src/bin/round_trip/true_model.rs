@@ -94,7 +94,13 @@ impl TrueModel {
         | Hidden::Dropouts { .. }
         | Hidden::ForeignChirp { .. }
         | Hidden::GrazingAbsorption { .. }
-        | Hidden::SeatDip { .. } = hidden
+        | Hidden::SeatDip { .. }
+        | Hidden::HelmholtzAbsorber { .. }
+        | Hidden::LimpWall { .. }
+        | Hidden::Fog { .. }
+        | Hidden::TemperatureGradient { .. }
+        | Hidden::WarmingLoudspeaker { .. }
+        | Hidden::ColumnLoudspeaker { .. } = hidden
         {
             self.less(Statement::NotStated, "outside the catalogue");
         }
