@@ -1,0 +1,176 @@
+//! Hidden laws: the laboratory hides one of ten laws that no catalogue lists, or none, and a diagnosis that looks for laws is judged by what it
+//! says. The page is `docs/validation/hidden_laws.md`.
+//!
+//! With `--record` every room is written to a CSV file as soon as it is done, and rooms that the file holds are not done again. The table of
+//! several records, of several processes or machines: `--merge`.
+
+mod agreement;
+mod judge;
+mod kinds;
+mod tables;
+mod task;
+mod trial;
+mod truth;
+mod worlds;
+
+use clap::{Parser, ValueEnum};
+use sabine::diagnose::DiagnoseConfig;
+use sabine_validation::{AnyError, record};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use task::Task;
+use trial::{Discover, Trial};
+use worlds::{Null, World};
+
+/// Hide laws that no catalogue lists, and judge what a diagnosis says of them.
+#[derive(Parser)]
+struct Arguments {
+    /// Rooms for each kind, size and kind of room without a law; 0 prints the tables of the record alone
+    #[arg(long, default_value_t = 1)]
+    rooms: u64,
+    /// What the seeds of all rooms begin at: a room has the same seed whatever else is asked for. For figures that are published: the first
+    /// eight hexadecimal digits of the commit, as a number
+    #[arg(long, default_value_t = 24_000)]
+    seed: u64,
+    /// Kinds of laws [default: all ten]
+    #[arg(long, value_delimiter = ',', value_name = "KIND")]
+    kinds: Vec<String>,
+    /// Sizes of laws, 0.1 to 5 in tenths: 1 is plain; `none` for rooms without a law alone
+    #[arg(long, default_value = "0.5,1,2", value_name = "X,...")]
+    sizes: String,
+    /// Rooms without a law: nothing, cause, nuisances, both; `none` for rooms with a law alone
+    #[arg(long, default_value = "nothing,cause,nuisances", value_name = "NULL,...")]
+    nulls: String,
+    /// Nuisances in every room: places off by 5 mm more, levels of octaves by 0.4 dB, stationary noise at -50 dB
+    #[arg(long)]
+    nuisances: bool,
+    /// Look for a law in each room, or where the catalogue leaves it unexplained, as the command does by itself
+    #[arg(long, value_enum, default_value = "unexplained")]
+    discover: Discover,
+    /// Rays for each pair
+    #[arg(long, default_value_t = DiagnoseConfig::default().rays)]
+    rays: usize,
+    /// Receivers, 1 to 40; below six no law is looked for
+    #[arg(long, default_value_t = 12)]
+    receivers: usize,
+    /// Do each N-th room alone, from the K-th on: several processes side by side, each with a record of its own
+    #[arg(long, value_name = "K/N", value_parser = sabine_validation::part, default_value = "1/1")]
+    part: (usize, usize),
+    /// CSV file that rooms are added to, and whose rooms count in the tables
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Print the tables of these records, and do nothing else
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["record", "part"])]
+    merge: Vec<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    sabine_validation::exit_code(run(&Arguments::parse()))
+}
+
+fn run(arguments: &Arguments) -> Result<(), AnyError> {
+    if !arguments.merge.is_empty() {
+        let records: Vec<Vec<Trial>> =
+            arguments.merge.iter().map(|path| record::read(path)).collect::<Result<_, _>>()?;
+        tables::print(&records.concat());
+        return Ok(());
+    }
+    let tasks = tasks(arguments)?;
+    let mut trials: Vec<Trial> = match &arguments.record {
+        Some(path) if path.exists() => record::read(path)?,
+        _ => Vec::new(),
+    };
+    let scratch = std::env::temp_dir().join(format!("sabine_hidden_laws_{}", std::process::id()));
+    let mut failures = Vec::new();
+    for task in tasks {
+        if task.is_done(&trials) {
+            continue;
+        }
+        let trial = task.run(&scratch);
+        // The error that counts is the task's.
+        let _ = std::fs::remove_dir_all(&scratch);
+        match trial {
+            Ok(trial) => {
+                eprintln!("{trial}");
+                trials.push(trial);
+                if let Some(path) = &arguments.record {
+                    record::write(path, &trials)?;
+                }
+            }
+            // One room that cannot be done does not keep the others from it.
+            Err(error) => {
+                let failure = format!("{}: {error}", task.name());
+                eprintln!("{failure}");
+                failures.push(failure);
+            }
+        }
+    }
+    tables::print(&trials);
+    if failures.is_empty() { Ok(()) } else { Err(failures.join("; ").into()) }
+}
+
+/// The parts of a list, none of `none`.
+fn listed<T>(text: &str, parse: impl Fn(&str) -> Result<T, String>) -> Result<Vec<T>, AnyError> {
+    let parts = text.split(',').filter(|part| *part != "none");
+    Ok(parts.map(parse).collect::<Result<_, _>>()?)
+}
+
+fn tasks(arguments: &Arguments) -> Result<Vec<Task>, AnyError> {
+    let kinds: Vec<usize> = if arguments.kinds.is_empty() {
+        (0..kinds::KINDS.len()).collect()
+    } else {
+        arguments.kinds.iter().map(|id| kinds::number(id)).collect::<Result<_, _>>()?
+    };
+    let nulls = listed(&arguments.nulls, |text| Null::from_str(text, false))?;
+    let sizes = listed(&arguments.sizes, World::sized)?;
+    let mut worlds: Vec<World> = nulls.into_iter().map(World::Null).collect();
+    worlds.extend(sizes.into_iter().map(World::Law));
+    let mut tasks = Vec::new();
+    for round in 0..arguments.rooms {
+        for &kind in &kinds {
+            for &world in &worlds {
+                tasks.push(Task {
+                    kind,
+                    world,
+                    seed: world.seed(arguments.seed, round, kind),
+                    rays: arguments.rays,
+                    receivers: arguments.receivers,
+                    nuisances: arguments.nuisances,
+                    discover: arguments.discover,
+                });
+            }
+        }
+    }
+    let (first, each) = arguments.part;
+    Ok(tasks.into_iter().skip(first - 1).step_by(each).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)] // a panic is how a test fails
+    use super::*;
+
+    fn arguments(more: &[&str]) -> Arguments {
+        Arguments::try_parse_from(["hidden_laws"].iter().chain(more)).unwrap()
+    }
+
+    #[test]
+    fn a_room_has_the_same_seed_whatever_else_is_asked_for() {
+        let all = tasks(&arguments(&["--rooms", "2"])).unwrap();
+        assert_eq!(all.len(), 120);
+        let fog = tasks(&arguments(&["--rooms", "2", "--kinds", "fog", "--sizes", "2", "--nulls", "none"]))
+            .unwrap();
+        assert_eq!(fog.len(), 2);
+        assert!(fog.iter().all(|task| all.iter().any(|other| other.seed == task.seed && other.kind == 2)));
+        let parts = [1, 2, 3].map(|k| tasks(&arguments(&["--part", &format!("{k}/3")])).unwrap().len());
+        assert_eq!(parts, [20; 3]);
+    }
+
+    #[test]
+    fn what_is_no_kind_size_or_room_is_an_error() {
+        for more in [["--kinds", "gravity"], ["--sizes", "0.55"], ["--nulls", "void"]] {
+            assert!(tasks(&arguments(&more)).is_err(), "{more:?}");
+        }
+        assert!(tasks(&arguments(&["--rooms", "0"])).unwrap().is_empty());
+    }
+}

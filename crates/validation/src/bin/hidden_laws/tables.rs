@@ -1,0 +1,171 @@
+//! What a record comes to.
+
+use crate::judge::Outcome;
+use crate::kinds::KINDS;
+use crate::trial::Trial;
+use crate::worlds::Null;
+use sabine_validation::{exact_interval, median, print_share as share};
+
+/// Prints all tables as Markdown.
+pub fn print(trials: &[Trial]) {
+    let laws: Vec<&Trial> = trials.iter().filter(|t| t.size.is_some()).collect();
+    let nulls: Vec<&Trial> = trials.iter().filter(|t| t.size.is_none()).collect();
+    by_kind_and_size(&laws);
+    agreement(&laws);
+    shares_of_laws(&laws);
+    without_a_law(&nulls);
+    if !trials.is_empty() {
+        let seconds = median(trials.iter().map(|t| t.seconds).collect());
+        println!("\n{} rooms; {seconds:.0} s for a room (median)", trials.len());
+    }
+}
+
+/// A count, and its exact 95 % interval in percent.
+fn counted(hits: usize, all: usize) -> String {
+    if all == 0 {
+        return "-".to_owned();
+    }
+    let (low, high) = exact_interval(hits, all);
+    format!("{hits} ({:.0}-{:.0} %)", 100.0 * low, 100.0 * high)
+}
+
+fn sizes_of(own: &[&Trial]) -> Vec<f64> {
+    let mut sizes: Vec<f64> = own.iter().filter_map(|t| t.size).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes.dedup();
+    sizes
+}
+
+fn by_kind_and_size(laws: &[&Trial]) {
+    println!(
+        "| law | size | rooms | right law | named by the catalogue | `unexplained` | of these and the next, the misfit's own test is right | wrong law | wrong name | `adequate` | rooms with a false name or law beside it |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    for kind in &KINDS {
+        let own: Vec<&Trial> = laws.iter().copied().filter(|t| t.kind == kind.id).collect();
+        for size in sizes_of(&own) {
+            let own: Vec<&Trial> = own.iter().copied().filter(|t| t.size == Some(size)).collect();
+            let cell =
+                |outcome: Outcome| counted(own.iter().filter(|t| t.outcome == outcome).count(), own.len());
+            let not_named = own
+                .iter()
+                .filter(|t| !matches!(t.outcome, Outcome::RightLaw | Outcome::Catalogue))
+                .filter(|t| t.misfit_is_right == Some(true));
+            let beside = own
+                .iter()
+                .filter(|t| matches!(t.outcome, Outcome::RightLaw | Outcome::Catalogue))
+                .filter(|t| t.false_laws + t.false_names > 0);
+            println!(
+                "| {} | {size} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+                kind.id,
+                own.len(),
+                cell(Outcome::RightLaw),
+                cell(Outcome::Catalogue),
+                cell(Outcome::Unexplained),
+                not_named.count(),
+                cell(Outcome::WrongLaw),
+                cell(Outcome::WrongName),
+                cell(Outcome::Adequate),
+                beside.count()
+            );
+        }
+    }
+}
+
+/// Sign, edge and level of right laws.
+fn agreement(laws: &[&Trial]) {
+    if laws.iter().all(|t| t.outcome != Outcome::RightLaw) {
+        return;
+    }
+    println!(
+        "\n| right laws | rooms | sign right | edge within an octave | off by (dB rms, median) | hidden (dB rms, median) |"
+    );
+    println!("|---|---|---|---|---|---|");
+    for kind in &KINDS {
+        let own: Vec<&&Trial> =
+            laws.iter().filter(|t| t.kind == kind.id && t.outcome == Outcome::RightLaw).collect();
+        if own.is_empty() {
+            continue;
+        }
+        let of = |value: fn(&Trial) -> Option<bool>| {
+            let known: Vec<bool> = own.iter().filter_map(|t| value(t)).collect();
+            let right = known.iter().filter(|right| **right).count();
+            if known.is_empty() { "-".to_owned() } else { format!("{right} of {}", known.len()) }
+        };
+        let middle = |value: fn(&Trial) -> Option<f64>| {
+            let known: Vec<f64> = own.iter().filter_map(|t| value(t)).collect();
+            if known.is_empty() { "-".to_owned() } else { format!("{:.2}", median(known)) }
+        };
+        println!(
+            "| {} | {} | {} | {} | {} | {} |",
+            kind.id,
+            own.len(),
+            of(|t| t.sign_right),
+            of(|t| t.edge_right),
+            middle(|t| t.rms_db),
+            middle(|t| t.hidden_rms_db)
+        );
+    }
+}
+
+fn shares_of_laws(laws: &[&Trial]) {
+    if laws.is_empty() {
+        return;
+    }
+    println!("\n| rooms with a law | found | 95 % interval |\n|---|---|---|");
+    let is = |outcome: Outcome| laws.iter().map(move |t| t.outcome == outcome);
+    share("right law", is(Outcome::RightLaw));
+    share("named by the catalogue", is(Outcome::Catalogue));
+    share("`unexplained`", is(Outcome::Unexplained));
+    let true_statement = |t: &&Trial| {
+        matches!(t.outcome, Outcome::RightLaw | Outcome::Catalogue | Outcome::Unexplained)
+            || t.outcome == Outcome::Adequate && t.misfit_is_right == Some(true)
+    };
+    share("one of these: something true is said", laws.iter().map(true_statement));
+    share("wrong law", is(Outcome::WrongLaw));
+    share("wrong name", is(Outcome::WrongName));
+    share("`adequate`", is(Outcome::Adequate));
+    for size in sizes_of(laws) {
+        let own = laws.iter().filter(|t| t.size == Some(size));
+        share(&format!("size {size}: right law"), own.map(|t| t.outcome == Outcome::RightLaw));
+    }
+    share("right laws: sign", laws.iter().filter_map(|t| t.sign_right));
+    share("right laws: edge within an octave", laws.iter().filter_map(|t| t.edge_right));
+}
+
+fn without_a_law(nulls: &[&Trial]) {
+    if nulls.is_empty() {
+        return;
+    }
+    println!("\n| rooms without a law | found | 95 % interval |\n|---|---|---|");
+    let all = [Null::Nothing, Null::Cause, Null::Nuisances, Null::Both];
+    for null in all {
+        let own = || nulls.iter().filter(move |t| t.null == Some(null));
+        let what = format!("{null:?}").to_lowercase();
+        share(&format!("{what}: false law"), own().map(|t| t.false_laws > 0));
+        share(&format!("{what}: false name of the catalogue"), own().map(|t| t.false_names > 0));
+        share(&format!("{what}: `unexplained`"), own().map(|t| t.outcome == Outcome::Unexplained));
+        if matches!(null, Null::Cause | Null::Both) {
+            share(&format!("{what}: the cause is named"), own().map(|t| t.outcome == Outcome::Catalogue));
+        }
+    }
+    share("all: false law", nulls.iter().map(|t| t.false_laws > 0));
+    println!(
+        "\n| rooms of the kind, without a law | rooms | false law | false name | `unexplained` |\n|---|---|---|---|---|"
+    );
+    for kind in &KINDS {
+        let own: Vec<&&Trial> = nulls.iter().filter(|t| t.kind == kind.id).collect();
+        if own.is_empty() {
+            continue;
+        }
+        let count = |is: fn(&Trial) -> bool| counted(own.iter().filter(|t| is(t)).count(), own.len());
+        println!(
+            "| {} | {} | {} | {} | {} |",
+            kind.id,
+            own.len(),
+            count(|t| t.false_laws > 0),
+            count(|t| t.false_names > 0),
+            count(|t| t.outcome == Outcome::Unexplained)
+        );
+    }
+}
