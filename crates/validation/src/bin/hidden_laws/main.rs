@@ -72,7 +72,14 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
     if !arguments.merge.is_empty() {
         let records: Vec<Vec<Trial>> =
             arguments.merge.iter().map(|path| record::read(path)).collect::<Result<_, _>>()?;
-        tables::print(&records.concat());
+        let mut trials: Vec<Trial> = Vec::new();
+        for trial in records.into_iter().flatten() {
+            // A room that two records hold counts once.
+            if !trials.iter().any(|other| other.is_of_same_room(&trial)) {
+                trials.push(trial);
+            }
+        }
+        tables::print(&trials);
         return Ok(());
     }
     let tasks = tasks(arguments)?;

@@ -37,8 +37,11 @@ fn sizes_of(own: &[&Trial]) -> Vec<f64> {
 }
 
 fn by_kind_and_size(laws: &[&Trial]) {
+    if laws.is_empty() {
+        return;
+    }
     println!(
-        "| law | size | rooms | right law | named by the catalogue | `unexplained` | of these and the next, the misfit's own test is right | wrong law | wrong name | `adequate` | rooms with a false name or law beside it |"
+        "| law | size | rooms | right law | named by the catalogue | `unexplained` | `adequate` | wrong law | wrong name | not named right, but a test of the misfit speaks of it | right, with a false name or law beside it |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|");
     for kind in &KINDS {
@@ -62,10 +65,10 @@ fn by_kind_and_size(laws: &[&Trial]) {
                 cell(Outcome::RightLaw),
                 cell(Outcome::Catalogue),
                 cell(Outcome::Unexplained),
-                not_named.count(),
+                cell(Outcome::Adequate),
                 cell(Outcome::WrongLaw),
                 cell(Outcome::WrongName),
-                cell(Outcome::Adequate),
+                not_named.count(),
                 beside.count()
             );
         }

@@ -59,6 +59,15 @@ pub struct Trial {
     pub seconds: f64,
 }
 
+impl Trial {
+    /// Whether another line is of the same room, asked for in the same way.
+    pub fn is_of_same_room(&self, other: &Self) -> bool {
+        let asked = |t: &Self| (t.seed, t.rays, t.receivers, t.nuisances, t.discover);
+        (&self.kind, self.null, self.size) == (&other.kind, other.null, other.size)
+            && asked(self) == asked(other)
+    }
+}
+
 impl fmt::Display for Trial {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let world = match (self.size, self.null) {
