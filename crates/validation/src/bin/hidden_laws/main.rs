@@ -5,6 +5,7 @@
 //! several records, of several processes or machines: `--merge`.
 
 mod agreement;
+mod change;
 mod judge;
 mod kinds;
 mod tables;

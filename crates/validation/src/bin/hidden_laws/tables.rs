@@ -36,14 +36,20 @@ fn sizes_of(own: &[&Trial]) -> Vec<f64> {
     sizes
 }
 
+/// Median of what is known, to two decimals.
+fn middle(own: &[&Trial], value: fn(&Trial) -> Option<f64>) -> String {
+    let known: Vec<f64> = own.iter().filter_map(|t| value(t)).collect();
+    if known.is_empty() { "-".to_owned() } else { format!("{:.2}", median(known)) }
+}
+
 fn by_kind_and_size(laws: &[&Trial]) {
     if laws.is_empty() {
         return;
     }
     println!(
-        "| law | size | rooms | right law | named by the catalogue | `unexplained` | `adequate` | wrong law | wrong name | not named right, but a test of the misfit speaks of it | right, with a false name or law beside it |"
+        "| law | size | rooms | it changes levels by (dB rms, median) | right law | named by the catalogue | `unexplained` | `adequate` | wrong law | wrong name | not named right, but a test of the misfit speaks of it | right, with a false name or law beside it |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|---|---|");
     for kind in &KINDS {
         let own: Vec<&Trial> = laws.iter().copied().filter(|t| t.kind == kind.id).collect();
         for size in sizes_of(&own) {
@@ -59,9 +65,10 @@ fn by_kind_and_size(laws: &[&Trial]) {
                 .filter(|t| matches!(t.outcome, Outcome::RightLaw | Outcome::Catalogue))
                 .filter(|t| t.false_laws + t.false_names > 0);
             println!(
-                "| {} | {size} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+                "| {} | {size} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
                 kind.id,
                 own.len(),
+                middle(&own, |t| t.change_db),
                 cell(Outcome::RightLaw),
                 cell(Outcome::Catalogue),
                 cell(Outcome::Unexplained),
@@ -85,8 +92,8 @@ fn agreement(laws: &[&Trial]) {
     );
     println!("|---|---|---|---|---|---|");
     for kind in &KINDS {
-        let own: Vec<&&Trial> =
-            laws.iter().filter(|t| t.kind == kind.id && t.outcome == Outcome::RightLaw).collect();
+        let own: Vec<&Trial> =
+            laws.iter().copied().filter(|t| t.kind == kind.id && t.outcome == Outcome::RightLaw).collect();
         if own.is_empty() {
             continue;
         }
@@ -95,18 +102,14 @@ fn agreement(laws: &[&Trial]) {
             let right = known.iter().filter(|right| **right).count();
             if known.is_empty() { "-".to_owned() } else { format!("{right} of {}", known.len()) }
         };
-        let middle = |value: fn(&Trial) -> Option<f64>| {
-            let known: Vec<f64> = own.iter().filter_map(|t| value(t)).collect();
-            if known.is_empty() { "-".to_owned() } else { format!("{:.2}", median(known)) }
-        };
         println!(
             "| {} | {} | {} | {} | {} | {} |",
             kind.id,
             own.len(),
             of(|t| t.sign_right),
             of(|t| t.edge_right),
-            middle(|t| t.rms_db),
-            middle(|t| t.hidden_rms_db)
+            middle(&own, |t| t.rms_db),
+            middle(&own, |t| t.hidden_rms_db)
         );
     }
 }

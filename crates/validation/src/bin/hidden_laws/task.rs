@@ -1,5 +1,6 @@
 //! One room: drawn, diagnosed, judged.
 
+use crate::change::change_db;
 use crate::judge::judge;
 use crate::kinds::KINDS;
 use crate::trial::{Discover, Trial};
@@ -61,6 +62,13 @@ impl Task {
         };
         let found = diagnoser.diagnose(&measured, &[], &())?;
         let judged = judge(&found, kind, &contents, &truth)?;
+        let change_db = match contents.hidden.split_first() {
+            Some((_, others)) if contents.law => {
+                let [with, without] = [&contents.hidden, others].map(|hidden| lab.responses(hidden));
+                Some(change_db(&with?, &without?, truth.bands()?)?)
+            }
+            _ => None,
+        };
         let first = contents.hidden.first().filter(|_| contents.law || contents.cause.is_some());
         let (size, null) = match self.world {
             World::Law(size) => (Some(size), None),
@@ -77,6 +85,7 @@ impl Task {
             nuisances: self.nuisances,
             discover: self.discover,
             hidden: first.map(|hidden| format!("{hidden:?}")).unwrap_or_default(),
+            change_db,
             surface: first.and_then(|hidden| kind.surface_of(hidden, &truth)).map(str::to_owned),
             verdict: found.verdict.to_string(),
             answer: answer(&found),

@@ -30,6 +30,9 @@ pub struct Trial {
     pub discover: Discover,
     /// The law, or the other cause, with its numbers.
     pub hidden: String,
+    /// By how much the law changes levels, in dB: the root mean square over responses, octaves and stretches of 20 ms, less the mean.
+    #[serde(default)]
+    pub change_db: Option<f64>,
     /// Its material.
     pub surface: Option<String>,
     pub verdict: String,
