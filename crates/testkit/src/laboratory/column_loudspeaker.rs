@@ -1,6 +1,6 @@
 //! A column loudspeaker: an upright line of sources.
 //!
-//! L. L. Beranek and T. J. Mellow, *Acoustics*, 2012, 4.19: a line of length L radiates the pressure sin(x) / x at an angle e to its middle plane,
+//! L. L. Beranek and T. J. Mellow, *Acoustics*, 2012, chapter 4: a line of length L radiates the pressure sin(x) / x at an angle e to its middle plane,
 //! x = pi L sin(e) / wavelength. Energies are means over a band, and the radiated power stays.
 
 use super::hidden::Hidden;

@@ -1,6 +1,6 @@
 //! A Helmholtz absorber on a share of a material's area.
 //!
-//! H. Kuttruff, *Room Acoustics*, 6th ed., 2.4 and 6.3: a resonator in a wall has the specific impedance z = r + i q (f / f0 - f0 / f); a
+//! H. Kuttruff, *Room Acoustics*, 6th ed., chapters 2 and 6: a resonator in a wall has the specific impedance z = r + i q (f / f0 - f0 / f); a
 //! locally reacting wall reflects the pressure (z cos - 1) / (z cos + 1) of a plane wave.
 
 use super::octave_mean::octave_mean;

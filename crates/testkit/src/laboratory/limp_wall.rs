@@ -1,6 +1,6 @@
 //! A light wall that lets sound out.
 //!
-//! The mass law (H. Kuttruff, *Room Acoustics*, 6th ed., 6.3; L. Cremer and H. A. Müller, *Principles and Applications of Room Acoustics*,
+//! The mass law (H. Kuttruff, *Room Acoustics*, 6th ed., chapter 6; L. Cremer and H. A. Müller, *Principles and Applications of Room Acoustics*,
 //! volume 2): a limp wall of mass m per area lets the share 1 / (1 + (pi f m cos / (rho c))^2) of the energy of a plane wave through.
 
 use super::octave_mean::octave_mean;

@@ -5,6 +5,7 @@
 mod box_modes;
 mod fixtures;
 mod hidden_effects;
+mod hidden_laws;
 mod hidden_modes;
 mod imports;
 mod laboratory;
