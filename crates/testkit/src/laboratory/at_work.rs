@@ -84,16 +84,12 @@ impl Hidden {
             Self::ChannelFault { fault: Fault::Gain { response, gain_db } } => {
                 truth.gains_db[*response] += gain_db;
             }
-            Self::WarmingLoudspeaker { final_db, time_constant } => {
-                warming::apply(truth, *final_db, *time_constant)?;
-            }
-            Self::Fog { water_g_m3, radius_um } => fog::check(*water_g_m3, *radius_um)?,
-            Self::TemperatureGradient { k_per_m, stated_at_m } => {
-                layered_air::check(truth, *k_per_m, *stated_at_m)?;
-            }
-            Self::HelmholtzAbsorber { .. } | Self::LimpWall { .. } | Self::ColumnLoudspeaker { .. } => {
-                check_wall_or_column(truth, self)?;
-            }
+            Self::WarmingLoudspeaker { .. }
+            | Self::Fog { .. }
+            | Self::TemperatureGradient { .. }
+            | Self::HelmholtzAbsorber { .. }
+            | Self::LimpWall { .. }
+            | Self::ColumnLoudspeaker { .. } => apply_law(truth, self)?,
             Self::ChannelFault { fault: Fault::Swap { .. } }
             | Self::BackgroundNoise { .. }
             | Self::CoupledVolume { .. }
@@ -336,6 +332,20 @@ fn check(truth: &Truth, effect: &Hidden) -> Result<(), Error> {
             Ok(OutOfRange::check("level (dB)", *level_db, -300.0, 60.0, "between -300 and 60 dB")?)
         }
         _ => Ok(()),
+    }
+}
+
+/// Refuses a law that does not fit the room, and lowers levels; all else is looked up where sound meets walls, air and loudspeakers.
+fn apply_law(truth: &mut Truth, law: &Hidden) -> Result<(), Error> {
+    match law {
+        Hidden::WarmingLoudspeaker { final_db, time_constant } => {
+            warming::apply(truth, *final_db, *time_constant)
+        }
+        Hidden::Fog { water_g_m3, radius_um } => fog::check(*water_g_m3, *radius_um),
+        Hidden::TemperatureGradient { k_per_m, stated_at_m } => {
+            layered_air::check(truth, *k_per_m, *stated_at_m)
+        }
+        wall_or_column => check_wall_or_column(truth, wall_or_column),
     }
 }
 
