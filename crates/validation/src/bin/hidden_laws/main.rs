@@ -54,6 +54,9 @@ struct Arguments {
     /// Receivers, 1 to 40; below six no law is looked for
     #[arg(long, default_value_t = 12)]
     receivers: usize,
+    /// Print by how much the laws change levels, and diagnose nothing: seconds for each room
+    #[arg(long, conflicts_with_all = ["record", "merge"])]
+    changes: bool,
     /// Do each N-th room alone, from the K-th on: several processes side by side, each with a record of its own
     #[arg(long, value_name = "K/N", value_parser = sabine_validation::part, default_value = "1/1")]
     part: (usize, usize),
@@ -84,6 +87,16 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
         return Ok(());
     }
     let tasks = tasks(arguments)?;
+    if arguments.changes {
+        let mut changes = Vec::new();
+        for task in &tasks {
+            if let (World::Law(size), Some(db)) = (task.world, task.change_db()?) {
+                changes.push((task.kind, size, db));
+            }
+        }
+        tables::print_changes(&changes);
+        return Ok(());
+    }
     let mut trials: Vec<Trial> = match &arguments.record {
         Some(path) if path.exists() => record::read(path)?,
         _ => Vec::new(),

@@ -20,6 +20,23 @@ pub fn print(trials: &[Trial]) {
     }
 }
 
+/// Prints by how much laws change levels: number of the kind, size, and dB.
+pub fn print_changes(changes: &[(usize, f64, f64)]) {
+    let mut sizes: Vec<f64> = changes.iter().map(|(_, size, _)| *size).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes.dedup();
+    let columns: String = sizes.iter().map(|size| format!(" size {size} |")).collect();
+    println!("| law |{columns}\n|---|{}", "---|".repeat(sizes.len()));
+    for (number, kind) in KINDS.iter().enumerate() {
+        let cell = |size: &f64| {
+            let own: Vec<f64> =
+                changes.iter().filter(|c| c.0 == number && c.1 == *size).map(|c| c.2).collect();
+            if own.is_empty() { " - |".to_owned() } else { format!(" {:.2} |", median(own)) }
+        };
+        println!("| {} |{}", kind.id, sizes.iter().map(cell).collect::<String>());
+    }
+}
+
 /// A count, and its exact 95 % interval in percent.
 fn counted(hits: usize, all: usize) -> String {
     if all == 0 {

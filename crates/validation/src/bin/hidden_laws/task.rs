@@ -4,7 +4,7 @@ use crate::change::change_db;
 use crate::judge::judge;
 use crate::kinds::KINDS;
 use crate::trial::{Discover, Trial};
-use crate::worlds::{World, contents, room};
+use crate::worlds::{Contents, World, contents, room};
 use sabine::diagnose::{Cause, DiagnoseConfig, Diagnoser, Diagnosis, FitTest};
 use sabine_testkit::Laboratory;
 use sabine_validation::AnyError;
@@ -45,6 +45,13 @@ impl Task {
         format!("{} {:?} seed {}", KINDS[self.kind].id, self.world, self.seed)
     }
 
+    /// By how much its law changes levels in dB, without a diagnosis; none where there is no law.
+    pub fn change_db(&self) -> Result<Option<f64>, AnyError> {
+        let lab = Laboratory::new(room(self.kind, self.seed, self.receivers))?;
+        let contents = contents((self.kind, self.world), &lab, self.seed, self.nuisances)?;
+        change_by_law(&lab, &contents)
+    }
+
     /// Does it, in a new folder.
     pub fn run(&self, folder: &Path) -> Result<Trial, AnyError> {
         let started = Instant::now();
@@ -62,13 +69,7 @@ impl Task {
         };
         let found = diagnoser.diagnose(&measured, &[], &())?;
         let judged = judge(&found, kind, &contents, &truth)?;
-        let change_db = match contents.hidden.split_first() {
-            Some((_, others)) if contents.law => {
-                let [with, without] = [&contents.hidden, others].map(|hidden| lab.responses(hidden));
-                Some(change_db(&with?, &without?, truth.bands()?)?)
-            }
-            _ => None,
-        };
+        let change_db = change_by_law(&lab, &contents)?;
         let first = contents.hidden.first().filter(|_| contents.law || contents.cause.is_some());
         let (size, null) = match self.world {
             World::Law(size) => (Some(size), None),
@@ -105,6 +106,16 @@ impl Task {
             misfit_is_right: judged.misfit_is_right,
             seconds: started.elapsed().as_secs_f64(),
         })
+    }
+}
+
+fn change_by_law(lab: &Laboratory, contents: &Contents) -> Result<Option<f64>, AnyError> {
+    match contents.hidden.split_first() {
+        Some((_, others)) if contents.law => {
+            let (with, without) = (lab.responses(&contents.hidden)?, lab.responses(others)?);
+            change_db(&with, &without, lab.config().bands).map(Some)
+        }
+        _ => Ok(None),
     }
 }
 
