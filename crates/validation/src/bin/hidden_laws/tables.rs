@@ -2,22 +2,32 @@
 
 use crate::judge::Outcome;
 use crate::kinds::KINDS;
-use crate::trial::Trial;
+use crate::trial::{Discover, Trial};
 use crate::worlds::Null;
 use sabine_validation::{exact_interval, median, print_share as share};
 
-/// Prints all tables as Markdown.
+/// Prints all tables as Markdown, those of rooms in which a law was always looked for after the others.
 pub fn print(trials: &[Trial]) {
-    let laws: Vec<&Trial> = trials.iter().filter(|t| t.size.is_some()).collect();
-    let nulls: Vec<&Trial> = trials.iter().filter(|t| t.size.is_none()).collect();
+    for discover in [Discover::Unexplained, Discover::Always] {
+        let own: Vec<&Trial> = trials.iter().filter(|t| t.discover == discover).collect();
+        if !own.is_empty() {
+            let text = format!("{discover:?}").to_lowercase();
+            println!("\nA law was looked for: {text} (`--discover`)\n");
+            print_alike(&own);
+        }
+    }
+}
+
+/// Tables of rooms that were diagnosed alike.
+fn print_alike(trials: &[&Trial]) {
+    let laws: Vec<&Trial> = trials.iter().copied().filter(|t| t.size.is_some()).collect();
+    let nulls: Vec<&Trial> = trials.iter().copied().filter(|t| t.size.is_none()).collect();
     by_kind_and_size(&laws);
     agreement(&laws);
     shares_of_laws(&laws);
     without_a_law(&nulls);
-    if !trials.is_empty() {
-        let seconds = median(trials.iter().map(|t| t.seconds).collect());
-        println!("\n{} rooms; {seconds:.0} s for a room (median)", trials.len());
-    }
+    let seconds = median(trials.iter().map(|t| t.seconds).collect());
+    println!("\n{} rooms; {seconds:.0} s for a room (median)", trials.len());
 }
 
 /// Prints by how much laws change levels: number of the kind, size, and dB.
