@@ -45,8 +45,8 @@ struct Arguments {
     /// Nuisances in every room: places off by 5 mm more, levels of octaves by 0.4 dB, stationary noise at -50 dB
     #[arg(long)]
     nuisances: bool,
-    /// Look for a law in each room, or where the catalogue leaves it unexplained, as the command does by itself
-    #[arg(long, value_enum, default_value = "unexplained")]
+    /// Look for a law in each room, or where the catalogue leaves it unexplained or one formula would do as well, as the command does by itself
+    #[arg(long, value_enum, default_value = "if-needed")]
     discover: Discover,
     /// Rays for each pair
     #[arg(long, default_value_t = DiagnoseConfig::default().rays)]

@@ -4,22 +4,23 @@ use crate::judge::Outcome;
 use crate::kinds::KINDS;
 use crate::trial::{Discover, Trial};
 use crate::worlds::Null;
+use clap::ValueEnum;
 use sabine_validation::{exact_interval, median, print_share as share};
 
 /// Prints all tables as Markdown, those of rooms in which a law was always looked for after the others.
 pub fn print(trials: &[Trial]) {
-    for discover in [Discover::Unexplained, Discover::Always] {
+    for discover in [Discover::IfNeeded, Discover::Always] {
         let own: Vec<&Trial> = trials.iter().filter(|t| t.discover == discover).collect();
         if !own.is_empty() {
-            let text = format!("{discover:?}").to_lowercase();
-            println!("\nA law was looked for: {text} (`--discover`)\n");
-            print_alike(&own);
+            let value = discover.to_possible_value();
+            println!("\n`--discover={}`\n", value.as_ref().map_or("", |value| value.get_name()));
+            print_tables(&own);
         }
     }
 }
 
-/// Tables of rooms that were diagnosed alike.
-fn print_alike(trials: &[&Trial]) {
+/// Tables of rooms that were diagnosed in the same way.
+fn print_tables(trials: &[&Trial]) {
     let laws: Vec<&Trial> = trials.iter().copied().filter(|t| t.size.is_some()).collect();
     let nulls: Vec<&Trial> = trials.iter().copied().filter(|t| t.size.is_none()).collect();
     by_kind_and_size(&laws);

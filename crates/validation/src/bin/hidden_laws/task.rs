@@ -65,7 +65,7 @@ impl Task {
         let diagnoser = Diagnoser::new(config)?;
         let diagnoser = match self.discover {
             Discover::Always => diagnoser.discovering(),
-            Discover::Unexplained => diagnoser.discovering_if_unexplained(),
+            Discover::IfNeeded => diagnoser.discovering_if_needed(),
         };
         let found = diagnoser.diagnose(&measured, &[], &())?;
         let judged = judge(&found, kind, &contents, &truth)?;
@@ -145,7 +145,7 @@ fn laws(found: &Diagnosis) -> String {
 
 fn fallen(found: &Diagnosis) -> String {
     let all = found.law_search.iter().flat_map(|search| &search.fallen);
-    all.map(|law| format!("{}: {}", law.formula, law.reason)).collect::<Vec<_>>().join("; ")
+    all.map(|law| format!("{}: {}", law.goes_with, law.reason)).collect::<Vec<_>>().join("; ")
 }
 
 fn in_words(test: &FitTest) -> String {

@@ -11,8 +11,8 @@ use std::fmt;
 pub enum Discover {
     /// Beside the catalogue, in each room.
     Always,
-    /// Where the catalogue leaves a room unexplained.
-    Unexplained,
+    /// Where the catalogue leaves a room unexplained, or one formula would do as well as what it names.
+    IfNeeded,
 }
 
 /// A room.
