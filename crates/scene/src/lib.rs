@@ -76,7 +76,6 @@
 //! - H. Arau-Puchades: An improved reverberation formula. Acustica 65, 1988.
 
 #[cfg(feature = "rooms")]
-mod broken_line;
 mod error;
 mod floor_plan;
 #[cfg(any(feature = "rooms", feature = "gltf"))]
@@ -87,6 +86,7 @@ mod measured_room;
 mod measurements;
 mod mesh_file;
 mod scene;
+mod table_lines;
 mod theory;
 #[cfg(feature = "rooms")]
 mod toml_field;

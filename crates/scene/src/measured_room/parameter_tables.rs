@@ -2,8 +2,8 @@
 
 use super::MeasuredRoom;
 use super::file::ParameterTable;
-use crate::broken_line::broken;
 use crate::error::Error;
+use crate::table_lines::LineNumbers;
 use csv::{ReaderBuilder, StringRecord, Trim};
 use sabine_acoustics::{Bands, Error as ValueError, OutOfRange, ParameterKind, read_at_most};
 use std::collections::{BTreeMap, HashSet};
@@ -84,25 +84,25 @@ impl MeasuredRoom {
             return Err(error.in_file(path, "bytes"));
         }
         let text = String::from_utf8_lossy(&bytes);
-        // Lines are counted by their newlines alone: after the pair of other systems the parser says one too few.
-        let text = text.trim_start_matches('\u{feff}').replace("\r\n", "\n");
+        let text = text.trim_start_matches('\u{feff}');
         let head = text.lines().next().unwrap_or_default();
         let delimiter =
             [b'\t', b';'].into_iter().find(|&mark| head.contains(char::from(mark))).unwrap_or(b',');
+        let mut lines = LineNumbers::of(text);
         let mut reader =
             ReaderBuilder::new().delimiter(delimiter).trim(Trim::All).from_reader(text.as_bytes());
         let columns = reader
             .headers()
-            .map_err(|error| broken(path, &error))
+            .map_err(|error| lines.broken(path, &error))
             .and_then(|head| Columns::read(head, of_file.is_some()).map_err(|e| e.in_file(path, "line 1")))?;
         let mut known: HashSet<(usize, usize, u64, ParameterKind)> =
             self.parameters.iter().map(ParameterEntry::key).collect();
         let before = self.parameters.len();
         for record in reader.records() {
-            let record = record.map_err(|error| broken(path, &error))?;
+            let record = record.map_err(|error| lines.broken(path, &error))?;
             let line = Line {
                 path,
-                number: record.position().map_or(0, csv::Position::line),
+                number: lines.at(record.position()),
                 record: &record,
                 decimal_comma: delimiter != b',',
             };

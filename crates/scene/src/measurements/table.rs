@@ -3,11 +3,11 @@
 use super::file_names::Names;
 use super::places::{Place, Places};
 use super::{ImportOptions, Measurements, Sound, meaning, number};
-use crate::broken_line::broken;
 use crate::error::Error;
 use crate::inside_folder::check_inside;
 use crate::measured_room::NewResponse;
 use crate::scene::Source;
+use crate::table_lines::LineNumbers;
 use csv::{ReaderBuilder, StringRecord, Trim};
 use sabine_acoustics::{Air, OutOfRange, read_at_most};
 use std::collections::{HashMap, HashSet};
@@ -114,15 +114,16 @@ pub(super) fn read(path: &Path, options: &ImportOptions) -> Result<Measurements,
     let text = text.trim_start_matches('\u{feff}');
     let head = text.lines().next().unwrap_or_default();
     let delimiter = [b'\t', b';'].into_iter().find(|&mark| head.contains(char::from(mark))).unwrap_or(b',');
+    let mut lines = LineNumbers::of(text);
     let mut reader = ReaderBuilder::new().delimiter(delimiter).trim(Trim::All).from_reader(text.as_bytes());
-    let columns = columns(reader.headers().map_err(|error| broken(path, &error))?)
+    let columns = columns(reader.headers().map_err(|error| lines.broken(path, &error))?)
         .map_err(|error| error.in_file(path, "line 1"))?;
     let (mut sources, mut receivers) = (Places::new("s"), Places::new("r"));
     let mut known = [Known::default(), Known::default()];
     let (mut files, mut rows) = (HashSet::new(), Vec::new());
     for record in reader.records() {
-        let record = record.map_err(|error| broken(path, &error))?;
-        let number = record.position().map_or(0, csv::Position::line);
+        let record = record.map_err(|error| lines.broken(path, &error))?;
+        let number = lines.at(record.position());
         let line =
             Line { path, number, record: &record, columns: &columns, decimal_comma: delimiter != b',' };
         let source = line.place("source", ["source_x_m", "source_y_m", "source_z_m"])?;

@@ -111,6 +111,11 @@ fn each_fault_names_its_line_and_column() {
         let folder = folder(&GOOD.replacen(from, to, 1));
         let error = read(folder.path()).unwrap_err().to_string();
         assert!(error.contains("positions.csv") && error.contains(words), "{to}: {error}");
+        // The same line where lines end as they do under Windows.
+        std::fs::write(folder.path().join("positions.csv"), GOOD.replacen(from, to, 1).replace('\n', "\r\n"))
+            .unwrap();
+        let error = read(folder.path()).unwrap_err().to_string();
+        assert!(error.contains(words), "{to}: {error}");
     }
     for (table, words) in [
         ("", "line 1"),
