@@ -3,6 +3,7 @@
 
 pub mod hiding;
 pub mod record;
+pub mod room_tasks;
 
 use std::fmt::Display;
 use std::process::ExitCode;

@@ -12,7 +12,7 @@ fn absorbed((f0_hz, q, resistance): (f64, f64, f64), cosine: f64, hz: f64) -> f6
     4.0 * real / ((1.0 + real).powi(2) + imaginary * imaginary)
 }
 
-/// Share of the energy that is left at a meeting, in the mean over a band; `share` of the area are resonators.
+/// Share of the energy that is left at a meeting, averaged over a band; `share` of the area are resonators.
 pub(crate) fn left(share: f64, resonator: (f64, f64, f64), cosine: f64, edges_hz: (f64, f64)) -> f64 {
     1.0 - share * octave_mean(edges_hz, |hz| absorbed(resonator, cosine, hz))
 }

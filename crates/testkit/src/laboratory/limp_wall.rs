@@ -10,7 +10,7 @@ const AIR_KG_M2_S: f64 = 413.3;
 /// Something always comes back (energy), so that levels stay finite at grazing incidence.
 const LEAST_REFLECTED: f64 = 1e-3;
 
-/// Share of the energy that is left at a meeting, in the mean over a band, by the cosine of the angle to the normal.
+/// Share of the energy that is left at a meeting, averaged over a band, by the cosine of the angle to the normal.
 pub(crate) fn left(kg_m2: f64, cosine: f64, edges_hz: (f64, f64)) -> f64 {
     let through = |hz: f64| {
         let mass = std::f64::consts::PI * hz * kg_m2 * cosine / AIR_KG_M2_S;

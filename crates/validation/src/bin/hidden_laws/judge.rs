@@ -37,7 +37,7 @@ pub struct Judgement {
     pub outcome: Outcome,
     /// Laws that are none, or not the hidden one.
     pub false_laws: usize,
-    /// Named effects of the catalogue that are not at work.
+    /// Named effects of the catalogue that do not act in the room.
     pub false_names: usize,
     /// Whether a test of the lack of fit speaks of the right covariate (and surface); none where no law is hidden.
     pub misfit_is_right: Option<bool>,

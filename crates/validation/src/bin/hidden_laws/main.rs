@@ -16,6 +16,7 @@ mod worlds;
 
 use clap::{Parser, ValueEnum};
 use sabine::diagnose::DiagnoseConfig;
+use sabine_validation::room_tasks::do_all;
 use sabine_validation::{AnyError, record};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -97,37 +98,7 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
         tables::print_changes(&changes);
         return Ok(());
     }
-    let mut trials: Vec<Trial> = match &arguments.record {
-        Some(path) if path.exists() => record::read(path)?,
-        _ => Vec::new(),
-    };
-    let scratch = std::env::temp_dir().join(format!("sabine_hidden_laws_{}", std::process::id()));
-    let mut failures = Vec::new();
-    for task in tasks {
-        if task.is_done(&trials) {
-            continue;
-        }
-        let trial = task.run(&scratch);
-        // The error that counts is the task's.
-        let _ = std::fs::remove_dir_all(&scratch);
-        match trial {
-            Ok(trial) => {
-                eprintln!("{trial}");
-                trials.push(trial);
-                if let Some(path) = &arguments.record {
-                    record::write(path, &trials)?;
-                }
-            }
-            // One room that cannot be done does not keep the others from it.
-            Err(error) => {
-                let failure = format!("{}: {error}", task.name());
-                eprintln!("{failure}");
-                failures.push(failure);
-            }
-        }
-    }
-    tables::print(&trials);
-    if failures.is_empty() { Ok(()) } else { Err(failures.join("; ").into()) }
+    do_all("hidden_laws", arguments.record.as_deref(), tasks, tables::print)
 }
 
 /// The parts of a list, none of `none`.

@@ -8,6 +8,7 @@ use crate::worlds::{Contents, World, contents, room};
 use sabine::diagnose::{Cause, DiagnoseConfig, Diagnoser, Diagnosis, FitTest};
 use sabine_testkit::Laboratory;
 use sabine_validation::AnyError;
+use sabine_validation::room_tasks::RoomTask;
 use std::path::Path;
 use std::time::Instant;
 
@@ -25,8 +26,18 @@ pub struct Task {
 }
 
 impl Task {
-    /// Whether a record holds this room.
-    pub fn is_done(&self, trials: &[Trial]) -> bool {
+    /// By how much its law changes levels in dB, without a diagnosis; none where there is no law.
+    pub fn change_db(&self) -> Result<Option<f64>, AnyError> {
+        let lab = Laboratory::new(room(self.kind, self.seed, self.receivers))?;
+        let contents = contents((self.kind, self.world), &lab, self.seed, self.nuisances)?;
+        change_by_law(&lab, &contents)
+    }
+}
+
+impl RoomTask for Task {
+    type Trial = Trial;
+
+    fn is_done(&self, trials: &[Trial]) -> bool {
         let own = (self.seed, self.rays, self.receivers, self.nuisances, self.discover);
         trials.iter().any(|t| {
             let world = match (t.size, t.null) {
@@ -40,20 +51,11 @@ impl Task {
         })
     }
 
-    /// What it is, for messages.
-    pub fn name(&self) -> String {
+    fn name(&self) -> String {
         format!("{} {:?} seed {}", KINDS[self.kind].id, self.world, self.seed)
     }
 
-    /// By how much its law changes levels in dB, without a diagnosis; none where there is no law.
-    pub fn change_db(&self) -> Result<Option<f64>, AnyError> {
-        let lab = Laboratory::new(room(self.kind, self.seed, self.receivers))?;
-        let contents = contents((self.kind, self.world), &lab, self.seed, self.nuisances)?;
-        change_by_law(&lab, &contents)
-    }
-
-    /// Does it, in a new folder.
-    pub fn run(&self, folder: &Path) -> Result<Trial, AnyError> {
+    fn run(&self, folder: &Path) -> Result<Trial, AnyError> {
         let started = Instant::now();
         let kind = &KINDS[self.kind];
         let lab = Laboratory::new(room(self.kind, self.seed, self.receivers))?;

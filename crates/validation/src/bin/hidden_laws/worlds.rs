@@ -29,7 +29,7 @@ const SEED_STEP: u64 = 0x9E37_79B9;
 pub enum Null {
     /// Nothing is wrong.
     Nothing,
-    /// An effect of the catalogue is at work.
+    /// An effect of the catalogue acts in the room.
     Cause,
     /// Places, levels and noise are off by a little.
     Nuisances,

@@ -14,6 +14,7 @@ mod true_model;
 use clap::Parser;
 use sabine::diagnose::DiagnoseConfig;
 use sabine_testkit::Hidden;
+use sabine_validation::room_tasks::do_all;
 use sabine_validation::{AnyError, hiding, record};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -71,37 +72,7 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
         tables::print(&records.concat());
         return Ok(());
     }
-    let mut trials: Vec<Trial> = match &arguments.record {
-        Some(path) if path.exists() => record::read(path)?,
-        _ => Vec::new(),
-    };
-    let scratch = std::env::temp_dir().join(format!("sabine_round_trip_{}", std::process::id()));
-    let mut failures = Vec::new();
-    for task in tasks(arguments) {
-        if task.is_done(&trials) {
-            continue;
-        }
-        let trial = task.run(&scratch);
-        // The error that counts is the task's.
-        let _ = std::fs::remove_dir_all(&scratch);
-        match trial {
-            Ok(trial) => {
-                eprintln!("{trial}");
-                trials.push(trial);
-            }
-            // One room that cannot be done does not keep the others from it.
-            Err(error) => {
-                let failure = format!("{} seed {}: {error}", hiding::name(&task.hidden), task.seed);
-                eprintln!("{failure}");
-                failures.push(failure);
-            }
-        }
-        if let Some(path) = &arguments.record {
-            record::write(path, &trials)?;
-        }
-    }
-    tables::print(&trials);
-    if failures.is_empty() { Ok(()) } else { Err(failures.join("; ").into()) }
+    do_all("round_trip", arguments.record.as_deref(), tasks(arguments), tables::print)
 }
 
 fn tasks(arguments: &Arguments) -> Vec<Task> {

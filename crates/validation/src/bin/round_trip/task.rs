@@ -7,6 +7,7 @@ use crate::true_model::TrueModel;
 use sabine::diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, ExtendedModel, ModelCause, ModelChange};
 use sabine::scene::{MeasuredRoom, TimeZero};
 use sabine_testkit::{End, Fault, Hidden, LabConfig, Laboratory};
+use sabine_validation::room_tasks::RoomTask;
 use sabine_validation::{AnyError, hiding};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -43,9 +44,14 @@ pub struct Task {
     pub rays: usize,
 }
 
-impl Task {
-    /// Whether a record holds this room.
-    pub fn is_done(&self, trials: &[Trial]) -> bool {
+impl RoomTask for Task {
+    type Trial = Trial;
+
+    fn name(&self) -> String {
+        format!("{} seed {}", hiding::name(&self.hidden), self.seed)
+    }
+
+    fn is_done(&self, trials: &[Trial]) -> bool {
         let name = hiding::name(&self.hidden);
         let is_it = |t: &Trial| {
             t.hidden == name && (t.strength, t.seed, t.rays) == (self.strength, self.seed, self.rays)
@@ -53,8 +59,7 @@ impl Task {
         trials.iter().any(is_it)
     }
 
-    /// Does it, in a new folder.
-    pub fn run(&self, folder: &Path) -> Result<Trial, AnyError> {
+    fn run(&self, folder: &Path) -> Result<Trial, AnyError> {
         let started = Instant::now();
         let time_zero = hiding::time_zero(&self.hidden);
         let lab = Laboratory::new(LabConfig {
@@ -125,7 +130,9 @@ impl Task {
             seconds: started.elapsed().as_secs_f64(),
         })
     }
+}
 
+impl Task {
     fn diagnoser(&self) -> Result<Diagnoser, AnyError> {
         let config = DiagnoseConfig { rays: self.rays, seed: self.seed, ..DiagnoseConfig::default() };
         Ok(Diagnoser::new(config)?)
