@@ -29,11 +29,6 @@ impl TabulatedLaw {
         Self { law, amplitude, grid }
     }
 
-    /// Least and greatest amplitude.
-    pub fn range(&self) -> (f64, f64) {
-        (self.grid[0], self.grid[self.grid.len() - 1])
-    }
-
     /// Tables for all bins.
     pub fn prepare(&self, room: &TracedRoomView<'_>) -> Result<Tables, Unprepared> {
         Ok(Tables::of_bins(room.by_pair(|pair| self.tables(pair))?))

@@ -12,6 +12,9 @@ use crate::survey::Survey;
 use sabine_acoustics::Bands;
 use sabine_paths::laws::{Law, LawError, LawParameter, LawTarget};
 
+/// Logarithm of energy in one decibel.
+const LN_PER_DB: f64 = std::f64::consts::LN_10 / 10.0;
+
 /// A covariate (index) and how its amplitude goes with the octave.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Formula {
@@ -54,29 +57,52 @@ impl Grammar {
     /// A formula as a case.
     pub fn case(&self, formula: &Formula, survey: &Survey) -> Result<Case, LawError> {
         let covariate = &self.covariates[formula.covariate];
-        let (least, bands) = (covariate.least_db(), formula.bands);
-        let terms = bands.terms(survey);
+        let amplitude = self.amplitude(formula, survey);
+        let law = TabulatedLaw::new(covariate.unit_law()?, 0, amplitude.range_db);
+        let found = found(covariate.clone(), formula.bands, survey.bands());
+        let changes = move |fitted: &FittedCase<'_>| {
+            let parameter = |i: usize| LawParameter::new(fitted.values()[i], fitted.interval(i), "dB");
+            let law = found(&(0..fitted.values().len()).map(parameter).collect::<Vec<_>>());
+            law.map_or_else(|_| Vec::new(), |law| vec![ModelChange::Law(Box::new(law))])
+        };
+        let (parameters, stage) = (self.parameters(formula, survey), self.stage(formula));
+        let starts = starts(&parameters);
+        Ok(Case::decay(parameters, OverBands { law, amplitude })
+            .about(self.subject(formula, survey))
+            .at(stage)
+            .starting(starts)
+            .changing(changes))
+    }
+
+    /// A formula with other numbers in the place of its covariate, as a case that is fitted as its own: `covariate` is `[pair][band][bin]`, the
+    /// mean over the energy of each bin.
+    pub fn sham(&self, formula: &Formula, survey: &Survey, covariate: Vec<Vec<Vec<f64>>>) -> Case {
+        let (parameters, stage) = (self.parameters(formula, survey), self.stage(formula));
+        let starts = starts(&parameters);
+        let amplitude = self.amplitude(formula, survey);
+        Case::decay(parameters, OfBins { covariate, amplitude }).at(stage).starting(starts)
+    }
+
+    fn parameters(&self, formula: &Formula, survey: &Survey) -> Vec<Parameter> {
+        let least = self.covariates[formula.covariate].least_db();
         let parameter = |term: &BandTerm| {
             let may_fall = least < 0.0 || term.name == "amplitude_per_octave";
             let low = if may_fall { -term.most_db } else { 0.0 };
             Parameter::new(term.name, "dB", 0.0, term.sd_db, (low, term.most_db))
                 .typically(0.3 * term.most_db)
         };
-        let parameters: Vec<Parameter> = terms.iter().map(parameter).collect();
-        let stage = if covariate.target == LawTarget::Recorder { Stage::Recorder } else { Stage::Room };
-        let starts = starts(&parameters);
-        let law = TabulatedLaw::new(covariate.unit_law()?, 0, (least, super::MOST_DB));
-        let found = found(covariate.clone(), bands, survey.bands());
-        let changes = move |fitted: &FittedCase<'_>| {
-            let parameter = |i: usize| LawParameter::new(fitted.values()[i], fitted.interval(i), "dB");
-            let law = found(&(0..fitted.values().len()).map(parameter).collect::<Vec<_>>());
-            law.map_or_else(|_| Vec::new(), |law| vec![ModelChange::Law(Box::new(law))])
-        };
-        Ok(Case::decay(parameters, OverBands { law, shares: terms.into_iter().map(|t| t.shares).collect() })
-            .about(self.subject(formula, survey))
-            .at(stage)
-            .starting(starts)
-            .changing(changes))
+        formula.bands.terms(survey).iter().map(parameter).collect()
+    }
+
+    fn stage(&self, formula: &Formula) -> Stage {
+        let of_recordings = self.covariates[formula.covariate].target == LawTarget::Recorder;
+        if of_recordings { Stage::Recorder } else { Stage::Room }
+    }
+
+    fn amplitude(&self, formula: &Formula, survey: &Survey) -> Amplitude {
+        let range_db = (self.covariates[formula.covariate].least_db(), super::MOST_DB);
+        let shares = formula.bands.terms(survey).into_iter().map(|t| t.shares).collect();
+        Amplitude { shares, range_db }
     }
 }
 
@@ -135,19 +161,39 @@ fn words(covariate: &Covariate, law: BandLaw, bands: Bands, fitted: &[LawParamet
     format!("{one} {amplitude}{slope} where {} is 1, and in proportion elsewhere{place}.", covariate.text())
 }
 
+/// An amplitude that goes with the octave.
+struct Amplitude {
+    /// Share of each parameter in each band, `[parameter][band]`.
+    shares: Vec<Vec<f64>>,
+    range_db: (f64, f64),
+}
+
+impl Amplitude {
+    fn db(&self, values: &[f64], band: usize) -> f64 {
+        let sum: f64 = self.shares.iter().zip(values).map(|(shares, x)| shares[band] * x).sum();
+        sum.clamp(self.range_db.0, self.range_db.1)
+    }
+}
+
+/// Decibels that are taken from each bin where its covariate is one.
+struct OfBins {
+    /// `[pair][band][bin]`.
+    covariate: Vec<Vec<Vec<f64>>>,
+    amplitude: Amplitude,
+}
+
+impl DecayTerm for OfBins {
+    fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+        let taken = -LN_PER_DB * self.amplitude.db(values, view.band());
+        let covariate = &self.covariate[view.pair][view.band()];
+        ln_energy.iter_mut().zip(covariate).for_each(|(l, own)| *l += taken * own);
+    }
+}
+
 /// A law whose amplitude goes with the octave.
 struct OverBands {
     law: TabulatedLaw,
-    /// Share of each parameter in each band, `[parameter][band]`.
-    shares: Vec<Vec<f64>>,
-}
-
-impl OverBands {
-    fn amplitude_db(&self, values: &[f64], view: &BandView<'_>) -> f64 {
-        let (least, most) = self.law.range();
-        let sum: f64 = self.shares.iter().zip(values).map(|(shares, x)| shares[view.band()] * x).sum();
-        sum.clamp(least, most)
-    }
+    amplitude: Amplitude,
 }
 
 impl DecayTerm for OverBands {
@@ -161,7 +207,7 @@ impl DecayTerm for OverBands {
     }
 
     fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
-        self.law.apply(self.amplitude_db(values, view), view, ln_energy);
+        self.law.apply(self.amplitude.db(values, view.band()), view, ln_energy);
     }
 }
 
@@ -169,7 +215,9 @@ impl DecayTerm for OverBands {
 mod tests {
     #![allow(clippy::unwrap_used)] // a panic is how a test fails
     use super::*;
+    use crate::config::DiagnoseConfig;
     use crate::hand_made;
+    use crate::likelihood::decay::EnergyModel;
     use sabine_scene::{Levels, TimeZero};
 
     #[test]
@@ -212,6 +260,37 @@ mod tests {
                 );
             }
             assert!(law.words().ends_with('.') && case.starts.iter().all(|s| s.len() == fitted.len()));
+        }
+    }
+
+    #[test]
+    fn a_sham_takes_its_amplitude_times_its_number_from_each_bin() {
+        let tables = hand_made::Tables::new(Levels::Absolute, TimeZero::Emission);
+        let baseline = tables.baseline(DiagnoseConfig::default());
+        let (data, survey, used) = (baseline.energy_data(), baseline.survey(), [true; 3]);
+        let grammar = Grammar::of(survey);
+        let from_second =
+            |f: &&Formula| f.bands == BandLaw::Above(1) && grammar.covariates[f.covariate].both_signs;
+        let formula = grammar.formulas.iter().find(from_second).unwrap();
+        let number = |pair: usize, band: usize, bin: usize| (0.3 * (7 * pair + 3 * band + bin) as f64).sin();
+        let of_band = |pair: usize, band: usize| {
+            (0..data.ends[pair][band]).map(|bin| number(pair, band, bin)).collect()
+        };
+        let sham = (0..3).map(|pair| (0..2).map(|band| of_band(pair, band)).collect()).collect();
+        let case = grammar.sham(formula, survey, sham);
+        let (cases, plain) = ([&case], EnergyModel::new(&data, &[], &used));
+        let model = EnergyModel::new(&data, &cases, &used);
+        let mut values = model.start(None);
+        values[model.first_of(0)] = 2.0;
+        for (pair, band) in [(0, 0), (2, 1)] {
+            let count = data.ends[pair][band];
+            let before = plain.predicted(&plain.start(None), pair, band, count);
+            let after = model.predicted(&values, pair, band, count);
+            for (bin, (before, after)) in before.iter().zip(after).enumerate() {
+                let taken = if band == 1 { 2.0 * number(pair, band, bin) } else { 0.0 };
+                let found = (before - after) / LN_PER_DB;
+                assert!((found - taken).abs() < 1e-9, "{pair} {band} {bin}: {found} {taken}");
+            }
         }
     }
 }

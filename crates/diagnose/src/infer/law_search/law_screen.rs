@@ -38,13 +38,17 @@ pub(crate) struct LawScreen<'a> {
     terms: Vec<ReadyTerm>,
     /// Shams, each with the formula whose covariate it was.
     shams: Vec<(Sham, usize, ReadyTerm)>,
+    places: ShamPlaces,
     seed: u64,
 }
 
 /// A sham that does well.
-#[derive(Clone, Debug)]
-pub(crate) struct BestSham {
-    pub words: String,
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ScreenedSham {
+    pub sham: Sham,
+    /// The formula whose covariate it was.
+    pub formula: usize,
+    /// Evidence times probability beforehand, in nats.
     pub nats: f64,
 }
 
@@ -71,7 +75,7 @@ impl<'a> LawScreen<'a> {
         let pairs: Vec<usize> = (0..used.len()).filter(|&p| used[p]).collect();
         let all = columns(grammar, pairs.len());
         let seed = baseline.config.seed;
-        let places = ShamPlaces::draw(&pairs, used.len(), survey.materials().len(), seed);
+        let sham_places = ShamPlaces::draw(&pairs, used.len(), survey.materials().len(), seed);
         let one = |&pair: &usize| {
             let expansion = model.expansion(&fit.values, pair);
             let rows = model.rows_of(pair);
@@ -81,7 +85,7 @@ impl<'a> LawScreen<'a> {
             let mut first = 0;
             for &(band, count) in &rows {
                 for (place, column) in all.iter().enumerate() {
-                    let values = column.values((features, grammar, &places), (pair, band, count));
+                    let values = column.values((features, grammar, &sham_places), (pair, band, count));
                     for (bin, value) in values.into_iter().flatten().enumerate() {
                         x[(first + bin, place * bands + band)] = -LN_PER_DB * value * through[first + bin];
                     }
@@ -97,7 +101,7 @@ impl<'a> LawScreen<'a> {
         let null = NullModel::of(&screened, &places, model.priors().iter().map(|p| p.sd).collect());
         let screen = Screen::new(bands, screened, &fit.covariance);
         let (terms, shams) = terms(grammar, survey, &screen, &all);
-        Self { grammar, screen, null, terms, shams, seed }
+        Self { grammar, screen, null, terms, shams, places: sham_places, seed }
     }
 
     /// Evidence of a formula (by its place), times its probability beforehand, in nats.
@@ -162,15 +166,35 @@ impl<'a> LawScreen<'a> {
         largest(&self.screen, &self.terms, columns, &self.null, (DRAWS, self.seed ^ 0xFA111))
     }
 
-    /// The sham that does best.
-    pub fn best_sham(&self, survey: &Survey) -> Option<BestSham> {
-        let best = self
-            .shams
-            .iter()
-            .map(|(sham, formula, term)| (self.screen.nats(term, &self.screen.slopes), *sham, *formula));
-        let (nats, sham, formula) = best.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let words = self.grammar.subject(&self.grammar.formulas[formula], survey);
-        Some(BestSham { words: format!("{words}, {}", sham.words()), nats })
+    /// All shams, the best first.
+    pub fn shams(&self) -> Vec<ScreenedSham> {
+        let one = |(sham, formula, term): &(Sham, usize, ReadyTerm)| ScreenedSham {
+            sham: *sham,
+            formula: *formula,
+            nats: self.screen.nats(term, &self.screen.slopes),
+        };
+        let mut ranked: Vec<ScreenedSham> = self.shams.iter().map(one).collect();
+        ranked.sort_by(|a, b| b.nats.total_cmp(&a.nats));
+        ranked
+    }
+
+    /// What a sham is in the bins that are compared, `[pair][band][bin]`; empty where none are.
+    pub fn sham_values(
+        &self,
+        features: &Features,
+        sham: &ScreenedSham,
+        ends: &[Vec<usize>],
+    ) -> Vec<Vec<Vec<f64>>> {
+        let covariate = self.grammar.formulas[sham.formula].covariate;
+        let column = Column { covariate, sham: Some(sham.sham) };
+        let of_band = |(pair, band, &count): (usize, usize, &usize)| {
+            let known = (features, self.grammar, &self.places);
+            column.values(known, (pair, band, count)).filter(|_| count > 0).unwrap_or_default()
+        };
+        let of_pair = |(pair, ends): (usize, &Vec<usize>)| {
+            ends.iter().enumerate().map(|(band, count)| of_band((pair, band, count))).collect()
+        };
+        ends.iter().enumerate().map(of_pair).collect()
     }
 }
 

@@ -1,8 +1,8 @@
 //! What laws that were chosen must stand before they are named.
 
 use super::features::Features;
-use super::law_screen::{BestSham, LawScreen};
-use crate::effect::Observable;
+use super::law_screen::LawScreen;
+use crate::effect::{Case, Observable};
 use crate::effects::Grammar;
 use crate::error::Error;
 use crate::infer::cross_validation::{Folds, predict};
@@ -17,6 +17,8 @@ const LEAST_VAULT_NATS: f64 = 0.0;
 const MAX_FAMILY_P: f64 = 0.01;
 /// A sham that comes as near takes the name away, in nats.
 const SHAM_NATS: f64 = 3.0;
+/// Shams that are fitted, at most: those for which the screen says most.
+const FITTED_SHAMS: usize = 4;
 /// Laws that are listed as not told apart, at most.
 const MAX_LISTED: usize = 20;
 
@@ -24,16 +26,24 @@ const MAX_LISTED: usize = 20;
 #[derive(Clone, Debug)]
 pub(crate) struct Trial {
     pub candidate: usize,
-    /// What the screen says for it beside the other causes, in nats.
+    /// Evidence of the decays for it beside the other causes, times its probability beforehand, in nats.
     pub nats: f64,
     /// Probability of as good a law anywhere in the family where no law acts.
     pub family_p: f64,
-    pub sham: Option<BestSham>,
+    pub sham: Option<FittedSham>,
     /// What the data do not tell it from, in words.
     pub not_told_from: Vec<String>,
     /// Logarithm of how much more probable it makes the responses of the vault, predicted from all others; none without a vault, and where it
     /// has fallen before.
     pub vault_gain_nats: Option<f64>,
+}
+
+/// A sham, fitted as the law is.
+#[derive(Clone, Debug)]
+pub(crate) struct FittedSham {
+    pub words: String,
+    /// Evidence of the decays for it, times its probability beforehand, in nats.
+    pub nats: f64,
 }
 
 /// Why a law is not named.
@@ -83,11 +93,12 @@ pub(crate) fn trials(
         let screen =
             LawScreen::of(search.baseline, &grammar, &features, &cases, &without.energy, &search.used);
         let others = screen.not_told_from(formula).into_iter().take(MAX_LISTED);
+        let ln_prior = grammar.formulas[formula].ln_prior;
         found.push(Trial {
             candidate,
-            nats: screen.nats(formula),
+            nats: state.energy.log_evidence - without.energy.log_evidence + ln_prior,
             family_p: screen.family_p(formula),
-            sham: screen.best_sham(survey),
+            sham: best_sham(search, (&grammar, &features, &screen), &cases, &without)?,
             not_told_from: others.map(|f| grammar.subject(&grammar.formulas[f], survey)).collect(),
             vault_gain_nats: None,
         });
@@ -103,4 +114,29 @@ pub(crate) fn trials(
         trial.vault_gain_nats = place.and_then(|place| gains.get(place).copied());
     }
     Ok(found)
+}
+
+/// The sham that does best beside other cases, among those for which the screen says most. A screen is the first step of a fit: where something
+/// strong is missing, it says too little for what is right and too much for what merely has its course over time.
+fn best_sham(
+    search: &Search<'_>,
+    (grammar, features, screen): (&Grammar, &Features, &LawScreen<'_>),
+    cases: &[&Case],
+    without: &State,
+) -> Result<Option<FittedSham>, Error> {
+    let (baseline, survey) = (search.baseline, search.baseline.survey());
+    let mut best: Option<FittedSham> = None;
+    for sham in screen.shams().iter().take(FITTED_SHAMS) {
+        let formula = &grammar.formulas[sham.formula];
+        let case =
+            grammar.sham(formula, survey, screen.sham_values(features, sham, &baseline.simulation.ends));
+        let all: Vec<&Case> = cases.iter().copied().chain([&case]).collect();
+        let (fit, _) = baseline.fit_energy(&all, &search.used, Some(without.before()))?;
+        let nats = fit.log_evidence - without.energy.log_evidence + formula.ln_prior;
+        if best.as_ref().is_none_or(|best| nats > best.nats) {
+            let words = format!("{}, {}", grammar.subject(formula, survey), sham.sham.words());
+            best = Some(FittedSham { words, nats });
+        }
+    }
+    Ok(best)
 }
