@@ -13,3 +13,4 @@ pub(crate) mod prediction;
 pub(crate) mod ray_dependence;
 pub(crate) mod search;
 pub(crate) mod selection;
+pub(crate) mod visibility;

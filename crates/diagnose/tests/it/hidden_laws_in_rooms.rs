@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
 use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis};
+use sabine_paths::laws::{Law, LawParameter, LawTarget};
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
 
 /// What else takes sound from some reflections, or from long paths; among them the causes that are hidden.
@@ -16,6 +17,18 @@ const RIVALS: [&str; 5] = [
 /// A number from the environment, or another.
 fn number(name: &str, or: u64) -> u64 {
     std::env::var(name).map_or(or, |text| text.parse().unwrap())
+}
+
+/// A hidden law as one of the grammar would say it.
+fn grazing(lab: &Laboratory, material: usize, db: f64, from_hz: f64) -> Law {
+    let surface = lab.scene().materials()[material].name.clone();
+    let edge_hz = from_hz / 2f64.sqrt();
+    let formula = "-a * (1 - cos_incidence)^2 * above(frequency_hz, f0)";
+    let parameters = [
+        ("a", LawParameter::new(db, [0.0, 10.0], "dB")),
+        ("f0", LawParameter::new(edge_hz, [edge_hz; 2], "Hz")),
+    ];
+    Law::new("hidden", LawTarget::Reflection, Some(&surface), formula, parameters).unwrap()
 }
 
 /// Diagnoses rooms in which something is hidden, eight receivers and 1,000 rays each.
@@ -34,6 +47,12 @@ fn in_rooms(hidden: impl Fn(u64, &Laboratory) -> Vec<Hidden>) -> Vec<(Vec<Hidden
             let always = std::env::var_os("SABINE_DISCOVER_ALWAYS").is_some();
             let diagnoser =
                 if always { diagnoser.discovering() } else { diagnoser.discovering_if_needed() };
+            for own in &hidden {
+                if let Hidden::GrazingAbsorption { material, db, from_hz } = own {
+                    let law = grazing(&lab, *material, *db, *from_hz);
+                    println!("{seed}: d' {:.1}", diagnoser.d_prime_of_law(&room, &law, &()).unwrap());
+                }
+            }
             let found = diagnoser.diagnose(&room, &[], &()).unwrap();
             let materials = room.scene().materials().iter().map(|m| m.name.clone()).collect();
             let causes: Vec<(&str, Option<&str>)> =
