@@ -43,4 +43,4 @@ install --no-index --no-deps "$wheel"
 tests=$PWD/tests
 # From elsewhere: what is tested is what was installed.
 cd "$scratch"
-"$python" -I -W error "$tests/test_sabine.py"
+"$python" -I -W error -m unittest discover --start-directory "$tests"

@@ -19,15 +19,23 @@ use pyo3::prelude::*;
 
 mod bands;
 mod diagnose;
+mod directivity;
 mod estimate;
 mod failure;
 mod fit;
 mod interrupt;
+mod laws;
+mod listener;
 mod measure;
+mod model;
 mod place;
+mod plan;
 mod readings;
 mod room;
 mod samples;
+mod single_numbers;
+mod speech_transmission;
+mod sweep;
 mod trace;
 
 /// What the Python files call.
@@ -36,13 +44,29 @@ mod _sabine {
     #[pymodule_export]
     use crate::diagnose::{diagnose, effects};
     #[pymodule_export]
+    use crate::directivity::Directivity;
+    #[pymodule_export]
     use crate::estimate::estimate;
     #[pymodule_export]
     use crate::fit::{fit_responses, fit_t60};
     #[pymodule_export]
+    use crate::laws::Laws;
+    #[pymodule_export]
+    use crate::listener::{FreeFieldReference, interaural_correlation, lateral_energy, sound_strength};
+    #[pymodule_export]
     use crate::measure::measure;
     #[pymodule_export]
+    use crate::model::ExtendedModel;
+    #[pymodule_export]
+    use crate::plan::plan;
+    #[pymodule_export]
     use crate::room::{Room, library, library_material};
+    #[pymodule_export]
+    use crate::single_numbers::spatial_mean;
+    #[pymodule_export]
+    use crate::speech_transmission::{speech_transmission, speech_transmission_of};
+    #[pymodule_export]
+    use crate::sweep::Sweep;
     #[pymodule_export]
     use crate::trace::trace;
 }

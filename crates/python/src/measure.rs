@@ -4,6 +4,7 @@ use crate::bands::{bands, centres_hz};
 use crate::failure::Failure;
 use crate::readings::Columns;
 use crate::samples::{Samples, response};
+use crate::single_numbers::{SingleNumbers, of_decay};
 use pyo3::prelude::*;
 use sabine::acoustics::{RoomParameters, equalisation};
 
@@ -22,6 +23,7 @@ pub struct Measured<'py> {
     centre_time_s: Columns<'py>,
     drr_db: Columns<'py>,
     eq_db: Columns<'py>,
+    single_numbers: SingleNumbers,
 }
 
 /// Reads the parameters of ISO 3382-1 from a response.
@@ -53,5 +55,6 @@ pub fn measure<'py>(
         centre_time_s: columns(&room.centre_time_s),
         drr_db: columns(&room.drr_db),
         eq_db: columns(&eq_db),
+        single_numbers: of_decay(&room.edt_s, &room.t30_s, &room.c80_db, &room.d50, &room.centre_time_s),
     })
 }

@@ -1,4 +1,4 @@
-//! Readings per band as columns of numbers.
+//! Readings as columns of numbers, one for each band, and single ones.
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -31,5 +31,26 @@ impl<'py> Columns<'py> {
     /// Columns of estimates, which are all there.
     pub fn of_estimates(py: Python<'py>, estimates: &PerBand<Estimate>) -> Self {
         Self::of(py, &estimates.map(|estimate| Ok(*estimate)))
+    }
+}
+
+/// A single reading: NaN where there is none, and then the reason. In Python: a dictionary, which `sabine.Reading` takes.
+#[derive(IntoPyObject)]
+pub struct Single {
+    value: f64,
+    standard_error: f64,
+    reason: Option<String>,
+}
+
+impl From<&Reading> for Single {
+    fn from(reading: &Reading) -> Self {
+        match reading {
+            Ok(Estimate { value, standard_error }) => {
+                Self { value: *value, standard_error: *standard_error, reason: None }
+            }
+            Err(reason) => {
+                Self { value: f64::NAN, standard_error: f64::NAN, reason: Some(reason.to_string()) }
+            }
+        }
     }
 }

@@ -1,15 +1,19 @@
 //! The response between two places of a room.
 
 use crate::bands::centres_hz;
-use crate::failure::Failure;
+use crate::directivity::{Directivity, turned};
+use crate::failure::{Failure, refused};
 use crate::interrupt::interruptible;
+use crate::laws::Laws;
 use crate::place::Place;
 use crate::readings::Columns;
 use crate::room::Room;
 use crate::samples::rate_hz;
+use crate::single_numbers::{SingleNumbers, of_decay};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use sabine::acoustics::{Material, Observer};
+use sabine::acoustics::{Directivity as Pattern, Observer, Orientation};
+use sabine::paths::laws::{BoundLaws, LawSite};
 use sabine::paths::{Conditions, PathParameters, PathSet, Propagator};
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use sabine::scene::{DiffuseRoom, Receiver, Source};
@@ -32,6 +36,15 @@ pub struct Settings {
     allow_leaks: bool,
 }
 
+/// A source or a receiver: where it is, what it favours, and where it faces.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct End<'py> {
+    place: Place,
+    directivity: Option<PyRef<'py, Directivity>>,
+    axis: Option<[f64; 3]>,
+}
+
 /// What is read from paths; in Python a dictionary, which `sabine.Parameters` takes.
 #[derive(IntoPyObject)]
 struct Parameters<'py> {
@@ -44,6 +57,7 @@ struct Parameters<'py> {
     d50: Columns<'py>,
     centre_time_s: Columns<'py>,
     drr_db: Columns<'py>,
+    single_numbers: SingleNumbers,
 }
 
 /// A response; in Python a dictionary.
@@ -57,58 +71,113 @@ pub struct Traced<'py> {
     paths: usize,
 }
 
-/// Traces the paths between two places, reads their parameters and renders the response.
+/// Traces the paths between two places, reads their parameters and renders the response, under laws if there are any.
 ///
 /// # Errors
-/// Places or settings are refused, or the mesh leaks.
+/// Places, axes, laws or settings are refused, or the mesh leaks.
 #[pyfunction]
 pub fn trace<'py>(
     py: Python<'py>,
     room: &Room,
-    source: Place,
-    receiver: Place,
+    source: End<'py>,
+    receiver: End<'py>,
+    laws: Option<PyRef<'py, Laws>>,
     settings: Settings,
 ) -> Result<Traced<'py>, Failure> {
-    let (source, receiver) = (source.source(&room.sources)?, receiver.receiver(&room.receivers)?);
     let sample_rate_hz = rate_hz(settings.sample_rate)?;
     let config = RenderConfig { sample_rate_hz, seed: settings.seed, ..RenderConfig::default() };
     let renderer = PressureRenderer::new(config)?;
+    let ends = Ends::new(room, &source, &receiver)?;
+    let site = LawSite::new(&room.scene, &ends.source, &ends.receiver, &room.air);
+    let laws = laws.as_ref().map(|laws| BoundLaws::new(laws.laws(), &site)).transpose();
+    let laws = laws.map_err(|error| refused(format!("laws: {error}")))?;
     let materials = room.materials(room.bands());
+    let mut conditions = ends.conditions(Conditions::new(&materials, &room.air));
+    if let Some(laws) = laws.as_ref().filter(|laws| !laws.is_empty()) {
+        conditions = conditions.with_laws(laws);
+    }
     let (response, parameters, levels_db, paths) = interruptible(py, |observer| {
-        let (paths, parameters) = long_enough(room, &materials, &source, &receiver, &settings, observer)?;
-        let conditions = Conditions::new(&materials, &room.air);
+        let (paths, parameters) = long_enough(room, &ends, &conditions, &settings, observer)?;
         let energy = paths.energy_response(&conditions, DECAY_STEP_S)?;
         let levels_db: Vec<_> =
             (0..energy.bands().len()).map(|band| energy.decay_curve(band).level_db()).collect();
         Ok((renderer.render(&paths, &conditions)?, parameters, levels_db, paths.len()))
     })?;
-    let columns = |readings| Columns::of(py, readings);
     Ok(Traced {
         sample_rate: response.sample_rate_hz(),
         samples: PyArray1::from_vec(py, response.into_samples()),
-        parameters: Parameters {
-            bands_hz: centres_hz(parameters.bands()),
-            edt_s: columns(&parameters.edt_s),
-            t20_s: columns(&parameters.t20_s),
-            t30_s: columns(&parameters.t30_s),
-            c50_db: columns(&parameters.c50_db),
-            c80_db: columns(&parameters.c80_db),
-            d50: columns(&parameters.d50),
-            centre_time_s: columns(&parameters.centre_time_s),
-            drr_db: columns(&parameters.drr_db),
-        },
+        parameters: Parameters::of(py, &parameters),
         decay_db: PyArray2::from_vec2(py, &levels_db)?,
         decay_step_s: DECAY_STEP_S,
         paths,
     })
 }
 
+impl<'py> Parameters<'py> {
+    fn of(py: Python<'py>, read: &PathParameters) -> Self {
+        let columns = |readings| Columns::of(py, readings);
+        Self {
+            bands_hz: centres_hz(read.bands()),
+            edt_s: columns(&read.edt_s),
+            t20_s: columns(&read.t20_s),
+            t30_s: columns(&read.t30_s),
+            c50_db: columns(&read.c50_db),
+            c80_db: columns(&read.c80_db),
+            d50: columns(&read.d50),
+            centre_time_s: columns(&read.centre_time_s),
+            drr_db: columns(&read.drr_db),
+            single_numbers: of_decay(&read.edt_s, &read.t30_s, &read.c80_db, &read.d50, &read.centre_time_s),
+        }
+    }
+}
+
+/// Both ends of the paths, with the patterns that are not omnidirectional.
+struct Ends {
+    source: Source,
+    receiver: Receiver,
+    source_pattern: Option<(Pattern, Orientation)>,
+    receiver_pattern: Option<(Pattern, Orientation)>,
+}
+
+impl Ends {
+    /// An axis that is given counts before the one that the place has in the room; a pattern without either faces the other end.
+    fn new(room: &Room, from: &End<'_>, to: &End<'_>) -> Result<Self, Failure> {
+        let (mut source, mut receiver) =
+            (from.place.source(&room.sources)?, to.place.receiver(&room.receivers)?);
+        source.axis = facing("source_axis", from.axis)?.or(source.axis);
+        receiver.axis = facing("receiver_axis", to.axis)?.or(receiver.axis);
+        let away = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|k| b[k] - a[k]);
+        let pattern = |end: &End<'_>, axis: [f64; 3]| {
+            end.directivity.as_ref().map(|pattern| turned(pattern, axis, room.bands())).transpose()
+        };
+        let source_axis = source.axis.unwrap_or(away(source.position_m, receiver.position_m));
+        let receiver_axis = receiver.axis.unwrap_or(away(receiver.position_m, source.position_m));
+        let (source_pattern, receiver_pattern) = (pattern(from, source_axis)?, pattern(to, receiver_axis)?);
+        Ok(Self { source, receiver, source_pattern, receiver_pattern })
+    }
+
+    fn conditions<'a>(&'a self, mut conditions: Conditions<'a>) -> Conditions<'a> {
+        if let Some((pattern, orientation)) = &self.source_pattern {
+            conditions = conditions.with_source(pattern, *orientation);
+        }
+        if let Some((pattern, orientation)) = &self.receiver_pattern {
+            conditions = conditions.with_receiver(pattern, *orientation);
+        }
+        conditions
+    }
+}
+
+/// An axis as a unit vector.
+fn facing(what: &str, axis: Option<[f64; 3]>) -> Result<Option<[f64; 3]>, Failure> {
+    let forward = axis.map(|axis| Orientation::towards(axis).map(|orientation| orientation.forward()));
+    forward.transpose().map_err(|error| refused(format!("{what}: {error}")))
+}
+
 /// Traces for as long as asked, or until T30 can be read in every band.
 fn long_enough(
     room: &Room,
-    materials: &[Material],
-    source: &Source,
-    receiver: &Receiver,
+    ends: &Ends,
+    conditions: &Conditions<'_>,
     settings: &Settings,
     observer: &dyn Observer,
 ) -> Result<(PathSet, PathParameters), Failure> {
@@ -121,13 +190,13 @@ fn long_enough(
         allow_leaks: settings.allow_leaks,
         ..TracerConfig::default()
     })?;
-    let conditions = Conditions::new(materials, &room.air);
+    let Ends { source, receiver, .. } = ends;
     if settings.duration_s.is_none() {
-        return Ok(tracer.trace_until_t30(&room.scene, source, receiver, &conditions, observer)?);
+        return Ok(tracer.trace_until_t30(&room.scene, source, receiver, conditions, observer)?);
     }
     // Refuses volumes that no room has, as a mesh in another unit.
     DiffuseRoom::of_scene(&room.scene, &room.air, room.bands())?;
     let paths = tracer.trace(&room.scene, source, receiver, &room.air, observer)?;
-    let parameters = PathParameters::read(&paths, &conditions)?;
+    let parameters = PathParameters::read(&paths, conditions)?;
     Ok((paths, parameters))
 }

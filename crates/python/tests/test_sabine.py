@@ -1,6 +1,6 @@
 """Tests of the installed package: closed forms, the repository's fixtures, and bad input. Needs numpy alone.
 
-    python crates/python/tests/test_sabine.py
+    python -m unittest discover --start-directory crates/python/tests
 """
 
 import json
@@ -21,13 +21,17 @@ from unittest import mock
 import numpy as np
 
 import sabine
-
-FIXTURES = Path(__file__).resolve().parents[3] / "fixtures"
-RATE_HZ = 48_000
-SIZE_M = (5.0, 4.0, 2.6)
-SOURCE_M, RECEIVER_M = (1.0, 1.0, 1.5), (4.0, 3.0, 1.2)
-#: Exact centres of the octaves from 125 Hz to 4 kHz (IEC 61260-1, base ten).
-CENTRES_HZ = 1000.0 * 10.0 ** (0.3 * np.arange(-3, 3))
+from case import (
+    FIXTURES,
+    RATE_HZ,
+    RECEIVER_M,
+    SIZE_M,
+    SOURCE_M,
+    Case,
+    decaying_tones,
+    diffuse_box,
+    eyring_t60_s,
+)
 
 
 def read_wav(path):
@@ -42,24 +46,6 @@ def delay_wav(path, delay_s):
     sound = bytes(round(delay_s * rate_hz) * frame_bytes) + data[4:]
     head = head[:4] + struct.pack("<I", len(head) + len(sound)) + head[8:]
     path.write_bytes(head + b"data" + struct.pack("<I", len(sound)) + sound)
-
-
-def decaying_tones(t60_s, duration_s):
-    """A tone at the centre of each octave that falls by 60 dB in its own time."""
-    times_s = np.arange(int(duration_s * RATE_HZ)) / RATE_HZ
-    tones = np.cos(2 * np.pi * CENTRES_HZ[:, None] * times_s)
-    return np.sum(tones * 10.0 ** (-3.0 * times_s / np.asarray(t60_s)[:, None]), axis=0)
-
-
-def eyring_t60_s(size_m, absorption):
-    """Without air, at 343.2 m/s."""
-    x, y, z = size_m
-    surface = 2 * (x * y + y * z + z * x)
-    return 24 * np.log(10) / 343.2 * x * y * z / (-surface * np.log(1 - absorption))
-
-
-def diffuse_box(absorption, **more):
-    return sabine.ShoeBox(SIZE_M, absorption, scattering=0.9, **more)
 
 
 class Measure(unittest.TestCase):
@@ -251,11 +237,7 @@ class Diagnose(unittest.TestCase):
         json.dumps(found.data)
 
 
-class BadInput(unittest.TestCase):
-    def assert_refused(self, words, call, *arguments, error=ValueError, **named):
-        with self.subTest(words), self.assertRaisesRegex(error, words):
-            call(*arguments, **named)
-
+class BadInput(Case):
     def test_samples_are_refused_in_words(self):
         tone = np.ones(1000, np.float32)
         for call in (sabine.measure, sabine.estimate):

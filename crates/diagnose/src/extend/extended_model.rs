@@ -111,7 +111,15 @@ impl ExtendedModel {
         let path = path.as_ref();
         let text =
             std::fs::read_to_string(path).map_err(|source| Cause::Io { path: path.to_owned(), source })?;
-        let model: Self = toml::from_str(&text)
+        Self::from_toml(&text, path)
+    }
+
+    /// Reads the text of such a file, which has this path.
+    ///
+    /// # Errors
+    /// As [`ExtendedModel::read`], but for those of reading.
+    pub fn from_toml(text: &str, path: &Path) -> Result<Self, Error> {
+        let model: Self = toml::from_str(text)
             .map_err(|source| Error::Model { path: path.to_owned(), source: Box::new(source) })?;
         model.check().map_err(|(field, source)| Cause::InFile {
             path: path.to_owned(),

@@ -36,6 +36,31 @@ pub fn read_laws(path: impl AsRef<Path>) -> Result<Vec<Law>, Error> {
     } else {
         read_file(path)?
     };
+    check_together(laws, path)
+}
+
+/// The laws of the text of such a file, which has this path.
+///
+/// ```
+/// let text = r#"
+///     [[laws]]
+///     id = "haze"
+///     target = "path"
+///     formula = "-a * length_m"
+///     parameters = { a = { value = 0.1, low = 0, high = 1, unit = "dB/m" } }
+/// "#;
+/// assert_eq!(sabine_diagnose::laws_of_toml(text, "haze.toml".as_ref())?[0].printed(), "-a * length_m");
+/// # Ok::<(), sabine_diagnose::Error>(())
+/// ```
+///
+/// # Errors
+/// As [`read_laws`], but for those of reading.
+pub fn laws_of_toml(text: &str, path: &Path) -> Result<Vec<Law>, Error> {
+    check_together(parse(path, text)?, path)
+}
+
+/// Laws of one identifier are an error of their file or folder.
+fn check_together(laws: Vec<Law>, path: &Path) -> Result<Vec<Law>, Error> {
     Law::check_together(&laws).map_err(|error| Cause::from(error).in_file(path, "laws"))?;
     Ok(laws)
 }

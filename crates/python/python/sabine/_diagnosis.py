@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass
+from pathlib import Path
 from typing import List, Sequence, Tuple
 
 from . import _inputs, _plots, _sabine
+from ._inputs import Document
 from ._room import Room
 
 
@@ -48,6 +50,20 @@ class Diagnosis:
         """What must be said besides."""
         return tuple(self.data["notes"])
 
+    def write(self, folder: str | os.PathLike) -> None:
+        """Writes ``diagnosis.json`` and ``extended_model.toml`` into a folder, which is made if need be.
+
+        :func:`diagnose` starts from the model; so do the commands ``sabine diagnose``, ``trace``, ``fit`` and others with ``--model``.
+
+        Raises:
+            OSError: the folder cannot be written to.
+        """
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        text = json.dumps(self.data, indent=2, sort_keys=True, ensure_ascii=False)
+        (folder / "diagnosis.json").write_text(text, encoding="utf-8")
+        (folder / "extended_model.toml").write_text(self.extended_model, encoding="utf-8")
+
     def plot(self, ax=None):
         """Draws the evidence of each effect that was weighed, in nats; returns the axes (new ones by default)."""
         ax = _plots.new_axes(ax)
@@ -75,6 +91,9 @@ def diagnose(
     rays: int = 10_000,
     effects: Sequence[str] | None = None,
     hold_out: Sequence[str] = (),
+    laws: Document | None = None,
+    discover: str | None = None,
+    model: Document | Diagnosis | None = None,
     seed: int = 0,
     allow_leaks: bool = False,
 ) -> Diagnosis:
@@ -88,18 +107,35 @@ def diagnose(
         rays: rays for each pair of source and receiver, 100 to 10 million.
         effects: effects to weigh, by name (:func:`effects`); all by default.
         hold_out: names of receivers that are predicted and never fitted; by default each is held out in turn.
+        laws: formulas that are weighed as causes beside the catalogue, ``[[laws]]`` in TOML: a file, a folder of such files, or the
+            text of one (docs/how-to/own-law.md).
+        discover: when a law is looked for beside the catalogue: ``always``, ``if_needed`` (where no cause explains the room, or a
+            formula would explain it as well) or ``never``; by default ``if_needed``, with ``effects`` ``never``.
+        model: an extended model to start from, a file, the text of one, or an earlier diagnosis: its causes are at work, fitted
+            anew, and the search goes on (docs/how-to/extended-model.md).
         seed: of rays and simulated measurements. The same seed gives the same diagnosis.
         allow_leaks: goes on although more than one ray in a thousand escapes through holes of the mesh.
 
     Raises:
         OSError: a file is missing or cannot be read.
-        ValueError: the room has no responses, an effect or receiver is unknown, or a setting is out of range.
+        ValueError: the room has no responses, an effect or receiver is unknown, or a setting is out of range; a law or a model cannot
+            be read or does not fit the room.
         KeyboardInterrupt: somebody pressed Ctrl-C.
     """
     room = room if isinstance(room, Room) else Room.read(room)
-    chosen = None if effects is None else _names(effects, "effects")
-    rays, seed = _inputs.count(rays, "rays"), _inputs.count(seed, "seed")
-    found = _sabine.diagnose(room._handle, rays, chosen, _names(hold_out, "hold_out"), seed, allow_leaks)
+    if isinstance(model, Diagnosis):
+        model = model.extended_model
+    settings = {
+        "rays": _inputs.count(rays, "rays"),
+        "effects": None if effects is None else _names(effects, "effects"),
+        "hold_out": _names(hold_out, "hold_out"),
+        "laws": None if laws is None else _inputs.document(laws, "laws", _sabine.Laws),
+        "discover": discover or ("if_needed" if effects is None else "never"),
+        "model": None if model is None else _inputs.document(model, "model", _sabine.ExtendedModel),
+        "seed": _inputs.count(seed, "seed"),
+        "allow_leaks": allow_leaks,
+    }
+    found = _sabine.diagnose(room._handle, settings)
     return Diagnosis(data=json.loads(found[0]), extended_model=found[1])
 
 

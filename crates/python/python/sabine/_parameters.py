@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Sequence
-
-import numpy as np
+from dataclasses import dataclass
+from typing import Dict, Sequence
 
 from . import _inputs, _sabine
-from ._readings import OCTAVES, Readings
+from ._readings import OCTAVES, Reading, Readings
+from ._table import Table
 
 
-@dataclass(frozen=True, eq=False)
-class Parameters:
+@dataclass(frozen=True, eq=False, repr=False)
+class Parameters(Table):
     """Parameters of ISO 3382-1 per band, times counted from the arrival of the direct sound.
 
     Attributes:
@@ -22,9 +21,11 @@ class Parameters:
         d50: share of the energy within 50 ms, 0 to 1.
         centre_time_s: centre time in seconds.
         drr_db: direct-to-reverberant energy ratio, in dB.
+        single_numbers: means over the octaves 500 Hz and 1 kHz, or the six third octaves of these (ISO 3382-1:2009, table A.1):
+            ``edt_mid_s``, ``t30_mid_s``, ``c80_mid_db``, ``d50_mid``, ``centre_time_mid_s``; and ``bass_ratio``, T30 at 125 and
+            250 Hz over T30 at 500 Hz and 1 kHz (L. Beranek: Concert Halls and Opera Houses, 2004).
     """
 
-    bands_hz: np.ndarray
     edt_s: Readings
     t20_s: Readings
     t30_s: Readings
@@ -33,37 +34,12 @@ class Parameters:
     d50: Readings
     centre_time_s: Readings
     drr_db: Readings
-
-    @classmethod
-    def _of(cls, found: dict):
-        bands_hz = np.asarray(found["bands_hz"])
-        given = {"bands_hz": bands_hz, "onset_s": found.get("onset_s")}
-        names = (field.name for field in fields(cls))
-        return cls(**{n: given[n] if n in given else Readings._of(bands_hz, found[n]) for n in names})
-
-    def __repr__(self) -> str:
-        """A table; below it why numbers are missing."""
-        quantities = [(f.name, getattr(self, f.name)) for f in fields(self)]
-        quantities = [(name, value) for name, value in quantities if isinstance(value, Readings)]
-        head = f"{type(self).__name__:<20}" + "".join(f"{hz:>9g}" for hz in self.bands_hz) + " Hz"
-        rows = [
-            f"{name:<20}" + "".join(f"{'-' if np.isnan(v) else format(v, '.3f'):>9}" for v in readings)
-            for name, readings in quantities
-        ]
-        places = {}
-        for name, readings in quantities:
-            for hz, why in readings.missing.items():
-                places.setdefault(why, []).append(f"{name} {hz:g}")
-        reasons = [f"- {why}: {', '.join(where)}" for why, where in places.items()]
-        return "\n".join([head, *rows, *reasons])
+    single_numbers: Dict[str, Reading]
 
     def plot(self, ax=None):
         """Draws EDT, T20 and T30 with 95 % intervals over frequency; returns the axes (new ones by default)."""
-        for name in ("edt_s", "t20_s", "t30_s"):
-            ax = getattr(self, name).plot(ax, label=name[:-2].upper())
-        ax.set_ylabel("Reverberation time (s)")
-        ax.legend()
-        return ax
+        names = {"edt_s": "EDT", "t20_s": "T20", "t30_s": "T30"}
+        return self._plot(ax, names, "Reverberation time (s)")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 
-def new_axes(ax):
+def new_axes(ax, polar: bool = False):
     """The axes given, or new ones."""
     if ax is not None:
         return ax
@@ -13,7 +13,7 @@ def new_axes(ax):
         from matplotlib import pyplot
     except ImportError as error:
         raise ImportError("plot() needs matplotlib: pip install matplotlib") from error
-    return pyplot.subplots(layout="constrained")[1]
+    return pyplot.subplots(layout="constrained", subplot_kw={"polar": polar})[1]
 
 
 def band_axis(ax, bands_hz: np.ndarray) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from . import _plots
+from . import _plots, _pyfar
 from ._parameters import MeasuredParameters, Parameters, measure
 from ._readings import Readings
 
@@ -16,7 +16,8 @@ class Response:
     """The response between two places of a room, as :meth:`Room.trace` finds it.
 
     Attributes:
-        samples: pressure, float32, shape (samples,); sample 0 is the emission, 1 the direct sound at 1 m.
+        samples: pressure, float32, shape (samples,); sample 0 is the emission, 1 the direct sound at 1 m, of a directional
+            source on its axis.
         sample_rate: samples per second.
         parameters: of the paths, with the standard error that the number of rays leaves. What is read from the samples:
             :meth:`measure`.
@@ -53,11 +54,7 @@ class Response:
         Raises:
             ImportError: pyfar is not installed.
         """
-        try:
-            import pyfar
-        except ImportError as error:
-            raise ImportError("to_pyfar() needs pyfar: pip install pyfar") from error
-        return pyfar.Signal(self.samples, self.sample_rate)
+        return _pyfar.signal(self.samples, self.sample_rate)
 
     def plot(self, ax=None):
         """Draws the decay of each band over time; returns the axes (new ones by default)."""

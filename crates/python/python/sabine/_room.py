@@ -9,7 +9,8 @@ from typing import Dict, Mapping, Sequence, Tuple, Union
 import numpy as np
 
 from . import _inputs, _plots, _pyroomacoustics, _sabine
-from ._inputs import Place
+from ._directivity import Pattern, handle_of
+from ._inputs import Document, Place
 from ._response import Response
 
 #: Octaves of a room's tables and of fits, 125 Hz to 8 kHz.
@@ -133,6 +134,11 @@ class Room:
         source: Place,
         receiver: Place,
         *,
+        source_directivity: Pattern | None = None,
+        source_axis: Sequence[float] | None = None,
+        receiver_directivity: Pattern | None = None,
+        receiver_axis: Sequence[float] | None = None,
+        laws: Document | None = None,
         rays: int = 20_000,
         seed: int = 0,
         sample_rate: float = 48_000,
@@ -146,8 +152,16 @@ class Room:
         The same seed gives the same response on any number of threads. Ctrl-C stops it.
 
         Args:
-            source: name, or position (x, y, z) in metres of an omnidirectional source.
-            receiver: name, or position (x, y, z) in metres.
+            source: name, or position (x, y, z) in metres.
+            receiver: the same.
+            source_directivity: how it radiates: a :class:`Directivity`, or the name of a pattern of first order (``cardioid``
+                and others); None for all directions alike.
+            source_axis: direction in which it faces, shape (3,), of any length; by default the one that the room file states, or else
+                towards the receiver.
+            receiver_directivity: how the receiver hears, likewise.
+            receiver_axis: where it faces, likewise; by default as the room file states, or else towards the source.
+            laws: formulas that change what paths carry, ``[[laws]]`` in TOML: a file, a folder of such files, or the text of one
+                (docs/how-to/own-law.md). Response, parameters and decay are those under them.
             rays: 1 to 100 million; the standard error falls with its square root.
             seed: of rays and noise.
             sample_rate: of the response, 8 to 96 kHz.
@@ -157,7 +171,9 @@ class Room:
             allow_leaks: goes on although more than one ray in a thousand escapes through holes of the mesh.
 
         Raises:
-            ValueError: a place outside the room or on a surface, or a setting out of range.
+            ValueError: a place outside the room or on a surface, an axis without length, an unknown pattern, or a setting out of
+                range; a law that cannot be read or does not fit the room: the message names the law and the column of its formula.
+            OSError: the file of laws is missing or cannot be read.
             KeyboardInterrupt: somebody pressed Ctrl-C.
         """
         settings = {
@@ -169,8 +185,20 @@ class Room:
             "diffraction": diffraction,
             "allow_leaks": allow_leaks,
         }
-        source, receiver = _inputs.place(source, "source"), _inputs.place(receiver, "receiver")
-        return Response._of(_sabine.trace(self._handle, source, receiver, settings))
+
+        def end(name: str, place: Place, directivity: Pattern | None, axis) -> dict:
+            return {
+                "place": _inputs.place(place, name),
+                "directivity": handle_of(directivity, f"{name}_directivity"),
+                "axis": _inputs.axis(axis, f"{name}_axis"),
+            }
+
+        ends = (
+            end("source", source, source_directivity, source_axis),
+            end("receiver", receiver, receiver_directivity, receiver_axis),
+        )
+        laws = None if laws is None else _inputs.document(laws, "laws", _sabine.Laws)
+        return Response._of(_sabine.trace(self._handle, *ends, laws, settings))
 
     def plot(self, ax=None):
         """Draws the absorption of each surface over frequency, with its standard deviation; returns the axes (new ones by default)."""
