@@ -43,8 +43,8 @@ pub struct SweepMeasurement {
     /// Recording divided by sweep: a chain that passes the sweep as it is gives a pulse of 1, but for what lies outside the
     /// sweep's range. All channels have one length and one time axis.
     pub responses: Vec<ImpulseResponse>,
-    /// Time in the recording, less the time in the playback, of the first sample: 50 ms before the onset. Where playback and
-    /// recording started together, what is added to times in the response to count from the emission, latency included.
+    /// Time in the recording, less the time in the playback, of the first sample: 50 ms before the onset, or where the recording begins.
+    /// Where playback and recording started together, what is added to times in the response to count from the emission, latency included.
     pub start_s: f64,
     /// Difference of each repetition from the one most like it, in dB relative to the response's energy; empty for a single
     /// sweep.
@@ -183,10 +183,13 @@ fn locate(samples: &[f64], sweep: &ExponentialSweep) -> Result<usize, Error> {
     let alone = &deconvolved[..(peak + sweep.period() / 2).max(one).min(deconvolved.len())];
     let several = sweep.config().repetitions > 1;
     alignment::check_arrivals(if several { alone } else { &deconvolved }, sweep)?;
-    if onset < negative {
+    // A pulse of the sweep's bandwidth B rings before its peak within an envelope 1 / (pi B t): what has no latency begins early.
+    let bandwidth_hz = sweep.config().to_hz - sweep.config().from_hz;
+    let ringing = (rate / (std::f64::consts::PI * ONSET_SHARE * bandwidth_hz)).ceil() as usize;
+    if onset + ringing < negative {
         return Err(SweepError::StartsLate { late_s: (negative - onset) as f64 / rate }.into());
     }
-    Ok((onset - negative).saturating_sub((BEFORE_S * rate) as usize))
+    Ok(onset.saturating_sub(negative + (BEFORE_S * rate) as usize))
 }
 
 /// The largest sample of the first repetition's response, in the deconvolved recording of all.

@@ -151,7 +151,8 @@ impl Room {
 }
 
 impl Room {
-    fn of_measured(room: MeasuredRoom) -> Self {
+    /// The room of a folder.
+    pub fn of_measured(room: MeasuredRoom) -> Self {
         Self {
             scene: room.scene().clone(),
             absorption_sd: room.priors().iter().map(|prior| prior.absorption_sd.clone()).collect(),

@@ -5,6 +5,7 @@ use crate::directivity::{Directivity, turned};
 use crate::failure::{Failure, refused};
 use crate::interrupt::interruptible;
 use crate::laws::Laws;
+use crate::model::{ExtendedModel, Modelled};
 use crate::place::Place;
 use crate::readings::Columns;
 use crate::room::Room;
@@ -13,7 +14,7 @@ use crate::single_numbers::{SingleNumbers, of_decay};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use sabine::acoustics::{Directivity as Pattern, Observer, Orientation};
-use sabine::paths::laws::{BoundLaws, LawSite};
+use sabine::paths::laws::{BoundLaws, Law, LawSite};
 use sabine::paths::{Conditions, PathParameters, PathSet, Propagator};
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use sabine::scene::{DiffuseRoom, Receiver, Source};
@@ -71,37 +72,63 @@ pub struct Traced<'py> {
     paths: usize,
 }
 
-/// Traces the paths between two places, reads their parameters and renders the response, under laws if there are any.
+/// What is at work beside the room: laws, and an extended model.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Beside<'py> {
+    laws: Option<PyRef<'py, Laws>>,
+    model: Option<PyRef<'py, ExtendedModel>>,
+}
+
+impl Beside<'_> {
+    fn laws(&self) -> &[Law] {
+        self.laws.as_ref().map_or(&[], |laws| laws.laws())
+    }
+}
+
+/// Traces the paths between two places, reads their parameters and renders the response, under laws and a model if there are any.
 ///
 /// # Errors
-/// Places, axes, laws or settings are refused, or the mesh leaks.
+/// Places, axes, laws, model or settings are refused, or the mesh leaks.
 #[pyfunction]
 pub fn trace<'py>(
     py: Python<'py>,
     room: &Room,
     source: End<'py>,
     receiver: End<'py>,
-    laws: Option<PyRef<'py, Laws>>,
+    beside: Beside<'py>,
     settings: Settings,
 ) -> Result<Traced<'py>, Failure> {
     let sample_rate_hz = rate_hz(settings.sample_rate)?;
     let config = RenderConfig { sample_rate_hz, seed: settings.seed, ..RenderConfig::default() };
     let renderer = PressureRenderer::new(config)?;
+    let modelled =
+        beside.model.as_ref().map(|model| Modelled::new(model, room, beside.laws())).transpose()?;
+    let room = modelled.as_ref().map_or(room, |modelled| &modelled.room);
     let ends = Ends::new(room, &source, &receiver)?;
-    let site = LawSite::new(&room.scene, &ends.source, &ends.receiver, &room.air);
-    let laws = laws.as_ref().map(|laws| BoundLaws::new(laws.laws(), &site)).transpose();
-    let laws = laws.map_err(|error| refused(format!("laws: {error}")))?;
     let materials = room.materials(room.bands());
-    let mut conditions = ends.conditions(Conditions::new(&materials, &room.air));
-    if let Some(laws) = laws.as_ref().filter(|laws| !laws.is_empty()) {
-        conditions = conditions.with_laws(laws);
-    }
+    // The model has the laws.
+    let own = if modelled.is_some() { &[] } else { beside.laws() };
+    let laws = BoundLaws::new(own, &LawSite::new(&room.scene, &ends.source, &ends.receiver, &room.air));
+    let laws = laws.map_err(|error| refused(format!("laws: {error}")))?;
+    let conditions = match &modelled {
+        Some(modelled) => modelled.conditions(&materials, &ends.source, &ends.receiver)?,
+        None if laws.is_empty() => Conditions::new(&materials, &room.air),
+        None => Conditions::new(&materials, &room.air).with_laws(&laws),
+    };
+    let conditions = ends.conditions(conditions);
     let (response, parameters, levels_db, paths) = interruptible(py, |observer| {
-        let (paths, parameters) = long_enough(room, &ends, &conditions, &settings, observer)?;
+        let tracer = PathTracer::new(settings.tracer(modelled.as_ref()))?;
+        let (paths, parameters) =
+            long_enough(&tracer, room, &ends, &conditions, settings.duration_s, observer)?;
         let energy = paths.energy_response(&conditions, DECAY_STEP_S)?;
         let levels_db: Vec<_> =
             (0..energy.bands().len()).map(|band| energy.decay_curve(band).level_db()).collect();
-        Ok((renderer.render(&paths, &conditions)?, parameters, levels_db, paths.len()))
+        let mut response = renderer.render(&paths, &conditions)?;
+        if let Some(modelled) = &modelled {
+            response = modelled.finish(&ends.source, &ends.receiver, response, settings.seed)?;
+        }
+        Ok((response, parameters, levels_db, paths.len()))
     })?;
     Ok(Traced {
         sample_rate: response.sample_rate_hz(),
@@ -111,6 +138,21 @@ pub fn trace<'py>(
         decay_step_s: DECAY_STEP_S,
         paths,
     })
+}
+
+impl Settings {
+    fn tracer(&self, modelled: Option<&Modelled>) -> TracerConfig {
+        TracerConfig {
+            rays: self.rays,
+            seed: self.seed,
+            duration_s: self.duration_s.unwrap_or(LONGEST_S),
+            image_order: self.image_order,
+            diffraction: self.diffraction || modelled.is_some_and(Modelled::diffraction),
+            cuboid_paths: modelled.map_or(0, Modelled::cuboid_paths),
+            allow_leaks: self.allow_leaks,
+            ..TracerConfig::default()
+        }
+    }
 }
 
 impl<'py> Parameters<'py> {
@@ -175,23 +217,15 @@ fn facing(what: &str, axis: Option<[f64; 3]>) -> Result<Option<[f64; 3]>, Failur
 
 /// Traces for as long as asked, or until T30 can be read in every band.
 fn long_enough(
+    tracer: &PathTracer,
     room: &Room,
     ends: &Ends,
     conditions: &Conditions<'_>,
-    settings: &Settings,
+    duration_s: Option<f64>,
     observer: &dyn Observer,
 ) -> Result<(PathSet, PathParameters), Failure> {
-    let tracer = PathTracer::new(TracerConfig {
-        rays: settings.rays,
-        seed: settings.seed,
-        duration_s: settings.duration_s.unwrap_or(LONGEST_S),
-        image_order: settings.image_order,
-        diffraction: settings.diffraction,
-        allow_leaks: settings.allow_leaks,
-        ..TracerConfig::default()
-    })?;
     let Ends { source, receiver, .. } = ends;
-    if settings.duration_s.is_none() {
+    if duration_s.is_none() {
         return Ok(tracer.trace_until_t30(&room.scene, source, receiver, conditions, observer)?);
     }
     // Refuses volumes that no room has, as a mesh in another unit.

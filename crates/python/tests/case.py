@@ -1,5 +1,6 @@
 """What several test files need: the fixtures, boxes, decays of closed form, and refusals in words."""
 
+import re
 import unittest
 from pathlib import Path
 
@@ -47,5 +48,5 @@ class Case(unittest.TestCase):
     """A test that can say that a call is refused, and in which words."""
 
     def assert_refused(self, words, call, *arguments, error=ValueError, **named):
-        with self.subTest(words), self.assertRaisesRegex(error, words):
+        with self.subTest(words), self.assertRaisesRegex(error, re.compile(words, re.DOTALL)):
             call(*arguments, **named)

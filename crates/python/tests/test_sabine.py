@@ -5,9 +5,7 @@
 
 import json
 import os
-import shutil
 import signal
-import struct
 import sys
 import tempfile
 import threading
@@ -37,15 +35,6 @@ from case import (
 def read_wav(path):
     with wave.open(str(path)) as file:
         return np.frombuffer(file.readframes(file.getnframes()), np.int16), file.getframerate()
-
-
-def delay_wav(path, delay_s):
-    """Puts silence before the sound, whatever form its samples have."""
-    head, data = path.read_bytes().split(b"data", 1)
-    rate_hz, _, frame_bytes = struct.unpack("<IIH", head[head.index(b"fmt ") + 12 :][:10])
-    sound = bytes(round(delay_s * rate_hz) * frame_bytes) + data[4:]
-    head = head[:4] + struct.pack("<I", len(head) + len(sound)) + head[8:]
-    path.write_bytes(head + b"data" + struct.pack("<I", len(sound)) + sound)
 
 
 class Measure(unittest.TestCase):
@@ -222,21 +211,6 @@ class Fit(unittest.TestCase):
         self.assertIn("not reached at 1000 Hz", repr(fitted))
 
 
-class Diagnose(unittest.TestCase):
-    def test_a_latency_in_the_recordings_is_named(self):
-        with tempfile.TemporaryDirectory() as folder:
-            room = Path(folder, "room")
-            shutil.copytree(FIXTURES / "room", room)
-            for path in (room / "ir").glob("*.wav"):
-                delay_wav(path, 0.005)
-            found = sabine.diagnose(room, rays=1000, effects=["time_zero", "sound_speed", "channel_fault"])
-        self.assertEqual((found.verdict, found.causes[0]["effect"]), ("explained", "time_zero"))
-        self.assertLess(abs(found.causes[0]["parameters"]["latency"]["value"] - 5.0), 0.2)
-        self.assertRegex(repr(found), "time_zero .*\n    latency 5")
-        self.assertIn("latency", found.extended_model)
-        json.dumps(found.data)
-
-
 class BadInput(Case):
     def test_samples_are_refused_in_words(self):
         tone = np.ones(1000, np.float32)
@@ -302,7 +276,7 @@ class BadInput(Case):
         self.assert_refused("sample_rate", trace, SOURCE_M, RECEIVER_M, sample_rate=-1)
         self.assert_refused("image_order", trace, SOURCE_M, RECEIVER_M, image_order=11)
 
-    def test_fits_and_diagnoses_are_refused_in_words(self):
+    def test_fits_are_refused_in_words(self):
         box = diffuse_box(0.2)
         ends = {"source": SOURCE_M, "receiver": RECEIVER_M}
         tone = np.ones(1000, np.float32)
@@ -317,15 +291,9 @@ class BadInput(Case):
         self.assert_refused("responses\\[0\\]: expected", sabine.fit, box, responses=[(SOURCE_M, RECEIVER_M)])
         self.assert_refused("responses\\[0\\]: .*no direct sound", sabine.fit, box, responses=[(SOURCE_M, RECEIVER_M, 0 * tone, 48e3)])
         self.assert_refused("room: expected a Room", sabine.fit, "box", 0.5)
-        self.assert_refused("no measured responses", sabine.diagnose, box)
-        self.assert_refused("no effect \"gremlins\"", sabine.diagnose, FIXTURES / "room", effects=["gremlins"])
-        self.assert_refused("effects: expected a list", sabine.diagnose, FIXTURES / "room", effects="time_zero")
-        self.assert_refused("rays", sabine.diagnose, FIXTURES / "room", rays=1)
-        self.assert_refused("nobody", sabine.diagnose, FIXTURES / "room", hold_out=["nobody"])
 
     def test_a_file_that_is_missing_is_an_os_error_with_its_name(self):
         self.assert_refused("nowhere", sabine.Room.read, "nowhere", error=FileNotFoundError)
-        self.assert_refused("nowhere", sabine.diagnose, "nowhere", error=FileNotFoundError)
         with tempfile.TemporaryDirectory() as folder:
             Path(folder, "room.toml").write_text("[room]\nmesh = 3\n")
             self.assert_refused("room.toml", sabine.Room.read, folder)

@@ -70,6 +70,11 @@ class Deconvolution(Case):
         self.assertLess(np.abs(level_db[inside]).max(), 0.1)
         self.assertEqual((found.left_out, found.clock_drift_ppm, len(found.differences_db)), ((), None, 0))
 
+    def test_a_loopback_without_latency_is_a_pulse_at_its_beginning(self):
+        sweep = sabine.Sweep(duration_s=1.0, silence_s=0.5)
+        found = sweep.deconvolve(sweep.playback(), RATE_HZ)
+        self.assertEqual((found.start_s, np.argmax(found.responses[0])), (0.0, 0))
+
     def test_repetitions_are_averaged_and_one_that_differs_is_left_out(self):
         noise = np.random.default_rng(1)
         sweep = sabine.Sweep(duration_s=0.5, silence_s=0.5, repetitions=3)

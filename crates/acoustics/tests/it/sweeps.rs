@@ -271,6 +271,21 @@ fn recordings_that_are_no_measurement_say_why() {
     assert!(matches!(deconvolve(&[], &sweep, &Default::default()), Err(Error::Empty { .. })));
 }
 
+/// The pulse of a loopback rings before its peak, the longer the narrower the sweep.
+#[test]
+fn a_loopback_without_latency_is_no_late_recording() {
+    for to_hz in [100.0, 500.0, 4000.0, 15_900.0] {
+        for repetitions in [1, 3] {
+            let config = SweepConfig { to_hz, duration_s: 1.0, silence_s: 0.5, repetitions, ..settings() };
+            let sweep = ExponentialSweep::new(config).unwrap();
+            let found = deconvolve(&[sweep.playback().unwrap()], &sweep, &Default::default()).unwrap();
+            let samples = found.responses[0].samples();
+            let peak = (0..samples.len()).max_by(|&a, &b| samples[a].total_cmp(&samples[b])).unwrap();
+            assert_eq!((found.start_s, peak), (0.0, 0), "{to_hz} Hz, {repetitions} times");
+        }
+    }
+}
+
 /// Sweeps at full scale, of 16 bits, and loud speech-like noise are not clipped.
 #[test]
 fn what_is_loud_is_not_clipped() {

@@ -123,15 +123,13 @@ def diagnose(
         KeyboardInterrupt: somebody pressed Ctrl-C.
     """
     room = room if isinstance(room, Room) else Room.read(room)
-    if isinstance(model, Diagnosis):
-        model = model.extended_model
     settings = {
         "rays": _inputs.count(rays, "rays"),
         "effects": None if effects is None else _names(effects, "effects"),
         "hold_out": _names(hold_out, "hold_out"),
-        "laws": None if laws is None else _inputs.document(laws, "laws", _sabine.Laws),
-        "discover": discover or ("if_needed" if effects is None else "never"),
-        "model": None if model is None else _inputs.document(model, "model", _sabine.ExtendedModel),
+        "laws": _inputs.laws(laws),
+        "discover": str(discover or ("if_needed" if effects is None else "never")),
+        "model": _inputs.model(model),
         "seed": _inputs.count(seed, "seed"),
         "allow_leaks": allow_leaks,
     }

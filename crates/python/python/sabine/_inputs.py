@@ -7,6 +7,8 @@ from typing import List, Sequence, Union
 
 import numpy as np
 
+from . import _sabine
+
 #: A position (x, y, z) in metres, or the name of a source or receiver of the room.
 Place = Union[str, Sequence[float], np.ndarray]
 #: The path of a TOML file, or its text: a string that has a line break.
@@ -130,6 +132,18 @@ def document(values: Document, name: str, kind):
     if isinstance(values, (str, os.PathLike)):
         return kind.read(values)
     raise ValueError(f"{name}: expected a path or the text of a TOML file, found {values!r}")
+
+
+def model(values):
+    """An extended model: a document, or a diagnosis, which has one; None stays."""
+    if values is None:
+        return None
+    return document(getattr(values, "extended_model", values), "model", _sabine.ExtendedModel)
+
+
+def laws(values: Document | None):
+    """Laws of a document; None stays."""
+    return None if values is None else document(values, "laws", _sabine.Laws)
 
 
 def count(value, name: str) -> int:

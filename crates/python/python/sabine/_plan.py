@@ -84,7 +84,7 @@ def plan(
     sources: int = 0,
     candidates: int = 60,
     clearance_m: float = 0.5,
-    places_m: Sequence[Sequence[float]] | np.ndarray = (),
+    places_m: Sequence[Sequence[float]] | np.ndarray | None = None,
     minutes: Mapping[str, float] | None = None,
     rays: int = 2_000,
     seed: int = 0,
@@ -115,15 +115,16 @@ def plan(
         KeyboardInterrupt: somebody pressed Ctrl-C.
     """
     room = room if isinstance(room, Room) else Room.read(room)
-    places = np.asarray(places_m)
-    places = _inputs.table(places, "places_m", (None, 3)).tolist() if places.size else []
+    minutes = {} if minutes is None else minutes
+    if not isinstance(minutes, Mapping):
+        raise ValueError(f"minutes: expected a mapping from kinds to minutes, found {minutes!r}")
     settings = {
         "microphones": _inputs.count(microphones, "microphones"),
         "sources": _inputs.count(sources, "sources"),
         "candidates": _inputs.count(candidates, "candidates"),
         "clearance_m": _inputs.number(clearance_m, "clearance_m"),
-        "places_m": places,
-        "minutes": {kind: _inputs.number(value, f"minutes of {kind}") for kind, value in (minutes or {}).items()},
+        "places_m": [] if places_m is None else _inputs.table(places_m, "places_m", (None, 3)).tolist(),
+        "minutes": {str(kind): _inputs.number(value, f"minutes of {kind}") for kind, value in minutes.items()},
         "rays": _inputs.count(rays, "rays"),
         "seed": _inputs.count(seed, "seed"),
         "allow_leaks": allow_leaks,
@@ -138,6 +139,8 @@ def _question(diagnosis: Diagnosis, room: Room) -> tuple:
         raise ValueError(f"diagnosis: expected a Diagnosis, found {diagnosis!r}")
     if set(diagnosis.data["materials"]) != set(room.surfaces):
         raise ValueError("diagnosis: it is of a room of other materials")
+    if not np.array_equal(diagnosis.data["bands_hz"], room.bands_hz):
+        raise ValueError("diagnosis: it is of a room of other bands")
 
     def named(found: List[dict]) -> list:
         return [(one["effect"], one.get("subject")) for one in found]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import Dict, Mapping, Sequence, Tuple, Union
+from typing import TYPE_CHECKING, Dict, Mapping, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from . import _inputs, _plots, _pyroomacoustics, _sabine
 from ._directivity import Pattern, handle_of
 from ._inputs import Document, Place
 from ._response import Response
+
+if TYPE_CHECKING:
+    from ._diagnosis import Diagnosis
 
 #: Octaves of a room's tables and of fits, 125 Hz to 8 kHz.
 ROOM_OCTAVES = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0)
@@ -139,6 +142,7 @@ class Room:
         receiver_directivity: Pattern | None = None,
         receiver_axis: Sequence[float] | None = None,
         laws: Document | None = None,
+        model: Document | Diagnosis | None = None,
         rays: int = 20_000,
         seed: int = 0,
         sample_rate: float = 48_000,
@@ -162,6 +166,9 @@ class Room:
             receiver_axis: where it faces, likewise; by default as the room file states, or else towards the source.
             laws: formulas that change what paths carry, ``[[laws]]`` in TOML: a file, a folder of such files, or the text of one
                 (docs/how-to/own-law.md). Response, parameters and decay are those under them.
+            model: the extended model of a diagnosis of this room folder: a file, the text of one, or the diagnosis itself. The room is as
+                it says; source and receiver are names. Loudspeaker, noise and recorder are in ``samples`` alone; parameters and decay
+                are those of the paths. A law of ``laws`` takes the place of one of the same ``id`` in it.
             rays: 1 to 100 million; the standard error falls with its square root.
             seed: of rays and noise.
             sample_rate: of the response, 8 to 96 kHz.
@@ -172,8 +179,9 @@ class Room:
 
         Raises:
             ValueError: a place outside the room or on a surface, an axis without length, an unknown pattern, or a setting out of
-                range; a law that cannot be read or does not fit the room: the message names the law and the column of its formula.
-            OSError: the file of laws is missing or cannot be read.
+                range; a law or a model that cannot be read or does not fit the room: the message names the law and the column of its
+                formula, or the field; a model with waves.
+            OSError: the file of laws or of the model is missing or cannot be read.
             KeyboardInterrupt: somebody pressed Ctrl-C.
         """
         settings = {
@@ -197,8 +205,8 @@ class Room:
             end("source", source, source_directivity, source_axis),
             end("receiver", receiver, receiver_directivity, receiver_axis),
         )
-        laws = None if laws is None else _inputs.document(laws, "laws", _sabine.Laws)
-        return Response._of(_sabine.trace(self._handle, *ends, laws, settings))
+        beside = {"laws": _inputs.laws(laws), "model": _inputs.model(model)}
+        return Response._of(_sabine.trace(self._handle, *ends, beside, settings))
 
     def plot(self, ax=None):
         """Draws the absorption of each surface over frequency, with its standard deviation; returns the axes (new ones by default)."""

@@ -127,7 +127,7 @@ def trace(
     room: Room,
     source: dict[str, Any],
     receiver: dict[str, Any],
-    laws: Optional[Laws],
+    beside: dict[str, Any],
     settings: dict[str, Any],
 ) -> dict[str, Any]: ...
 def fit_t60(
