@@ -24,7 +24,7 @@ impl Directivity {
             "figure_of_eight" => Pattern::FIGURE_OF_EIGHT,
             other => {
                 return Err(refused(format!(
-                    "directivity: {other:?} is none of omni, subcardioid, cardioid, supercardioid, hypercardioid, figure_of_eight"
+                    "name: {other:?} is none of omni, subcardioid, cardioid, supercardioid, hypercardioid, figure_of_eight"
                 )));
             }
         };

@@ -73,8 +73,9 @@ impl Modelled {
         receiver: &Receiver,
     ) -> Result<Conditions<'a>, Failure> {
         let named = |what: &str| refused(format!("{what}: with a model it is a name of the room"));
-        let from = self.room.sources.iter().position(|known| known.id == source.id);
-        let to = self.room.receivers.iter().position(|known| known.id == receiver.id);
+        // A position has a name, too, which one of the room may have by chance.
+        let from = self.room.sources.iter().position(|known| known == source);
+        let to = self.room.receivers.iter().position(|known| known == receiver);
         let (from, to) = (from.ok_or_else(|| named("source"))?, to.ok_or_else(|| named("receiver"))?);
         Ok(self.extended.conditions(materials, from, to))
     }

@@ -46,6 +46,16 @@ pub struct End<'py> {
     axis: Option<[f64; 3]>,
 }
 
+impl End<'_> {
+    fn check_as_the_model_has_it(&self, what: &str) -> Result<(), Failure> {
+        match (&self.directivity, self.axis) {
+            (None, None) => Ok(()),
+            (Some(_), _) => Err(refused(format!("{what}_directivity: the model says it; give one of both"))),
+            (None, Some(_)) => Err(refused(format!("{what}_axis: the model says it; give one of both"))),
+        }
+    }
+}
+
 /// What is read from paths; in Python a dictionary, which `sabine.Parameters` takes.
 #[derive(IntoPyObject)]
 struct Parameters<'py> {
@@ -105,6 +115,10 @@ pub fn trace<'py>(
     let modelled =
         beside.model.as_ref().map(|model| Modelled::new(model, room, beside.laws())).transpose()?;
     let room = modelled.as_ref().map_or(room, |modelled| &modelled.room);
+    if modelled.is_some() {
+        source.check_as_the_model_has_it("source")?;
+        receiver.check_as_the_model_has_it("receiver")?;
+    }
     let ends = Ends::new(room, &source, &receiver)?;
     let materials = room.materials(room.bands());
     // The model has the laws.

@@ -105,7 +105,7 @@ class Patterns(Case):
     def test_patterns_are_refused_in_words(self):
         make = sabine.Directivity
         self.assert_refused("\"kardioid\" is none of omni", make, "kardioid")
-        self.assert_refused("directivity: expected a name", make, 3)
+        self.assert_refused("name: expected that of a pattern", make, 3)
         self.assert_refused("share", make.first_order, 1.5)
         self.assert_refused("omni_share: shape \\(2,\\)", make.first_order, [0.5, 0.5])
         self.assert_refused("angle", make.axisymmetric, [0, 90], [[0, 0]], [1000])

@@ -131,6 +131,8 @@ class Rendering(Case):
         refused("model: it is of a room folder", room=diffuse_box(0.2), ends=((1, 1, 1), (2, 2, 2)))
         refused("source: with a model it is a name", ends=((2.0, 2.0, 1.0), "corner"))
         refused("receiver: with a model it is a name", ends=("talker", (2.0, 2.0, 1.0)))
+        refused("source_directivity: the model says it", source_directivity="cardioid")
+        refused("receiver_axis: the model says it", receiver_axis=(1, 0, 0))
         refused("model: its response below 120 Hz is that of waves", "wave_below_hz = 120")
         refused("model: .*temperature_c", "temperature_c = 900")
         refused("model: .*nobody", "position = { place = \"nobody\", position_m = [1, 1, 1] }")

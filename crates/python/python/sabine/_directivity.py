@@ -28,7 +28,7 @@ class Directivity:
 
     def __init__(self, name: str):
         if not isinstance(name, str):
-            raise ValueError(f"directivity: expected a name or a Directivity, found {name!r}")
+            raise ValueError(f"name: expected that of a pattern, found {name!r}")
         self._handle = _sabine.Directivity.named(name)
 
     @classmethod

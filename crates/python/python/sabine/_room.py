@@ -167,7 +167,7 @@ class Room:
             laws: formulas that change what paths carry, ``[[laws]]`` in TOML: a file, a folder of such files, or the text of one
                 (docs/how-to/own-law.md). Response, parameters and decay are those under them.
             model: the extended model of a diagnosis of this room folder: a file, the text of one, or the diagnosis itself. The room is as
-                it says; source and receiver are names. Loudspeaker, noise and recorder are in ``samples`` alone; parameters and decay
+                it says; source and receiver are names, without directivity or axis of their own. Loudspeaker, noise and recorder are in ``samples`` alone; parameters and decay
                 are those of the paths. A law of ``laws`` takes the place of one of the same ``id`` in it.
             rays: 1 to 100 million; the standard error falls with its square root.
             seed: of rays and noise.
