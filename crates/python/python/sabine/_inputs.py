@@ -40,7 +40,7 @@ MAX_CHANNELS = 64
 
 
 def channels(values, name: str) -> List[np.ndarray]:
-    """Channels of one length: a single one, a list of them, or an array of shape (channels, samples)."""
+    """A single channel, a list of them, or an array of shape (channels, samples)."""
     is_list_of_arrays = isinstance(values, (list, tuple)) and all(isinstance(one, np.ndarray) for one in values)
     if is_list_of_arrays:
         rows = list(values)
@@ -104,10 +104,7 @@ def table(values, name: str, shape: tuple) -> np.ndarray:
 
 def position(values, name: str) -> list:
     """Three coordinates in metres."""
-    array = np.asarray(values)
-    if array.shape != (3,) or array.dtype.kind not in "fiu":
-        raise ValueError(f"{name}: expected 3 coordinates in metres, found {values!r}")
-    return array.tolist()
+    return _triple(values, name, "3 coordinates in metres")
 
 
 def place(values: Place, name: str) -> Union[str, list]:
@@ -117,11 +114,13 @@ def place(values: Place, name: str) -> Union[str, list]:
 
 def axis(values, name: str) -> Union[list, None]:
     """The components of a direction, of any length; None stays."""
-    if values is None:
-        return None
-    array = np.asarray(values)
+    return None if values is None else _triple(values, name, "the 3 components of a direction")
+
+
+def _triple(values, name: str, expected: str) -> list:
+    array = _array(values, name)
     if array.shape != (3,) or array.dtype.kind not in "fiu":
-        raise ValueError(f"{name}: expected the 3 components of a direction, found {values!r}")
+        raise ValueError(f"{name}: expected {expected}, found {values!r}")
     return array.tolist()
 
 

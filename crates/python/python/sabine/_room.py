@@ -166,9 +166,10 @@ class Room:
             receiver_axis: where it faces, likewise; by default as the room file states, or else towards the source.
             laws: formulas that change what paths carry, ``[[laws]]`` in TOML: a file, a folder of such files, or the text of one
                 (docs/how-to/own-law.md). Response, parameters and decay are those under them.
-            model: the extended model of a diagnosis of this room folder: a file, the text of one, or the diagnosis itself. The room is as
-                it says; source and receiver are names, without directivity or axis of their own. Loudspeaker, noise and recorder are in ``samples`` alone; parameters and decay
-                are those of the paths. A law of ``laws`` takes the place of one of the same ``id`` in it.
+            model: the extended model of a diagnosis of this room folder: a file, the text of one, or the diagnosis itself
+                (docs/how-to/extended-model.md). The room is as it says; source and receiver are names, without directivity or axis of
+                their own. Loudspeaker, noise and recorder are in ``samples`` alone; parameters and decay are those of the paths. A law
+                of ``laws`` takes the place of one of the same ``id`` in it.
             rays: 1 to 100 million; the standard error falls with its square root.
             seed: of rays and noise.
             sample_rate: of the response, 8 to 96 kHz.
@@ -193,17 +194,9 @@ class Room:
             "diffraction": diffraction,
             "allow_leaks": allow_leaks,
         }
-
-        def end(name: str, place: Place, directivity: Pattern | None, axis) -> dict:
-            return {
-                "place": _inputs.place(place, name),
-                "directivity": handle_of(directivity, f"{name}_directivity"),
-                "axis": _inputs.axis(axis, f"{name}_axis"),
-            }
-
         ends = (
-            end("source", source, source_directivity, source_axis),
-            end("receiver", receiver, receiver_directivity, receiver_axis),
+            _end("source", source, source_directivity, source_axis),
+            _end("receiver", receiver, receiver_directivity, receiver_axis),
         )
         beside = {"laws": _inputs.laws(laws), "model": _inputs.model(model)}
         return Response._of(_sabine.trace(self._handle, *ends, beside, settings))
@@ -222,6 +215,15 @@ class Room:
             f"{type(self).__name__}({size} m, {self.volume_m3:.4g} m³, {len(self.surfaces)} surfaces, "
             f"{len(self.sources)} sources, {len(self.receivers)} receivers, {self._handle.responses} responses)"
         )
+
+
+def _end(name: str, place: Place, directivity: Pattern | None, axis) -> dict:
+    """A source or a receiver, as the compiled half takes it."""
+    return {
+        "place": _inputs.place(place, name),
+        "directivity": handle_of(directivity, f"{name}_directivity"),
+        "axis": _inputs.axis(axis, f"{name}_axis"),
+    }
 
 
 class ShoeBox(Room):

@@ -39,7 +39,7 @@ class Table:
             f"{name:<20}" + "".join(f"{'-' if np.isnan(v) else format(v, '.3f'):>9}" for v in readings)
             for name, readings in quantities
         ]
-        places = {}
+        places: Dict[str, list] = {}
         for name, readings in quantities:
             for hz, why in readings.missing.items():
                 places.setdefault(why, []).append(f"{name} {hz:g}")
