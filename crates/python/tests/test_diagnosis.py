@@ -165,13 +165,14 @@ class Plans(Case):
 
     def test_after_a_diagnosis_it_weighs_what_decides_between_its_causes(self):
         effects = [{"effect": "sound_speed", "subject": None}, {"effect": "transducer_response", "subject": None}]
+        haze = {"effect": "haze", "subject": None}
         room = sabine.Room.read(self.ROOM)
         data = {
             "bands_hz": room.bands_hz.tolist(),
             "materials": dict.fromkeys(room.surfaces),
             "causes": effects[:1],
             "alternatives": [one["effect"] for one in effects],
-            "candidates": effects,
+            "candidates": [haze, *effects],
         }
         places_m = [(3.0, 3.0, 1.5), (4.0, 4.5, 1.2), (5.0, 1.0, 1.4), (2.0, 2.5, 1.0)]
         ask = lambda **changed: sabine.plan(
@@ -185,7 +186,7 @@ class Plans(Case):
         self.assert_refused("diagnosis: .*materials", ask, materials={})
         self.assert_refused("diagnosis: .*bands", ask, bands_hz=[1000.0])
         self.assert_refused("two hypotheses", ask, alternatives=[], candidates=[])
-        self.assert_refused("another one", ask, causes=[{"effect": "gremlins"}], alternatives=[])
+        self.assert_refused("diagnosis: its cause haze is no effect", ask, causes=[haze], alternatives=[])
 
     def test_what_cannot_be_planned_is_refused_in_words(self):
         refused = lambda words, *given, room=self.ROOM, **more: self.assert_refused(words, sabine.plan, room, *given, **more)

@@ -10,7 +10,7 @@ from typing import List, Mapping, Sequence
 import numpy as np
 
 from . import _inputs, _plots, _sabine
-from ._diagnosis import Diagnosis
+from ._diagnosis import Diagnosis, effects
 from ._room import Room
 
 #: Measurements that are printed.
@@ -97,7 +97,7 @@ def plan(
 
     Args:
         room: a room folder with sources, or what :meth:`Room.read` made of one; measured responses are not needed without ``diagnosis``.
-        diagnosis: a diagnosis of this room.
+        diagnosis: a diagnosis of this room. Laws that were weighed in it are passed over.
         microphones: places for microphones to choose, 0 to 20.
         sources: places for the first source to choose, 0 to 5.
         candidates: measurements that are weighed, about: 4 to 1000.
@@ -110,8 +110,8 @@ def plan(
 
     Raises:
         OSError: a file is missing or cannot be read.
-        ValueError: the room is no folder or has no source, the diagnosis is of another room or leaves nothing open, or a setting is
-            out of range.
+        ValueError: the room is no folder or has no source, the diagnosis is of another room, names a law as a cause or leaves nothing
+            open, or a setting is out of range.
         KeyboardInterrupt: somebody pressed Ctrl-C.
     """
     room = room if isinstance(room, Room) else Room.read(room)
@@ -134,7 +134,7 @@ def plan(
 
 
 def _question(diagnosis: Diagnosis, room: Room) -> tuple:
-    """Causes, alternatives to them, and all effects that were weighed."""
+    """Causes, alternatives to them, and all effects of the catalogue that were weighed."""
     if not isinstance(diagnosis, Diagnosis):
         raise ValueError(f"diagnosis: expected a Diagnosis, found {diagnosis!r}")
     if set(diagnosis.data["materials"]) != set(room.surfaces):
@@ -142,7 +142,12 @@ def _question(diagnosis: Diagnosis, room: Room) -> tuple:
     if not np.array_equal(diagnosis.data["bands_hz"], room.bands_hz):
         raise ValueError("diagnosis: it is of a room of other bands")
 
+    known = effects()
+    laws = [cause["effect"] for cause in diagnosis.causes if cause["effect"] not in known]
+    if laws:
+        raise ValueError(f"diagnosis: its cause {laws[0]} is no effect of the catalogue; a plan weighs no laws")
+
     def named(found: List[dict]) -> list:
-        return [(one["effect"], one.get("subject")) for one in found]
+        return [(one["effect"], one.get("subject")) for one in found if one["effect"] in known]
 
     return named(diagnosis.causes), diagnosis.data["alternatives"], named(diagnosis.candidates)
