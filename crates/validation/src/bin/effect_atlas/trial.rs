@@ -5,6 +5,7 @@ use crate::task::Task;
 use sabine::diagnose::{Cause, Diagnosis, Verdict};
 use sabine_testkit::{Fault, Hidden, LabConfig, Laboratory};
 use sabine_validation::AnyError;
+use sabine_validation::absorption::absorption_errors;
 use sabine_validation::hiding::{answer, hide, named};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -278,19 +279,4 @@ fn within(cause: &Cause, truths: &[(String, f64)]) -> Vec<bool> {
             Some(p.low <= *truth && *truth <= p.high)
         })
         .collect()
-}
-
-/// Mean absolute error over materials and octaves, under the baseline and beside the causes.
-fn absorption_errors(found: &Diagnosis, lab: &Laboratory, hidden: &[Hidden]) -> Result<[f64; 2], AnyError> {
-    let truth = lab.truth(hidden)?;
-    let (mut before, mut after, mut count) = (0.0, 0.0, 0.0);
-    for (name, fitted) in &found.materials {
-        let Some(material) = truth.materials.iter().find(|m| m.name == *name) else { continue };
-        for (b, wanted) in material.absorption.iter().enumerate() {
-            before += (fitted.absorption_before[b] - wanted).abs();
-            after += (fitted.absorption[b] - wanted).abs();
-            count += 1.0;
-        }
-    }
-    Ok([before / f64::max(count, 1.0), after / f64::max(count, 1.0)])
 }

@@ -5,6 +5,7 @@
 //! several records, of several processes or machines: `--merge`.
 
 mod agreement;
+mod as_law;
 mod change;
 mod judge;
 mod kinds;

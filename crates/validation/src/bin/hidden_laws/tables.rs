@@ -7,6 +7,9 @@ use crate::worlds::Null;
 use clap::ValueEnum;
 use sabine_validation::{exact_interval, median, print_share as share};
 
+/// Classes of how visible laws are beforehand: the least d' of each.
+const VISIBLE: [f64; 4] = [0.0, 6.0, 8.0, 10.0];
+
 /// Prints all tables as Markdown, those of rooms in which a law was always looked for after the others.
 pub fn print(trials: &[Trial]) {
     for discover in [Discover::IfNeeded, Discover::Always] {
@@ -24,6 +27,7 @@ fn print_tables(trials: &[&Trial]) {
     let laws: Vec<&Trial> = trials.iter().copied().filter(|t| t.size.is_some()).collect();
     let nulls: Vec<&Trial> = trials.iter().copied().filter(|t| t.size.is_none()).collect();
     by_kind_and_size(&laws);
+    by_visibility(&laws);
     agreement(&laws);
     shares_of_laws(&laws);
     without_a_law(&nulls);
@@ -110,6 +114,45 @@ fn by_kind_and_size(laws: &[&Trial]) {
     }
 }
 
+/// What comes of laws that are as visible as each other.
+fn by_visibility(laws: &[&Trial]) {
+    let known: Vec<(f64, &Trial)> = laws.iter().filter_map(|t| Some((t.d_prime?, *t))).collect();
+    if known.is_empty() {
+        return;
+    }
+    println!(
+        "\n| d' beforehand | rooms | right law, or named by the catalogue | something true is said | wrong law or name |"
+    );
+    println!("|---|---|---|---|---|");
+    for (place, &low) in VISIBLE.iter().enumerate() {
+        let high = VISIBLE.get(place + 1).copied().unwrap_or(f64::INFINITY);
+        let own: Vec<&Trial> =
+            known.iter().filter(|(d, _)| (low..high).contains(d)).map(|(_, t)| *t).collect();
+        let count = |is: fn(&Trial) -> bool| counted(own.iter().filter(|t| is(t)).count(), own.len());
+        let range = if high.is_finite() { format!("{low} to {high}") } else { format!("{low} and more") };
+        let wrong = |t: &Trial| matches!(t.outcome, Outcome::WrongLaw | Outcome::WrongName);
+        println!(
+            "| {range} | {} | {} | {} | {} |",
+            own.len(),
+            count(is_named),
+            count(says_something_true),
+            count(wrong)
+        );
+    }
+}
+
+/// Whether the law is named, as a law or as an effect of the catalogue.
+fn is_named(trial: &Trial) -> bool {
+    matches!(trial.outcome, Outcome::RightLaw | Outcome::Catalogue)
+}
+
+/// Whether what is said is true: the law, or that something is wrong, or what the misfit goes with.
+fn says_something_true(trial: &Trial) -> bool {
+    is_named(trial)
+        || trial.outcome == Outcome::Unexplained
+        || trial.outcome == Outcome::Adequate && trial.misfit_is_right == Some(true)
+}
+
 /// Sign, edge and level of right laws.
 fn agreement(laws: &[&Trial]) {
     if laws.iter().all(|t| t.outcome != Outcome::RightLaw) {
@@ -151,11 +194,7 @@ fn shares_of_laws(laws: &[&Trial]) {
     share("right law", is(Outcome::RightLaw));
     share("named by the catalogue", is(Outcome::Catalogue));
     share("`unexplained`", is(Outcome::Unexplained));
-    let true_statement = |t: &&Trial| {
-        matches!(t.outcome, Outcome::RightLaw | Outcome::Catalogue | Outcome::Unexplained)
-            || t.outcome == Outcome::Adequate && t.misfit_is_right == Some(true)
-    };
-    share("one of these: something true is said", laws.iter().map(true_statement));
+    share("one of these: something true is said", laws.iter().map(|t| says_something_true(t)));
     share("wrong law", is(Outcome::WrongLaw));
     share("wrong name", is(Outcome::WrongName));
     share("`adequate`", is(Outcome::Adequate));
@@ -165,6 +204,12 @@ fn shares_of_laws(laws: &[&Trial]) {
     }
     share("right laws: sign", laws.iter().filter_map(|t| t.sign_right));
     share("right laws: edge within an octave", laws.iter().filter_map(|t| t.edge_right));
+    let named = laws.iter().filter(|t| is_named(t));
+    let ratio = |t: &&Trial| Some(t.absorption_after? / t.absorption_before?.max(1e-9));
+    let ratios: Vec<f64> = named.filter_map(ratio).collect();
+    if !ratios.is_empty() {
+        println!("| error of fitted absorption, after / before, named (median) | {:.2} | |", median(ratios));
+    }
 }
 
 fn without_a_law(nulls: &[&Trial]) {

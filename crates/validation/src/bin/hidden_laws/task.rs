@@ -1,5 +1,6 @@
 //! One room: drawn, diagnosed, judged.
 
+use crate::as_law::as_law;
 use crate::change::change_db;
 use crate::judge::judge;
 use crate::kinds::KINDS;
@@ -8,6 +9,7 @@ use crate::worlds::{Contents, World, contents, room};
 use sabine::diagnose::{Cause, DiagnoseConfig, Diagnoser, Diagnosis, FitTest};
 use sabine_testkit::Laboratory;
 use sabine_validation::AnyError;
+use sabine_validation::absorption::absorption_errors;
 use sabine_validation::room_tasks::RoomTask;
 use std::path::Path;
 use std::time::Instant;
@@ -69,10 +71,14 @@ impl RoomTask for Task {
             Discover::Always => diagnoser.discovering(),
             Discover::IfNeeded => diagnoser.discovering_if_needed(),
         };
+        let first = contents.hidden.first().filter(|_| contents.law || contents.cause.is_some());
+        let law = first.filter(|_| contents.law).map(|hidden| as_law(hidden, &truth)).transpose()?.flatten();
+        let d_prime = law.map(|law| diagnoser.d_prime_of_law(&measured, &law, &())).transpose()?;
         let found = diagnoser.diagnose(&measured, &[], &())?;
+        let [absorption_before, absorption_after] =
+            absorption_errors(&found, &lab, &contents.hidden)?.map(Some);
         let judged = judge(&found, kind, &contents, &truth)?;
         let change_db = change_by_law(&lab, &contents)?;
-        let first = contents.hidden.first().filter(|_| contents.law || contents.cause.is_some());
         let (size, null) = match self.world {
             World::Law(size) => (Some(size), None),
             World::Null(null) => (None, Some(null)),
@@ -89,6 +95,9 @@ impl RoomTask for Task {
             discover: self.discover,
             hidden: first.map(|hidden| format!("{hidden:?}")).unwrap_or_default(),
             change_db,
+            d_prime,
+            absorption_before,
+            absorption_after,
             surface: first.and_then(|hidden| kind.surface_of(hidden, &truth)).map(str::to_owned),
             verdict: found.verdict.to_string(),
             answer: answer(&found),

@@ -33,6 +33,14 @@ pub struct Trial {
     /// By how much the law changes levels, in dB: the root mean square over responses, octaves and stretches of 20 ms, less the mean.
     #[serde(default)]
     pub change_db: Option<f64>,
+    /// How visible the law is in the decays beforehand, in standard deviations; none for laws of delay.
+    #[serde(default)]
+    pub d_prime: Option<f64>,
+    /// Mean error of fitted absorption over materials and octaves, under the baseline and beside what is named.
+    #[serde(default)]
+    pub absorption_before: Option<f64>,
+    #[serde(default)]
+    pub absorption_after: Option<f64>,
     /// Its material.
     pub surface: Option<String>,
     pub verdict: String,
@@ -84,6 +92,9 @@ impl fmt::Display for Trial {
             "{} {world} seed {}: {:?}: {} [{}]",
             self.kind, self.seed, self.outcome, self.verdict, self.answer
         )?;
+        if let Some(d_prime) = self.d_prime {
+            write!(f, " d' {d_prime:.1}")?;
+        }
         if !self.laws.is_empty() {
             write!(f, " laws [{}]", self.laws)?;
         }
