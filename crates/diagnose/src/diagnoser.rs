@@ -98,10 +98,7 @@ impl Diagnoser {
     /// fit the room is an error of [`Diagnoser::diagnose`].
     pub fn with_laws(mut self, laws: Vec<Law>) -> Result<Self, Error> {
         for law in laws {
-            if self.effects.iter().any(|e| e.id() == law.id()) {
-                let reason = "an effect, or another law, has this identifier".to_owned();
-                return Err(Error::LawNotWeighed { id: law.id().to_owned(), reason });
-            }
+            LawEffect::check_name(&law, &self.effects)?;
             self.push_law(LawEffect::new(law)?);
         }
         Ok(self)

@@ -91,6 +91,47 @@ fn a_campaign_and_an_open_question_are_planned() {
     }
 }
 
+/// A law of the user, and one that a search found, are hypotheses as any other.
+#[test]
+fn laws_are_planned_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let fixture = MeasuredRoom::read(ROOM).unwrap();
+    let materials: Vec<String> = fixture.scene().materials().iter().map(|m| m.name.clone()).collect();
+    let bands: Vec<f64> = fixture.bands().iter_hz().collect();
+    let haze = "id = \"haze\"\ntarget = \"path\"\nformula = \"-a * length_m\"\n";
+    let laws = folder.path().join("laws.toml");
+    let parameters = "parameters = { a = { value = 0.1, low = 0, high = 1, unit = \"dB/m\" } }";
+    std::fs::write(&laws, format!("[[laws]]\n{haze}{parameters}\n")).unwrap();
+    let mut open = diagnosis(&materials, &bands, ["haze", "transducer_response"]);
+    let file = folder.path().join("diagnosis.json");
+    let asks = |open: &Value, out: &str, more: &[&str]| -> Value {
+        std::fs::write(&file, open.to_string()).unwrap();
+        let common = ["--room", ROOM, "--diagnosis", file.to_str().unwrap(), "--microphones", "1"];
+        let (_, plan) =
+            succeeds(&[&common[..], &["--clearance", "0.4"], more].concat(), &folder.path().join(out));
+        assert!(plan["candidates"][0]["nats"].as_f64().unwrap() > 0.0);
+        plan["question"]["leading"].clone()
+    };
+    let leading = asks(&open, "given", &["--laws", laws.to_str().unwrap()]);
+    assert_eq!(leading[0]["effect"], "haze");
+    // As `diagnosis.json` has a law that a search found; the planner is told of no other.
+    open["causes"] = json!([{ "effect": "unknown_law", "subject": "reflections go with an angle" }]);
+    open["alternatives"] = json!([]);
+    open["candidates"] = json!([{ "effect": "haze", "subject": null }, { "effect": "unknown_law", "subject": null },
+        { "effect": "air_absorption", "subject": null }]);
+    open["laws"] = json!([{ "id": "grazing", "target": "reflection", "surface": materials[0], "words": "Says so.",
+        "formula": "-a * (1 - cos_incidence)^2", "evidence_nats": 20.0, "points": [],
+        "parameters": { "a": { "value": 5.0, "low": 3.0, "high": 7.0, "unit": "dB" } } }]);
+    let leading = asks(&open, "found", &[]);
+    assert_eq!(leading.as_array().unwrap().len(), 2, "{leading}");
+    assert_eq!((&leading[0]["effect"], &leading[1]["effect"]), (&json!("grazing"), &json!("air_absorption")));
+    // A law that the diagnosis names and nobody gives.
+    let open = diagnosis(&materials, &bands, ["haze", "transducer_response"]);
+    std::fs::write(&file, open.to_string()).unwrap();
+    let out = folder.path().join("out");
+    refuses(&["--room", ROOM, "--diagnosis", file.to_str().unwrap()], &out, "a law that is not given here");
+}
+
 #[test]
 fn bad_input_is_named() {
     let folder = tempfile::tempdir().unwrap();

@@ -39,10 +39,10 @@ pub enum PlanError {
     /// Source places are judged by the microphones that hear them.
     #[error("a place for a source is asked for, but room.toml has no receivers: place microphones first")]
     NoReceiver,
-    /// A hypothesis is none of this room's: the diagnosis is of another room or of another version.
-    #[error("{} in this room: is the diagnosis of another one?", match subject {
-        Some(subject) => format!("the catalogue has no case {effect} of {subject:?}"),
-        None => format!("the catalogue has no effect {effect:?}"),
+    /// A hypothesis is none of this room's: the diagnosis is of another room or version, or of a law that is not given here.
+    #[error("{} in this room: is the diagnosis of another one, or of a law that is not given here?", match subject {
+        Some(subject) => format!("no effect has a case {effect} of {subject:?}"),
+        None => format!("there is no effect {effect:?}"),
     })]
     UnknownHypothesis {
         /// Identifier of the effect.

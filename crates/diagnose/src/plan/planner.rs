@@ -1,7 +1,7 @@
 //! The whole plan: candidates, prospects, expected nats, the choice, the report.
 
 use crate::effect::{Case, Effect, Nuisance};
-use crate::effects::catalogue;
+use crate::effects::{LawEffect, catalogue};
 use crate::infer::baseline::Baseline;
 use crate::infer::candidates::{CatalogueCase, cases as all_cases};
 use crate::plan::campaign::Campaign;
@@ -18,6 +18,7 @@ use crate::plan::prospect::{Fitted, Setting};
 use crate::plan::scales::Scales;
 use crate::simulate::scene_tracer::{Rays, SceneTracer};
 use sabine_acoustics::Observer;
+use sabine_paths::laws::Law;
 use sabine_propagate::MeshScene;
 use sabine_scene::{MeasuredRoom, Receiver};
 use std::sync::Arc;
@@ -62,6 +63,25 @@ impl Planner {
     #[must_use]
     pub fn with_effects(self, effects: Vec<Box<dyn Effect>>) -> Self {
         Self { effects, ..self }
+    }
+
+    /// With laws beside its effects: each is a cause of its own ([`LawEffect`]), its edges of bands where they are written.
+    ///
+    /// # Errors
+    /// [`crate::Error::LawNotWeighed`] in [`PlanError::Diagnose`] for a law that is none of [`LawEffect`], or whose identifier an effect or
+    /// another law has. A law that does not fit the room is an error of [`Planner::plan`].
+    pub fn with_laws(mut self, laws: Vec<Law>) -> Result<Self, PlanError> {
+        for law in laws {
+            LawEffect::check_name(&law, &self.effects)?;
+            self.effects.push(Box::new(LawEffect::with_edges_as_written(&law)?));
+        }
+        Ok(self)
+    }
+
+    /// Whether an effect or a law has this identifier.
+    #[must_use]
+    pub fn knows(&self, id: &str) -> bool {
+        self.effects.iter().any(|effect| effect.id() == id)
     }
 
     /// With another tracer than that of `sabine-propagate`.

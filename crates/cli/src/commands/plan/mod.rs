@@ -8,10 +8,11 @@ use crate::bar::Bar;
 use crate::commands::diagnose::words;
 use crate::demo::Demo;
 use crate::failure::Failure;
+use crate::laws::naming_laws;
 use crate::output::OutputFolder;
 use crate::room::RoomArguments;
 use clap::Args;
-use sabine::diagnose::{CostTable, DiagnoseConfig, EffectSize, Plan, PlanConfig, Planner};
+use sabine::diagnose::{CostTable, DiagnoseConfig, EffectSize, Plan, PlanConfig, Planner, read_laws};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -26,6 +27,9 @@ pub struct Arguments {
     /// A diagnosis.json of this room: plan what decides between its leading causes [default: plan for all causes of the catalogue]
     #[arg(long, value_name = "F")]
     diagnosis: Option<PathBuf>,
+    /// Formulas that are causes beside the catalogue, `[[laws]]` in TOML: a file, or a folder of such files
+    #[arg(long, value_name = "F")]
+    laws: Option<PathBuf>,
     /// Minutes that each kind of measurement takes, as TOML: microphone_min, source_min, source_turned_min, climate_min
     #[arg(long, value_name = "F")]
     cost: Option<PathBuf>,
@@ -76,7 +80,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         allow_leaks: arguments.allow_leaks,
         ..DiagnoseConfig::default()
     };
-    let planner = Planner::new(PlanConfig {
+    let laws = arguments.laws.as_ref().map(read_laws).transpose()?.unwrap_or_default();
+    let mut planner = Planner::new(PlanConfig {
         diagnose,
         microphones: arguments.microphones,
         sources: arguments.sources,
@@ -85,12 +90,22 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         cost,
         ..PlanConfig::default()
     })?;
+    let file = arguments.laws.as_deref();
+    planner = planner.with_laws(laws).map_err(|error| naming_laws(error.into(), file))?;
     // A folder that cannot be written to should not cost the user a computation first.
     let mut out = OutputFolder::create(&arguments.out)?;
     let (room, name) = arguments.room.read(&mut demo)?;
-    let question = arguments.diagnosis.as_ref().map(|path| open_question::read(path, &room)).transpose()?;
+    let mut question = None;
+    if let Some(path) = &arguments.diagnosis {
+        let (asked, mut found) = open_question::read(path, &room, |id| planner.knows(id))?;
+        found.retain(|law| !planner.knows(law.id()));
+        planner = planner.with_laws(found).map_err(|error| naming_laws(error.into(), Some(path)))?;
+        question = Some(asked);
+    }
     let bar = Bar::new();
-    let plan = planner.plan(&room, question.as_ref(), &bar)?;
+    let plan = planner
+        .plan(&room, question.as_ref(), &bar)
+        .map_err(|error| naming_laws(error.into(), arguments.laws.as_deref()))?;
     bar.finish();
     let json = serde_json::to_string_pretty(&serde_json::to_value(Document { room: &name, plan: &plan })?)?;
     out.write("plan.json", json.as_bytes())?;

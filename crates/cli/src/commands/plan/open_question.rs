@@ -1,8 +1,10 @@
 //! What a diagnosis leaves open, from its file.
 
-use sabine::diagnose::{Hypothesis, OpenQuestion};
+use sabine::diagnose::{Effect, Hypothesis, OpenQuestion, UnknownLaw};
+use sabine::paths::laws::Law;
 use sabine::scene::MeasuredRoom;
 use serde::Deserialize;
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -17,7 +19,12 @@ struct Diagnosis {
     alternatives: Vec<String>,
     candidates: Vec<Hypothesis>,
     materials: BTreeMap<String, serde::de::IgnoredAny>,
+    #[serde(default)]
+    laws: Vec<Value>,
 }
+
+/// What a law has in a file of laws: a diagnosis says more of it.
+const OF_LAW: [&str; 6] = ["id", "target", "surface", "formula", "words", "parameters"];
 
 /// A diagnosis that serves no plan.
 #[derive(Debug, thiserror::Error)]
@@ -38,15 +45,20 @@ pub enum DiagnosisFileError {
     OtherRoom { path: PathBuf, field: &'static str, found: String, expected: String },
 }
 
-/// The open question of a diagnosis of this room.
+/// The open question of a diagnosis of this room, and the laws that it found. A law that was found is a hypothesis by its own identifier; effects
+/// that a planner does not know are no alternatives.
 ///
 /// # Errors
 /// [`DiagnosisFileError`]: the file cannot be read, is no diagnosis, or has other materials or octaves than the room.
-pub fn read(path: &Path, room: &MeasuredRoom) -> Result<OpenQuestion, DiagnosisFileError> {
+pub fn read(
+    path: &Path,
+    room: &MeasuredRoom,
+    knows: impl Fn(&str) -> bool,
+) -> Result<(OpenQuestion, Vec<Law>), DiagnosisFileError> {
     let text = std::fs::read_to_string(path)
         .map_err(|source| DiagnosisFileError::Read { path: path.to_owned(), source })?;
-    let found: Diagnosis = serde_json::from_str(&text)
-        .map_err(|source| DiagnosisFileError::Parse { path: path.to_owned(), source })?;
+    let no_diagnosis = |source| DiagnosisFileError::Parse { path: path.to_owned(), source };
+    let mut found: Diagnosis = serde_json::from_str(&text).map_err(no_diagnosis)?;
     let other = |field, found: String, expected: String| {
         Err(DiagnosisFileError::OtherRoom { path: path.to_owned(), field, found, expected })
     };
@@ -61,5 +73,21 @@ pub fn read(path: &Path, room: &MeasuredRoom) -> Result<OpenQuestion, DiagnosisF
     if bands.len() != found.bands_hz.len() || !bands.iter().zip(&found.bands_hz).all(same) {
         return other("bands_hz", format!("{:?}", found.bands_hz), format!("{bands:?}"));
     }
-    Ok(OpenQuestion::of_diagnosis(&found.causes, &found.alternatives, &found.candidates))
+    let laws = found.laws.iter().map(law).collect::<Result<Vec<Law>, _>>().map_err(no_diagnosis)?;
+    let is_law = |cause: &Hypothesis| cause.effect == UnknownLaw.id();
+    for (cause, law) in found.causes.iter_mut().filter(|cause| is_law(cause)).zip(&laws) {
+        *cause = Hypothesis::of(law.id());
+    }
+    found.candidates.retain(|one| knows(&one.effect));
+    Ok((OpenQuestion::of_diagnosis(&found.causes, &found.alternatives, &found.candidates), laws))
+}
+
+/// A law of a diagnosis, which may have no surface.
+fn law(entry: &Value) -> Result<Law, serde_json::Error> {
+    let own = |(key, value): (&String, &Value)| {
+        (OF_LAW.contains(&key.as_str()) && !value.is_null()).then(|| (key.clone(), value.clone()))
+    };
+    let table: serde_json::Map<String, Value> =
+        entry.as_object().into_iter().flatten().filter_map(own).collect();
+    serde_json::from_value(Value::Object(table))
 }

@@ -101,6 +101,15 @@ impl LawEffect {
         Ok(Self { law })
     }
 
+    /// That no effect beside it has the identifier of a law.
+    pub(crate) fn check_name(law: &Law, effects: &[Box<dyn Effect>]) -> Result<(), Error> {
+        if effects.iter().all(|effect| effect.id() != law.id()) {
+            return Ok(());
+        }
+        let reason = "an effect, or another law, has this identifier".to_owned();
+        Err(Error::LawNotWeighed { id: law.id().to_owned(), reason })
+    }
+
     /// That the edges of a law have no more places between these bands than can be weighed.
     pub(crate) fn check_edges(law: &Law, bands: Bands) -> Result<(), Error> {
         edges::check(law, bands).map_err(|count| Error::LawNotWeighed {
