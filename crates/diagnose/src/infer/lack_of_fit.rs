@@ -80,7 +80,8 @@ pub(crate) fn test(search: &Search<'_>, state: &State, formulas: &Formulas) -> R
     let name = "levels of single responses by octave";
     tests.push(Test { name, subject: farthest, p_value: levels.p_value });
     tests.extend(what_levels_go_with(baseline, &residuals));
-    let found = formulas.best(baseline, &cases, &state.energy, &search.used);
+    let before = (&state.energy, &state.energy_firsts[..]);
+    let found = formulas.best(baseline, &cases, before, &search.used)?;
     let (subject, formula) = found.unzip();
     tests.extend(formula.map(|best: BestFormula| goes_with(subject, best.p_value)));
     let decays_p_value = corrected(&tests);

@@ -74,9 +74,8 @@ impl Grammar {
             .changing(changes))
     }
 
-    /// A formula with other numbers in the place of its covariate, as a case that is fitted as its own: `covariate` is `[pair][band][bin]`, the
-    /// mean over the energy of each bin.
-    pub fn sham(&self, formula: &Formula, survey: &Survey, covariate: Vec<Vec<Vec<f64>>>) -> Case {
+    /// A formula with these numbers for its covariate, `[pair][band][bin]`: one for each bin in the place of one for each path.
+    pub fn case_of_bins(&self, formula: &Formula, survey: &Survey, covariate: Vec<Vec<Vec<f64>>>) -> Case {
         let (parameters, stage) = (self.parameters(formula, survey), self.stage(formula));
         let starts = starts(&parameters);
         let amplitude = self.amplitude(formula, survey);
@@ -264,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sham_takes_its_amplitude_times_its_number_from_each_bin() {
+    fn a_case_of_bins_takes_its_amplitude_times_its_number_from_each() {
         let tables = hand_made::Tables::new(Levels::Absolute, TimeZero::Emission);
         let baseline = tables.baseline(DiagnoseConfig::default());
         let (data, survey, used) = (baseline.energy_data(), baseline.survey(), [true; 3]);
@@ -276,8 +275,8 @@ mod tests {
         let of_band = |pair: usize, band: usize| {
             (0..data.ends[pair][band]).map(|bin| number(pair, band, bin)).collect()
         };
-        let sham = (0..3).map(|pair| (0..2).map(|band| of_band(pair, band)).collect()).collect();
-        let case = grammar.sham(formula, survey, sham);
+        let numbers = (0..3).map(|pair| (0..2).map(|band| of_band(pair, band)).collect()).collect();
+        let case = grammar.case_of_bins(formula, survey, numbers);
         let (cases, plain) = ([&case], EnergyModel::new(&data, &[], &used));
         let model = EnergyModel::new(&data, &cases, &used);
         let mut values = model.start(None);

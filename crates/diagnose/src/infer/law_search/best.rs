@@ -6,7 +6,11 @@ use crate::effect::Case;
 use crate::effects::Grammar;
 use crate::error::Error;
 use crate::infer::baseline::Baseline;
+use crate::likelihood::decay::WarmStart;
 use crate::likelihood::laplace::LaplaceFit;
+
+/// Formulas that are fitted, at most.
+const FITTED: usize = 4;
 
 /// What is said for the best of all formulas beside a fit.
 #[derive(Clone, Copy, Debug)]
@@ -30,17 +34,36 @@ impl Formulas {
         Ok(Self { grammar, features })
     }
 
-    /// What the best of them goes with, in words, beside a fit of the decays under some cases, and what is said for it.
+    /// What the best of them goes with, in words, beside a fit of the decays under some cases, and what is said for it. Those for which the screen
+    /// says most are fitted: where single bins lie far off, its parabola promises what no fit gives.
     pub fn best(
         &self,
         baseline: &Baseline,
         cases: &[&Case],
-        fit: &LaplaceFit,
+        (fit, firsts): (&LaplaceFit, &[usize]),
         used: &[bool],
-    ) -> Option<(String, BestFormula)> {
+    ) -> Result<Option<(String, BestFormula)>, Error> {
+        let survey = baseline.survey();
         let screen = LawScreen::of(baseline, &self.grammar, &self.features, cases, fit, used);
-        let (formula, p_value) = screen.best()?;
-        let subject = self.grammar.subject(&self.grammar.formulas[formula], baseline.survey());
-        Some((subject, BestFormula { nats: screen.nats(formula), p_value }))
+        let mut best: Option<(usize, f64)> = None;
+        for (formula, promised) in screen.best(FITTED) {
+            if best.is_some_and(|(_, nats)| nats > promised) {
+                break;
+            }
+            let case = screen.case((&self.features, survey), (formula, None), &baseline.simulation.ends);
+            let all: Vec<&Case> = cases.iter().copied().chain([&case]).collect();
+            let (more, _) =
+                baseline.fit_energy(&all, used, Some(WarmStart { values: &fit.values, firsts }))?;
+            let gained = more.log_evidence - fit.log_evidence + self.grammar.formulas[formula].ln_prior;
+            let nats = promised.min(gained);
+            if best.is_none_or(|(_, most)| nats > most) {
+                best = Some((formula, nats));
+            }
+        }
+        let told = |(formula, nats): (usize, f64)| {
+            let subject = self.grammar.subject(&self.grammar.formulas[formula], survey);
+            (subject, BestFormula { nats, p_value: screen.p_value(nats) })
+        };
+        Ok(best.map(told))
     }
 }

@@ -149,10 +149,16 @@ impl<'a> LawScreen<'a> {
         self.ranked().into_iter().take(MAX_COMPARED).filter(same).map(|(other, _)| other).collect()
     }
 
-    /// The best of all formulas, and the probability that one as good is found where no law acts.
-    pub fn best(&self) -> Option<(usize, f64)> {
-        let (formula, nats) = self.ranked().into_iter().next()?;
-        Some((formula, tail(nats, &self.drawn())))
+    /// The most promising formulas, the best first.
+    pub fn best(&self, most: usize) -> Vec<(usize, f64)> {
+        let mut ranked = self.ranked();
+        ranked.truncate(most);
+        ranked
+    }
+
+    /// Probability that the best of the whole family has so much evidence where no law acts, beyond what is drawn too.
+    pub fn p_value(&self, nats: f64) -> f64 {
+        tail(nats, &self.drawn())
     }
 
     /// Probability that the best of the whole family is as good as a formula where no law acts.
@@ -178,15 +184,16 @@ impl<'a> LawScreen<'a> {
         ranked
     }
 
-    /// What a sham is in the bins that are compared, `[pair][band][bin]`; empty where none are.
-    pub fn sham_values(
+    /// A formula, or a sham of it, as a case that is fitted: what it takes from each bin is its mean over the energy there. `ends` are the bins that
+    /// are compared.
+    pub fn case(
         &self,
-        features: &Features,
-        sham: &ScreenedSham,
+        (features, survey): (&Features, &Survey),
+        (formula, sham): (usize, Option<Sham>),
         ends: &[Vec<usize>],
-    ) -> Vec<Vec<Vec<f64>>> {
-        let covariate = self.grammar.formulas[sham.formula].covariate;
-        let column = Column { covariate, sham: Some(sham.sham) };
+    ) -> Case {
+        let formula = &self.grammar.formulas[formula];
+        let column = Column { covariate: formula.covariate, sham };
         let of_band = |(pair, band, &count): (usize, usize, &usize)| {
             let known = (features, self.grammar, &self.places);
             column.values(known, (pair, band, count)).filter(|_| count > 0).unwrap_or_default()
@@ -194,7 +201,7 @@ impl<'a> LawScreen<'a> {
         let of_pair = |(pair, ends): (usize, &Vec<usize>)| {
             ends.iter().enumerate().map(|(band, count)| of_band((pair, band, count))).collect()
         };
-        ends.iter().enumerate().map(of_pair).collect()
+        self.grammar.case_of_bins(formula, survey, ends.iter().enumerate().map(of_pair).collect())
     }
 }
 

@@ -129,7 +129,7 @@ fn best_sham(
     for sham in screen.shams().iter().take(FITTED_SHAMS) {
         let formula = &grammar.formulas[sham.formula];
         let case =
-            grammar.sham(formula, survey, screen.sham_values(features, sham, &baseline.simulation.ends));
+            screen.case((features, survey), (sham.formula, Some(sham.sham)), &baseline.simulation.ends);
         let all: Vec<&Case> = cases.iter().copied().chain([&case]).collect();
         let (fit, _) = baseline.fit_energy(&all, &search.used, Some(without.before()))?;
         let nats = fit.log_evidence - without.energy.log_evidence + formula.ln_prior;
