@@ -87,7 +87,7 @@ impl Directivity {
         Ok(PyArray2::from_vec2(py, &directions.iter().map(gains).collect::<Vec<_>>())?)
     }
 
-    /// Directivity index of each band, or of all alike.
+    /// Directivity index of each band; one where all have the same pattern.
     fn index_db(&self, py: Python<'_>) -> Vec<f64> {
         py.detach(|| (0..self.columns()).map(|band| self.0.index_db(band)).collect())
     }

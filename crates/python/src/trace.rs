@@ -82,7 +82,7 @@ pub struct Traced<'py> {
     paths: usize,
 }
 
-/// What is at work beside the room: laws, and an extended model.
+/// What changes the room: laws, and an extended model.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Beside<'py> {

@@ -111,7 +111,7 @@ def diagnose(
             text of one (docs/how-to/own-law.md).
         discover: when a law is looked for beside the catalogue: ``always``, ``if_needed`` (where no cause explains the room, or a
             formula would explain it as well) or ``never``; by default ``if_needed``, with ``effects`` ``never``.
-        model: an extended model to start from, a file, the text of one, or an earlier diagnosis: its causes are at work, fitted
+        model: an extended model to start from, a file, the text of one, or an earlier diagnosis: its causes are there from the start, fitted
             anew, and the search goes on (docs/how-to/extended-model.md).
         seed: of rays and simulated measurements. The same seed gives the same diagnosis.
         allow_leaks: goes on although more than one ray in a thousand escapes through holes of the mesh.

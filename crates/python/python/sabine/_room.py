@@ -159,7 +159,7 @@ class Room:
             source: name, or position (x, y, z) in metres.
             receiver: the same.
             source_directivity: how it radiates: a :class:`Directivity`, or the name of a pattern of first order (``cardioid``
-                and others); None for all directions alike.
+                and others); None radiates the same in all directions.
             source_axis: direction in which it faces, shape (3,), of any length; by default the one that the room file states, or else
                 towards the receiver.
             receiver_directivity: how the receiver hears, likewise.
