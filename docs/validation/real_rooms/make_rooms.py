@@ -3,8 +3,8 @@
     python3 -m venv scratch && scratch/bin/pip install numpy scipy
     scratch/bin/python docs/validation/real_rooms/make_rooms.py ../shared/data OUT
 
-Writes OUT/double_slope, OUT/surrey_a, OUT/bbc and OUT/bras_cr2_other_air. What their publishers do not say (sizes, where in the room
-it was) is assumed here, as a user would have to: the comments say which.
+Writes OUT/double_slope, OUT/surrey_a, OUT/bbc, OUT/bras_cr2_other_air, OUT/bras_cr2_two and OUT/arni_2, arni_2_again, arni_50. What
+their publishers do not say (sizes, where in the room it was) is assumed here, as a user would have to: the comments say which.
 """
 import shutil
 import sys
@@ -20,26 +20,27 @@ FACES = {  # corners of a box by their bits x, y, z
     "floor": [(0, 2, 3, 1)],
     "ceiling": [(4, 5, 7, 6)],
 }
+PANELLED = {"panels": FACES["walls"] + FACES["ceiling"], "floor": FACES["floor"]}
 
 
-def box(folder, size):
+def box(folder, size, faces_of):
     lines = [f"v {' '.join(str(size[k] * (i >> k & 1)) for k in range(3))}" for i in range(8)]
-    for name, faces in FACES.items():
+    for name, faces in faces_of.items():
         lines.append(f"usemtl {name}")
         lines += ["f " + " ".join(str(i + 1) for i in face) for face in faces]
     (folder / "room.obj").write_text("\n".join(lines) + "\n")
 
 
-def room(folder, size, air, time_zero, centres, sources, receivers, responses):
+def room(folder, size, air, time_zero, centres, sources, receivers, responses, faces_of=FACES):
     """`responses`: (source, receiver, rate, samples)."""
     (folder / "ir").mkdir(parents=True)
-    box(folder, size)
+    box(folder, size, faces_of)
     text = ['[room]\nmesh = "room.obj"\n']
     if air:
         text.append(f"[air]\ntemperature_c = {air[0]}\nrelative_humidity_percent = {air[1]}\npressure_kpa = 101.325\n")
     text.append(f'[measurement]\ntime_zero = "{time_zero}"\nlevels = "per_response"\n')
     text.append(f"[bands]\ncentres_hz = {centres}\n")
-    for name in FACES:  # nothing is known of them but that they are surfaces of a furnished room
+    for name in faces_of:  # nothing is known of them but that they are surfaces of a furnished room
         n = len(centres)
         text.append(f"[materials.{name}]\nabsorption = {[0.2] * n}\nabsorption_sd = {[0.15] * n}\nscattering = {[0.2] * n}\n")
     for kind, places in (("sources", sources), ("receivers", receivers)):
@@ -108,6 +109,20 @@ def main(data, out):
         assert measured in text
         text = text.replace(measured, guessed)
     path.write_text(text)
+
+    # BRAS CR2 with both published responses.
+    shutil.copytree(data / "rooms/bras_cr2", out / "bras_cr2_two")
+    shutil.copy(data / "rooms_more/bras_cr2_second/LS2_MP2.wav", out / "bras_cr2_two/ir/LS2_MP2.wav")
+    with (out / "bras_cr2_two/room.toml").open("a") as file:
+        file.write('\n[[responses]]\nsource = "LS2"\nreceiver = "MP2"\nfile = "ir/LS2_MP2.wav"\n')
+
+    # Arni, Aalto: 2 and 50 of 55 panels on walls and ceiling closed, so reflecting. About 8.9 x 6.3 x 3.6 m and 4.37 m from loudspeaker
+    # to microphone (rooms_more/arni/SOURCE.md); where in the room they stood is assumed.
+    for name, state in (("arni_2", "2_numComb_200_mic_1_sweep_1"), ("arni_2_again", "2_numComb_200_mic_1_sweep_5"),
+                        ("arni_50", "50_numComb_5000_mic_1_sweep_1")):
+        rate, x = read(data / f"rooms_more/arni/panels/IR_numClosed_{state}.wav")
+        room(out / name, [8.9, 6.3, 3.6], None, "common", CENTRES, {"s1": [2.0, 3.0, 1.5]}, {"r1": [6.35, 3.4, 1.3]},
+             [("s1", "r1", rate, x[:, 0])], PANELLED)
 
 
 if __name__ == "__main__":
