@@ -6,7 +6,7 @@ use crate::extend::extension::changes;
 use crate::extend::model_change::ModelChange;
 use crate::infer::arrival_fits::ArrivalFits;
 use crate::infer::baseline::{self, Baseline};
-use crate::infer::candidates::{CatalogueCase, EffectScore};
+use crate::infer::candidates::{CatalogueCase, EffectScore, Score};
 use crate::infer::ray_dependence::MoreWithHalf;
 use crate::infer::search::{Search, State};
 use sabine_acoustics::Observer;
@@ -20,7 +20,7 @@ const ROUNDS: usize = 4;
 pub(crate) struct Selection {
     pub chosen: Vec<usize>,
     probabilities: Vec<(usize, f64)>,
-    /// The last cause and those that explain as much.
+    /// The last cause and those that explain as much: a set.
     pub rivals: Vec<String>,
     /// All effects beside the baseline, and beside the causes that were given.
     pub first: Vec<EffectScore>,
@@ -78,7 +78,8 @@ pub(crate) fn give(
     Ok(named)
 }
 
-/// Greedy naming beside what is named already, the scatter estimated again after each name, and a backward check.
+/// Greedy naming beside what is named already, the scatter estimated again after each name, and a backward check. A set of causes that cannot be
+/// told apart ends it, but for one that moves paths: causes of decays are then named before it.
 pub(crate) fn select(
     baseline: &mut Baseline,
     cases: &[CatalogueCase],
@@ -88,6 +89,8 @@ pub(crate) fn select(
     observer: &dyn Observer,
 ) -> Result<Selection, Error> {
     let most = named.chosen.len() + baseline.config.most_causes;
+    // The cause that stands for a set of those that move paths.
+    let mut stands_for_set: Option<usize> = None;
     while named.chosen.len() < most {
         baseline.prepare_rest(cases)?;
         let (ranked, rivals, interchangeable, threshold) = {
@@ -98,6 +101,9 @@ pub(crate) fn select(
             // What a cause stands for as well is not named beside it.
             scores.retain(|s| named.interchangeable.iter().all(|(_, others)| !others.contains(&s.candidate)));
             scores.retain(|s| named.without.iter().all(|&w| cases[w].effect != cases[s.candidate].effect));
+            // Whichever of a set moves the paths, decays say the same of what they alone tell.
+            let of_decays = |s: &Score| cases[s.candidate].case.observable() == Observable::Decay;
+            scores.retain(|s| stands_for_set.is_none() || of_decays(s));
             let mut ranked: Vec<EffectScore> = search
                 .by_effect(&scores)
                 .into_iter()
@@ -121,8 +127,11 @@ pub(crate) fn select(
             named.first.clone_from(&ranked);
             named.first.sort_by(|a, b| b.nats.total_cmp(&a.nats));
         }
-        let Some(best) = ranked.first().filter(|b| b.nats >= threshold) else {
-            named.last = Some((named.chosen.clone(), ranked));
+        // A second set beside the first has no name: which of one it is may hang on which of the other.
+        let second_set = stands_for_set.is_some() && !rivals.is_empty();
+        let Some(best) = ranked.first().filter(|b| b.nats >= threshold && !second_set) else {
+            // Beside a set not all were weighed.
+            named.last = stands_for_set.is_none().then(|| (named.chosen.clone(), ranked));
             break;
         };
         let strongest = best.nats.max(0.0);
@@ -136,9 +145,16 @@ pub(crate) fn select(
         named.interchangeable.push((best.best, interchangeable));
         if !rivals.is_empty() {
             named.rivals = std::iter::once(best).chain(&rivals).map(|r| r.id.clone()).collect();
-            break;
+            if cases[best.best].case.observable() != Observable::Arrivals {
+                break;
+            }
+            stands_for_set = Some(best.best);
         }
         put_to_work(baseline, cases, effects, &named.chosen, (used, arrival_fits))?;
+    }
+    if let Some(last) = stands_for_set {
+        named.chosen.retain(|&c| c != last);
+        named.chosen.push(last);
     }
     baseline.prepare_rest(cases)?;
     let search = Search::new(baseline, cases, effects, used.to_vec()).knowing(arrival_fits);

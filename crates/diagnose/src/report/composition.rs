@@ -66,7 +66,7 @@ pub(crate) fn compose(
         decay_curves(baseline, &before, &after, false)
     };
     let model = extension::extended_model(search, state);
-    let notes = notes_on(search, &confirmed, first_dispersion, &candidates);
+    let notes = notes_on(search, &confirmed, first_dispersion, (&candidates, &alternatives));
     let mut seconds: Vec<(String, f64)> =
         baseline.seconds.iter().map(|(stage, s)| ((*stage).to_owned(), *s)).collect();
     seconds.push(("lack of fit".into(), confirmed.testing_s));
@@ -148,7 +148,7 @@ fn notes_on(
     search: &Search<'_>,
     confirmed: &Confirmation,
     first_dispersion: &[f64],
-    candidates: &[CandidateScore],
+    (candidates, alternatives): (&[CandidateScore], &[String]),
 ) -> Vec<String> {
     let Confirmation { base, state, .. } = confirmed;
     let baseline = search.baseline;
@@ -160,6 +160,12 @@ fn notes_on(
         .collect();
     let dropped: Vec<(&str, Doubt)> =
         confirmed.dropped.iter().map(|&(c, doubt)| (search.candidates[c].id, doubt)).collect();
+    let most = state.chosen.len() >= baseline.config.most_causes;
+    let more = if most || !alternatives.is_empty() {
+        speaking(search, confirmed, candidates, alternatives)
+    } else {
+        Vec::new()
+    };
     let mut notes = notes(&Circumstances {
         baseline,
         verdict: confirmed.verdict,
@@ -170,7 +176,7 @@ fn notes_on(
         scattered: first_dispersion.iter().any(|d| *d > WARN_DISPERSION),
         unseated: &confirmed.unseated,
         dropped: &dropped,
-        beyond_limit: &beyond_limit(search, state, candidates),
+        not_sought: (most, &more),
         drift: drift_in_words(baseline),
         levels: levels_in_words(search.baseline, &confirmed.lack_after.levels),
         at_bounds: &at_bounds,
@@ -179,12 +185,19 @@ fn notes_on(
     notes
 }
 
-/// Effects that the data speak for beside as many causes as may be named.
-fn beyond_limit<'c>(search: &Search<'_>, state: &State, candidates: &'c [CandidateScore]) -> Vec<&'c str> {
-    if state.chosen.len() < search.baseline.config.most_causes {
-        return Vec::new();
-    }
-    let worth = |c: &&CandidateScore| c.nats_beside_causes.is_some_and(|nats| nats >= search.threshold());
+/// Effects that the data speak for beside the causes that stand.
+fn speaking<'c>(
+    search: &Search<'_>,
+    confirmed: &Confirmation,
+    candidates: &'c [CandidateScore],
+    alternatives: &[String],
+) -> Vec<&'c str> {
+    let fell = |id: &str| confirmed.dropped.iter().any(|&(c, _)| search.candidates[c].id == id);
+    let worth = |c: &&CandidateScore| {
+        c.nats_beside_causes.is_some_and(|nats| nats >= search.threshold())
+            && !alternatives.contains(&c.effect)
+            && !fell(&c.effect)
+    };
     candidates.iter().filter(worth).map(|c| c.effect.as_str()).collect()
 }
 

@@ -21,8 +21,8 @@ pub(crate) struct Circumstances<'a> {
     pub unseated: &'a [String],
     /// Causes for which the data speak and that are not named, and why.
     pub dropped: &'a [(&'a str, Doubt)],
-    /// Effects that the data speak for beside as many causes as may be named.
-    pub beyond_limit: &'a [&'a str],
+    /// Whether as many causes are named as may be, and the effects that the data speak for beside them, or else beside a set.
+    pub not_sought: (bool, &'a [&'a str]),
     /// How far single responses drift along their decay where it is much, in dB, and in which octave.
     pub drift: Option<(f64, f64)>,
     /// The responses' own levels by octave, where they scatter farther than chance lets them: root mean square in dB, and the response
@@ -96,12 +96,14 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
         };
         notes.push(format!("{id} {why}: it is not named."));
     }
-    if !about.beyond_limit.is_empty() {
-        notes.push(format!(
-            "No more than {} causes are named; beside them the data speak for {}, too.",
-            about.baseline.config.most_causes,
-            about.beyond_limit.join(" and ")
-        ));
+    let (most, more) = about.not_sought;
+    if !more.is_empty() {
+        let ended = if most {
+            format!("No more than {} causes are named", about.baseline.config.most_causes)
+        } else {
+            "The search ended at causes that cannot be told apart".to_owned()
+        };
+        notes.push(format!("{ended}; beside them the data speak for {}, too.", more.join(", ")));
     }
     if let Some((db, hz)) = about.drift {
         notes.push(format!(
