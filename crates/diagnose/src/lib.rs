@@ -116,6 +116,7 @@ pub use plan::cost::CostTable;
 pub use plan::error::PlanError;
 pub use plan::hypothesis::{Hypothesis, OpenQuestion};
 pub use plan::measurement::PlannedMeasurement;
+pub use plan::open_question::QuestionError;
 pub use plan::outcome::{Chosen, Decision, EffectSize, LookAlikes, Plan, Weighing};
 pub use plan::planner::Planner;
 pub use report::diagnosis::{

@@ -2,16 +2,18 @@
 
 use crate::failure::{Failure, refused};
 use crate::interrupt::interruptible;
+use crate::laws::Laws;
 use crate::room::Room;
 use pyo3::prelude::*;
-use sabine::diagnose::{CostTable, DiagnoseConfig, Hypothesis, OpenQuestion, PlanConfig, Planner};
+use sabine::diagnose::{CostTable, DiagnoseConfig, OpenQuestion, PlanConfig, Planner};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// How to plan, as `sabine.plan` says it.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct Settings {
+pub struct Settings<'py> {
+    laws: Option<PyRef<'py, Laws>>,
     microphones: usize,
     sources: usize,
     candidates: usize,
@@ -23,27 +25,22 @@ pub struct Settings {
     allow_leaks: bool,
 }
 
-/// An effect, and what it concerns.
-type Named = (String, Option<String>);
-
-/// Of a diagnosis: its causes, the alternatives to them, and every effect that was weighed, the strongest first.
-type Question = (Vec<Named>, Vec<String>, Vec<Named>);
-
-/// Plans the next measurements of a room: the plan as JSON, as in `plan.json`, with each measurement in words.
+/// Plans the next measurements of a room, after a diagnosis (`diagnosis.json`) or without one: the plan as JSON, as in `plan.json`, with each
+/// measurement in words.
 ///
 /// # Errors
-/// Settings are refused, the room was not read from a folder, or what [`Planner::plan`] says.
+/// Settings, laws or the diagnosis are refused, the room was not read from a folder, or what [`Planner::plan`] says.
 #[pyfunction]
 pub fn plan(
     py: Python<'_>,
     room: &Room,
-    question: Option<Question>,
-    settings: Settings,
+    diagnosis: Option<String>,
+    settings: Settings<'_>,
 ) -> Result<String, Failure> {
     let stated = room.measured.as_ref();
     let stated = stated.ok_or_else(|| refused("room: a plan is for a room folder; read one"))?;
     let Settings { rays, seed, allow_leaks, .. } = settings;
-    let planner = Planner::new(PlanConfig {
+    let mut planner = Planner::new(PlanConfig {
         diagnose: DiagnoseConfig { rays, seed, allow_leaks, ..DiagnoseConfig::default() },
         microphones: settings.microphones,
         sources: settings.sources,
@@ -52,9 +49,18 @@ pub fn plan(
         places_m: settings.places_m,
         cost: cost(&settings.minutes)?,
     })?;
-    let question = question.map(|(causes, alternatives, ranked)| {
-        OpenQuestion::of_diagnosis(&hypotheses(causes), &alternatives, &hypotheses(ranked))
-    });
+    if let Some(laws) = &settings.laws {
+        planner =
+            planner.with_laws(laws.laws().to_vec()).map_err(|error| refused(format!("laws: {error}")))?;
+    }
+    let mut question = None;
+    if let Some(text) = &diagnosis {
+        let asked = OpenQuestion::of_json(text, stated, |id| planner.knows(id));
+        let (asked, mut found) = asked.map_err(|error| refused(format!("diagnosis: {error}")))?;
+        found.retain(|law| !planner.knows(law.id()));
+        planner = planner.with_laws(found).map_err(|error| refused(format!("diagnosis: {error}")))?;
+        question = Some(asked);
+    }
     interruptible(py, |observer| {
         let plan = planner.plan(stated, question.as_ref(), observer)?;
         let mut told: Value = serde_json::to_value(&plan)?;
@@ -63,10 +69,6 @@ pub fn plan(
         }
         Ok(told.to_string())
     })
-}
-
-fn hypotheses(named: Vec<Named>) -> Vec<Hypothesis> {
-    named.into_iter().map(|(effect, subject)| Hypothesis { effect, subject }).collect()
 }
 
 fn cost(minutes: &BTreeMap<String, f64>) -> Result<CostTable, Failure> {

@@ -175,18 +175,32 @@ class Plans(Case):
             "candidates": [haze, *effects],
         }
         places_m = [(3.0, 3.0, 1.5), (4.0, 4.5, 1.2), (5.0, 1.0, 1.4), (2.0, 2.5, 1.0)]
-        ask = lambda **changed: sabine.plan(
-            room, sabine.Diagnosis({**data, **changed}, ""), rays=200, candidates=8, microphones=1, places_m=places_m
-        )
+        more = {"rays": 200, "candidates": 8, "microphones": 1, "places_m": places_m}
+        ask = lambda given=None, **changed: sabine.plan(room, sabine.Diagnosis({**data, **changed}, ""), laws=given, **more)
+        leading = lambda found: [one["effect"] for one in found.data["question"]["leading"]]
         found = ask()
-        self.assertEqual([one["effect"] for one in found.data["question"]["leading"]], ["sound_speed", "transducer_response"])
+        self.assertEqual(leading(found), ["sound_speed", "transducer_response"])
         placed = [one["measurement"]["position_m"] for one in found.candidates if one["measurement"]["kind"] == "microphone"]
         self.assertTrue(placed and all(tuple(at) in places_m for at in placed))
         self.assertEqual({one["effect"] for one in found.effects}, {"sound_speed", "transducer_response"})
-        self.assert_refused("diagnosis: .*materials", ask, materials={})
-        self.assert_refused("diagnosis: .*bands", ask, bands_hz=[1000.0])
+        self.assert_refused("diagnosis: materials: .*another room", ask, materials={})
+        self.assert_refused("diagnosis: bands_hz: .*another room", ask, bands_hz=[1000.0])
         self.assert_refused("two hypotheses", ask, alternatives=[], candidates=[])
-        self.assert_refused("diagnosis: its cause haze is no effect", ask, causes=[haze], alternatives=[])
+        self.assert_refused("a law that is not given here", ask, causes=[haze], alternatives=[])
+        # A law that the user gives, and one that the search for laws found.
+        text = '''
+            [[laws]]
+            id = "haze"
+            target = "path"
+            formula = "-a / 100 * length_m"
+            parameters.a = { value = 1.0, low = 0.0, high = 10.0, unit = "dB/m" }
+        '''
+        self.assertEqual(leading(ask(text, causes=[haze], alternatives=[]))[0], "haze")
+        self.assert_refused("laws: ", ask, text.replace("length_m", "width_m"))
+        law = {"id": "mist", "target": "path", "surface": None, "words": "Says so.", "formula": "-a / 100 * length_m"}
+        law["parameters"] = {"a": {"value": 1.0, "low": 0.0, "high": 10.0, "unit": "dB/m"}}
+        named = {"effect": "unknown_law", "subject": "paths go with their length"}
+        self.assertEqual(leading(ask(causes=[named], alternatives=[], laws=[law]))[0], "mist")
 
     def test_what_cannot_be_planned_is_refused_in_words(self):
         refused = lambda words, *given, room=self.ROOM, **more: self.assert_refused(words, sabine.plan, room, *given, **more)

@@ -17,6 +17,7 @@ pub(crate) mod gaussian;
 pub(crate) mod greedy;
 pub(crate) mod hypothesis;
 pub(crate) mod measurement;
+pub(crate) mod open_question;
 pub(crate) mod outcome;
 pub(crate) mod places;
 pub(crate) mod planner;

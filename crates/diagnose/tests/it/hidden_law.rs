@@ -104,7 +104,7 @@ fn what_a_hidden_law_goes_with_is_discovered() {
     let hidden = Hidden::GrazingAbsorption { material: 0, db: HIDDEN_DB, from_hz: 1000.0 };
     let (_folder, room) = room(&[hidden]);
     // No cause stands, and so the search begins by itself.
-    let diagnoser = diagnoser(Vec::new(), 10_000).unwrap().discovering_if_needed();
+    let diagnoser = diagnoser(Vec::new(), 3000).unwrap().discovering_if_needed();
     let found = diagnoser.diagnose(&room, &[], &()).unwrap();
     let named: Vec<(&str, Option<&str>)> =
         found.causes.iter().map(|c| (c.effect.as_str(), c.subject.as_deref())).collect();

@@ -10,7 +10,8 @@ from typing import List, Mapping, Sequence
 import numpy as np
 
 from . import _inputs, _plots, _sabine
-from ._diagnosis import Diagnosis, effects
+from ._diagnosis import Diagnosis
+from ._inputs import Document
 from ._room import Room
 
 #: Measurements that are printed.
@@ -80,6 +81,7 @@ def plan(
     room: Room | str | os.PathLike,
     diagnosis: Diagnosis | None = None,
     *,
+    laws: Document | None = None,
     microphones: int = 3,
     sources: int = 0,
     candidates: int = 60,
@@ -97,7 +99,9 @@ def plan(
 
     Args:
         room: a room folder with sources, or what :meth:`Room.read` made of one; measured responses are not needed without ``diagnosis``.
-        diagnosis: a diagnosis of this room. Laws that were weighed in it are passed over.
+        diagnosis: a diagnosis of this room. A law that it found is a hypothesis; effects that are not in the catalogue and no law given
+            here are passed over.
+        laws: laws that are causes beside the catalogue, as in :func:`diagnose`.
         microphones: places for microphones to choose, 0 to 20.
         sources: places for the first source to choose, 0 to 5.
         candidates: measurements that are weighed, about: 4 to 1000.
@@ -110,8 +114,8 @@ def plan(
 
     Raises:
         OSError: a file is missing or cannot be read.
-        ValueError: the room is no folder or has no source, the diagnosis is of another room, names a law as a cause or leaves nothing
-            open, or a setting is out of range.
+        ValueError: the room is no folder or has no source, the diagnosis is of another room or leaves nothing open, a law cannot
+            be weighed, or a setting is out of range.
         KeyboardInterrupt: somebody pressed Ctrl-C.
     """
     room = room if isinstance(room, Room) else Room.read(room)
@@ -119,6 +123,7 @@ def plan(
     if not isinstance(minutes, Mapping):
         raise ValueError(f"minutes: expected a mapping from kinds to minutes, found {minutes!r}")
     settings = {
+        "laws": _inputs.laws(laws),
         "microphones": _inputs.count(microphones, "microphones"),
         "sources": _inputs.count(sources, "sources"),
         "candidates": _inputs.count(candidates, "candidates"),
@@ -129,25 +134,7 @@ def plan(
         "seed": _inputs.count(seed, "seed"),
         "allow_leaks": allow_leaks,
     }
-    question = None if diagnosis is None else _question(diagnosis, room)
-    return Plan(json.loads(_sabine.plan(room._handle, question, settings)))
-
-
-def _question(diagnosis: Diagnosis, room: Room) -> tuple:
-    """Causes, alternatives to them, and all effects of the catalogue that were weighed."""
-    if not isinstance(diagnosis, Diagnosis):
+    if diagnosis is not None and not isinstance(diagnosis, Diagnosis):
         raise ValueError(f"diagnosis: expected a Diagnosis, found {diagnosis!r}")
-    if set(diagnosis.data["materials"]) != set(room.surfaces):
-        raise ValueError("diagnosis: it is of a room of other materials")
-    if not np.array_equal(diagnosis.data["bands_hz"], room.bands_hz):
-        raise ValueError("diagnosis: it is of a room of other bands")
-
-    known = effects()
-    laws = [cause["effect"] for cause in diagnosis.causes if cause["effect"] not in known]
-    if laws:
-        raise ValueError(f"diagnosis: its cause {laws[0]} is no effect of the catalogue; a plan weighs no laws")
-
-    def named(found: List[dict]) -> list:
-        return [(one["effect"], one.get("subject")) for one in found if one["effect"] in known]
-
-    return named(diagnosis.causes), diagnosis.data["alternatives"], named(diagnosis.candidates)
+    document = None if diagnosis is None else json.dumps(diagnosis.data)
+    return Plan(json.loads(_sabine.plan(room._handle, document, settings)))
