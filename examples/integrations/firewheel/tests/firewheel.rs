@@ -111,14 +111,25 @@ fn gains_and_rooms_change_without_a_step_while_it_plays() {
     assert!((left[9599] + 0.5).abs() < 1e-6 && (right[9599] - 1.0).abs() < 1e-6, "the other room alone");
     assert!((left[64] - 0.5).abs() < 1e-6, "the first room at first");
     assert!(steepest(&left) < 1e-3 && steepest(&right) < 1e-3, "{} {}", steepest(&left), steepest(&right));
+}
 
-    // Bypassed, firewheel mixes the input through; afterwards the room is heard again, and nothing from before.
-    graph.context.queue_bypassed_for(graph.node, true);
-    render(&mut graph, &ones);
-    graph.context.queue_bypassed_for(graph.node, false);
-    graph.context.update().unwrap();
-    let [left, _] = render(&mut graph, &ones);
-    assert!((left[9599] + 0.5).abs() < 1e-6);
+#[test]
+fn a_bypass_ends_the_decay() {
+    let mut graph = Graph::new(&[decay(40_000, 1, 48_000), decay(40_000, 2, 48_000)], RoomNode::default());
+    graph.start(48_000).unwrap();
+    render(&mut graph, &noise(5000, 3));
+    for bypassed in [false, true] {
+        if bypassed {
+            for state in [true, false] {
+                graph.context.queue_bypassed_for(graph.node, state);
+                graph.context.update().unwrap();
+                render(&mut graph, &[0.0; 2000]); // longer than firewheel fades
+            }
+        }
+        let [left, right] = render(&mut graph, &[0.0; 3000]);
+        let silent = left.iter().chain(&right).all(|&sample| sample == 0.0);
+        assert_eq!(silent, bypassed, "what was heard before a bypass is not heard after it");
+    }
 }
 
 #[test]

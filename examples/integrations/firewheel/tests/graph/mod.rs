@@ -10,11 +10,12 @@ use sabine_with_firewheel::offline::Offline;
 use sabine_with_firewheel::{RoomHandle, RoomNode, RoomNodeConfig};
 
 pub struct Graph {
+    /// Ends before the context does, which would wait for it.
+    pub stream: Option<Offline>,
     pub context: FirewheelContext,
     pub node: NodeID,
     pub gains: RoomNode,
     pub room: RoomHandle,
-    pub stream: Option<Offline>,
     pub inputs: usize,
 }
 
@@ -35,7 +36,7 @@ impl Graph {
         context.connect(input, node, &through, true).unwrap();
         context.connect(node, output, &[(0, 0), (1, 1)], true).unwrap();
         let room = RoomHandle::of(&context, node).unwrap();
-        Self { context, node, gains, room, stream: None, inputs }
+        Self { stream: None, context, node, gains, room, inputs }
     }
 
     /// Starts a stream; one that runs already ends.
