@@ -75,7 +75,6 @@
 //! - H. Kuttruff: Room Acoustics, 6th edition, 2017.
 //! - H. Arau-Puchades: An improved reverberation formula. Acustica 65, 1988.
 
-#[cfg(feature = "rooms")]
 mod error;
 mod floor_plan;
 #[cfg(any(feature = "rooms", feature = "gltf"))]
@@ -86,6 +85,7 @@ mod measured_room;
 mod measurements;
 mod mesh_file;
 mod scene;
+#[cfg(feature = "rooms")]
 mod table_lines;
 mod theory;
 #[cfg(feature = "rooms")]
