@@ -21,8 +21,10 @@ pub struct Figures {
     pub longest: f32,
     /// Time in callbacks, as a share of all that they gave out.
     pub load: f64,
-    /// Gaps and faults that the sound system reported.
-    pub interruptions: u64,
+    /// Gaps that the sound system reported.
+    pub gaps: u64,
+    /// Faults that it reported and may have got over.
+    pub faults: u64,
     /// Times that the microphone had too little, and silence took its place.
     pub microphone_short: u64,
     /// Frames of the microphone that came too fast and were left out.
@@ -40,7 +42,8 @@ pub struct Watch {
     busy_ns: AtomicU64,
     sound_ns: AtomicU64,
     last_ns: AtomicU64,
-    interruptions: AtomicU64,
+    gaps: AtomicU64,
+    faults: AtomicU64,
     pub(crate) microphone_short: AtomicU64,
     pub(crate) microphone_left_out: AtomicU64,
     /// What the sound system said last, for the error that may follow.
@@ -59,7 +62,8 @@ impl Default for Watch {
             busy_ns: AtomicU64::new(0),
             sound_ns: AtomicU64::new(0),
             last_ns: AtomicU64::new(0),
-            interruptions: AtomicU64::new(0),
+            gaps: AtomicU64::new(0),
+            faults: AtomicU64::new(0),
             microphone_short: AtomicU64::new(0),
             microphone_left_out: AtomicU64::new(0),
             fault: Mutex::new(None),
@@ -86,13 +90,13 @@ impl Watch {
     }
 
     /// The sound system reports a gap in the sound that it has got over.
-    pub fn interrupted(&self) {
-        self.interruptions.fetch_add(1, Ordering::Relaxed);
+    pub fn gap(&self) {
+        self.gaps.fetch_add(1, Ordering::Relaxed);
     }
 
     /// The sound system reports a fault that it may get over. If it does not, the output falls silent, and [`Watch::check`] says so.
     pub fn fault(&self, device: &'static str, reason: &str) {
-        self.interrupted();
+        self.faults.fetch_add(1, Ordering::Relaxed);
         *self.fault.lock().unwrap_or_else(PoisonError::into_inner) = Some(format!("the {device}: {reason}"));
     }
 
@@ -113,10 +117,15 @@ impl Watch {
         let last = Duration::from_nanos(self.last_ns.load(Ordering::Relaxed));
         let since = now.duration_since(self.start).saturating_sub(last);
         if since > PATIENCE {
-            let fault = self.fault.lock().unwrap_or_else(PoisonError::into_inner).clone();
-            return Err(Error::Silent { since, fault: fault.unwrap_or_else(|| "no fault is known".into()) });
+            let fault = self.last_fault().unwrap_or_else(|| "no fault is known".into());
+            return Err(Error::Silent { since, fault });
         }
         Ok(self.figures())
+    }
+
+    /// What the sound system said with the last fault.
+    pub fn last_fault(&self) -> Option<String> {
+        self.fault.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// The figures so far.
@@ -128,7 +137,8 @@ impl Watch {
             missed: count(&self.missed),
             longest: f32::from_bits(self.longest.load(Ordering::Relaxed)),
             load: count(&self.busy_ns) as f64 / count(&self.sound_ns).max(1) as f64,
-            interruptions: count(&self.interruptions),
+            gaps: count(&self.gaps),
+            faults: count(&self.faults),
             microphone_short: count(&self.microphone_short),
             microphone_left_out: count(&self.microphone_left_out),
         }

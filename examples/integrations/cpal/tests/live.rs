@@ -215,11 +215,11 @@ fn a_device_that_vanishes_ends_the_application_with_its_reason() {
     let error = watch.check(later(3.0)).unwrap_err();
     assert!(matches!(error, Error::Silent { .. }), "{error}");
     watch.called_back(later(2.9), later(2.9), 480, RATE_HZ);
-    watch.interrupted();
+    watch.gap();
     let figures = watch.check(later(4.0)).unwrap();
-    assert_eq!((figures.callbacks, figures.frames, figures.interruptions), (1, 480, 1));
+    assert_eq!((figures.callbacks, figures.frames, figures.gaps), (1, 480, 1));
     watch.fault("output", "I/O error");
-    assert_eq!(watch.check(later(4.5)).unwrap().interruptions, 2, "a fault that it may get over");
+    assert_eq!(watch.check(later(4.5)).unwrap().faults, 1, "it may get over it");
     let error = watch.check(later(5.0)).unwrap_err().to_string();
     assert!(error.contains("no sound for 2.1 s") && error.contains("the output: I/O error"), "{error}");
     watch.end("output", "unplugged".into());

@@ -56,7 +56,7 @@ pub fn config(
 /// application.
 fn report(watch: &Watch, device: &'static str, error: &cpal::Error) {
     match error.kind() {
-        ErrorKind::Xrun => watch.interrupted(),
+        ErrorKind::Xrun => watch.gap(),
         // The sound goes on.
         ErrorKind::DeviceChanged | ErrorKind::RealtimeDenied => {}
         ErrorKind::DeviceNotAvailable | ErrorKind::HostUnavailable | ErrorKind::StreamInvalidated => {

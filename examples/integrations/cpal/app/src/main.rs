@@ -10,9 +10,7 @@ mod devices;
 use arguments::{Arguments, USAGE};
 use cpal::traits::{DeviceTrait, HostTrait, StreamTrait};
 use sabine_eqfilter::RoomReverbControl;
-use sabine_with_cpal::{
-    Command, Figures, Input, Player, PlayerConfig, Watch, microphone, read_room, read_voice,
-};
+use sabine_with_cpal::{Command, Input, Player, PlayerConfig, Watch, microphone, read_room, read_voice};
 use std::error::Error;
 use std::path::Path;
 use std::process::ExitCode;
@@ -87,7 +85,7 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
     }
     playing.play()?;
     let outcome = look_after(&watch, &control, &typed_lines(), arguments.seconds, rate_hz);
-    print_figures(&watch.figures(), rate_hz);
+    print_figures(&watch, rate_hz);
     outcome
 }
 
@@ -140,7 +138,8 @@ fn look_after(
     }
 }
 
-fn print_figures(figures: &Figures, rate_hz: u32) {
+fn print_figures(watch: &Watch, rate_hz: u32) {
+    let figures = watch.figures();
     println!(
         "{:.1} s of sound in {} callbacks; {} missed their deadline, the longest took {:.1} % of it; {:.2} % of a core",
         figures.frames as f64 / f64::from(rate_hz),
@@ -150,7 +149,11 @@ fn print_figures(figures: &Figures, rate_hz: u32) {
         100.0 * figures.load,
     );
     println!(
-        "{} interruptions; the microphone was short {} times, {} of its frames were left out",
-        figures.interruptions, figures.microphone_short, figures.microphone_left_out
+        "the microphone was short {} times, {} of its frames were left out",
+        figures.microphone_short, figures.microphone_left_out
     );
+    println!("the sound system reported {} gaps and {} faults", figures.gaps, figures.faults);
+    if let Some(fault) = watch.last_fault() {
+        println!("the last fault: {fault}");
+    }
 }
