@@ -22,7 +22,7 @@
 //! | impulse responses and a model | [`optimize::MaterialFitter`], [`diagnose::Diagnoser`] |
 //! | a mesh with materials | [`propagate::PathTracer`] |
 //! | dry speech and responses, and a network to train | [`augment`], [`estimator::Trainer`] |
-//! | an audio callback, and a room that is to be heard in it | [`eqfilter::RoomReverb`]; kira, rodio, cpal: `docs/how-to/audio-engines.md` |
+//! | an audio callback, and a room that is to be heard in it | [`eqfilter::RoomReverb`]; kira, rodio, firewheel, cpal: `docs/how-to/audio-engines.md` |
 //! | an estimator or a tracer of my own | [`match_room_with`] |
 //! | a wish to read code first | the worked examples in `examples/` of the repository, one idea each |
 //! | no wish to program | the command `sabine` of the crate `sabine-cli` |

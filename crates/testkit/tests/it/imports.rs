@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
 
 /// Each package and the packages of this workspace that it may import.
-const MAY_IMPORT: [(&str, &[&str]); 21] = [
+const MAY_IMPORT: [(&str, &[&str]); 24] = [
     ("sabine-acoustics", &[]),
     ("sabine-features", &["sabine-acoustics"]),
     ("sabine-eqfilter", &["sabine-acoustics"]),
@@ -58,16 +58,30 @@ const MAY_IMPORT: [(&str, &[&str]); 21] = [
             "sabine-scene",
         ],
     ),
+    (
+        "sabine-with-bevy",
+        &[
+            "sabine-acoustics",
+            "sabine-eqfilter",
+            "sabine-paths",
+            "sabine-propagate",
+            "sabine-scene",
+            "sabine-with-firewheel",
+        ],
+    ),
+    ("sabine-with-cpal", &["sabine-acoustics", "sabine-eqfilter"]),
+    ("sabine-with-firewheel", &["sabine-acoustics", "sabine-eqfilter"]),
     ("sabine-with-kira", &["sabine-acoustics", "sabine-eqfilter"]),
     ("sabine-with-rodio", &["sabine-acoustics", "sabine-eqfilter"]),
     ("xtask", &[]),
 ];
 
 /// Libraries that live behind one crate alone, so that nobody else's users compile them.
-const LIVES_IN: [(&str, &str); 11] = [
+const LIVES_IN: [(&str, &str); 12] = [
     ("parry3d", "sabine-propagate"),
     ("candle-core", "sabine-estimator"),
     ("candle-nn", "sabine-estimator"),
+    ("bevy_ecs", "sabine-with-bevy"),
     ("clack-plugin", "sabine-clap-plugin"),
     ("gltf", "sabine-scene"),
     ("hdf5-pure", "sabine-scene"),

@@ -219,7 +219,7 @@ fn play(
 
 /// Materials of the library.
 fn materials(names: [&str; 6]) -> Result<[Material; 6], RoomError> {
-    let found = names.map(|name| Ok(library_material(name)?.material(acoustics::BANDS)?));
+    let found = names.map(|name| library_material(name)?.material(acoustics::BANDS));
     let mut materials = Vec::new();
     for material in found {
         materials.push(material.map_err(RoomError::Acoustics)?);
