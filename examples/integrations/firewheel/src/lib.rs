@@ -144,10 +144,22 @@ impl AudioNode for RoomNode {
             // firewheel keeps the state that `info` made.
             None => RoomHandle { room: Arc::new(Mutex::new(Room { config: config.clone(), control: None })) },
         };
-        let mut processor = RoomProcessor { gains: *self, reverb: None, control: None, room: handle.room };
-        processor.start(context.stream_info.sample_rate.get())?;
-        Ok(processor)
+        let (reverb, control) = start(&mut lock(&handle.room), *self, context.stream_info.sample_rate.get())?;
+        Ok(RoomProcessor { gains: *self, reverb: Some(reverb), control, room: handle.room })
     }
+}
+
+/// Takes up the room at the sample rate of a stream. Not for the audio thread.
+fn start(
+    room: &mut Room,
+    gains: RoomNode,
+    sample_rate_hz: u32,
+) -> Result<(RoomReverb, RoomReverbControl), Error> {
+    room.control = None;
+    let reverb = room.config.reverb(gains, sample_rate_hz)?;
+    let control = reverb.control();
+    room.control = Some(control.clone());
+    Ok((reverb, control))
 }
 
 /// What runs in the audio thread.
@@ -155,43 +167,25 @@ struct RoomProcessor {
     gains: RoomNode,
     /// None at a sample rate that the responses cannot be brought to: the node is silent then.
     reverb: Option<RoomReverb>,
-    control: Option<RoomReverbControl>,
+    control: RoomReverbControl,
     /// Shared with the handle. Nothing that runs in the audio thread touches it.
     room: Arc<Mutex<Room>>,
-}
-
-impl RoomProcessor {
-    /// Takes up the room at the sample rate of a stream. Not for the audio thread.
-    fn start(&mut self, sample_rate_hz: u32) -> Result<(), Error> {
-        let mut room = lock(&self.room);
-        (self.reverb, self.control, room.control) = (None, None, None);
-        let reverb = room.config.reverb(self.gains, sample_rate_hz)?;
-        let control = reverb.control();
-        (self.reverb, self.control, room.control) = (Some(reverb), Some(control.clone()), Some(control));
-        Ok(())
-    }
-
-    /// Refuses gains above 60 dB and what is not a number.
-    fn set_gains(&mut self, gains: RoomNode) -> Result<(), Error> {
-        if let Some(control) = &self.control {
-            control.set_wet(gains.wet.amp())?;
-            control.set_dry(gains.dry.amp())?;
-        }
-        self.gains = gains;
-        Ok(())
-    }
 }
 
 impl AudioNodeProcessor for RoomProcessor {
     fn events(&mut self, _info: &ProcInfo, events: &mut ProcEvents, extra: &mut ProcExtra) {
         for patch in events.drain_patches::<RoomNode>() {
-            let mut gains = self.gains;
-            gains.apply(patch);
-            if self.set_gains(gains).is_err() {
-                // The log has no room for it: nothing else is to be done in the audio thread.
-                let _ = extra
-                    .logger
-                    .try_error("room: a gain must be a number of up to 60 dB; it stays as it was");
+            let done = match &patch {
+                RoomNodePatch::Wet(gain) => self.control.set_wet(gain.amp()),
+                RoomNodePatch::Dry(gain) => self.control.set_dry(gain.amp()),
+            };
+            match done {
+                Ok(()) => self.gains.apply(patch),
+                Err(_) => {
+                    // Where the log is full, nothing else is to be done in the audio thread.
+                    let message = "room: a gain must be a number of up to 60 dB; it stays as it was";
+                    let _ = extra.logger.try_error(message);
+                }
             }
         }
     }
@@ -215,8 +209,12 @@ impl AudioNodeProcessor for RoomProcessor {
     }
 
     fn new_stream(&mut self, stream_info: &StreamInfo, context: &mut ProcStreamCtx) {
-        if let Err(error) = self.start(stream_info.sample_rate.get()) {
-            let _ = context.logger.try_error_with(|text| text.push_str(&format!("room: {error}")));
+        self.reverb = None;
+        match start(&mut lock(&self.room), self.gains, stream_info.sample_rate.get()) {
+            Ok((reverb, control)) => (self.reverb, self.control) = (Some(reverb), control),
+            Err(error) => {
+                let _ = context.logger.try_error_with(|text| text.push_str(&format!("room: {error}")));
+            }
         }
     }
 }

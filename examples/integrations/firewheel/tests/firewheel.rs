@@ -156,10 +156,17 @@ fn a_stream_at_another_rate_takes_up_the_room_and_the_gains() {
     graph.start(900).unwrap();
     let [left, right] = render(&mut graph, &noise(900, 1));
     assert!(left.iter().chain(&right).all(|&s| s == 0.0));
-    // A rate that it can have, once more.
+    // A rate that it can have, once more; of the gains meanwhile, what is a number.
+    graph.set_gains(RoomNode { wet: Volume::Decibels(f32::NAN), dry: Volume::Decibels(200.0) });
+    graph.set_gains(RoomNode { wet: Volume::Decibels(-20.0), dry: Volume::Decibels(200.0) });
+    render(&mut graph, &noise(900, 1));
     graph.start(48_000).unwrap();
-    let [left, _] = render(&mut graph, &noise(9000, 1));
-    assert!(left.iter().any(|&s| s != 0.0));
+    let input = noise(9000, 2);
+    let [left, _] = render(&mut graph, &input);
+    for n in (0..9000).step_by(41) {
+        let wanted = 0.1 * sum_at(&input, second.samples(), latency(&graph), n);
+        assert!((f64::from(left[n]) - wanted).abs() < 2e-6, "frame {n}: {} != {wanted}", left[n]);
+    }
 }
 
 #[test]
@@ -188,6 +195,9 @@ fn what_does_not_fit_is_refused_and_the_sound_stays() {
     let mut graph = Graph::new(&two_rates, plain);
     graph.start(48_000).unwrap();
 
+    let error = Graph::new(&pulses(1.0, 1.0, 48_000), plain).start(900).unwrap_err().to_string();
+    assert!(error.contains("between 1 kHz and 768 kHz"), "a stream at no rate of sound: {error}");
+
     let mut graph = Graph::new(&pulses(0.5, 0.5, 48_000), plain);
     let long = vec![decay(60_000, 1, 48_000); 2];
     assert!(
@@ -201,4 +211,8 @@ fn what_does_not_fit_is_refused_and_the_sound_stays() {
     graph.set_gains(RoomNode { wet: Volume::Decibels(f32::NAN), dry: Volume::Decibels(200.0) });
     let [left, right] = render(&mut graph, &[1.0; 9600]);
     assert!((left[9599] - 0.5).abs() < 1e-6 && (right[9599] - 0.5).abs() < 1e-6, "{}", left[9599]);
+    // One gain is still refused; the other one is heard.
+    graph.set_gains(RoomNode { wet: Volume::Decibels(-20.0), dry: Volume::Decibels(200.0) });
+    let [left, _] = render(&mut graph, &[1.0; 9600]);
+    assert!((left[9599] - 0.05).abs() < 1e-6, "{}", left[9599]);
 }
