@@ -144,7 +144,9 @@ fn a_survey_is_the_room_that_a_folder_would_hold() {
     }
     let found = survey.diagnose(&spec, &()).unwrap();
     assert!(
-        ["adequate", "explained", "ambiguous", "unexplained"].iter().any(|v| found["verdict"] == *v),
+        ["adequate", "explained", "unconfirmed", "ambiguous", "unexplained"]
+            .iter()
+            .any(|v| found["verdict"] == *v),
         "{found}"
     );
     assert_eq!(found["materials"].as_object().unwrap().len(), room.scene().materials().len());

@@ -36,16 +36,20 @@ def cause(entry):
 
 
 def answer(folder):
+    """The verdict; causes with their nats, a set at the end; what is left by chance; decays at positions left out."""
     path = folder / "diagnosis.json"
     if not path.exists():
         return "no answer"
     found = json.loads(path.read_text())
-    names = ", ".join(map(cause, found["causes"]))
-    p = found["lack_of_fit"]["p_value"]
-    text = f"{found['verdict']}{': ' + names if names else ''}; p {p:.1g}"
+    names = [cause(entry) for entry in found["causes"]]
+    others = [f"`{effect}`" for effect in found["alternatives"] if effect != found["causes"][-1]["effect"]]
+    if others:
+        names[-1] += " or " + " or ".join(others)
+    text = f"{found['verdict']}{': ' + '; '.join(names) if names else ''}"
+    text += f". p {found['lack_of_fit']['p_value_explained']:.0e}"
     held_out = found["held_out"]
-    if held_out and held_out.get("db_rmse"):
-        text += "; decays {:.2f} / {:.2f} / {:.2f} dB".format(*held_out["db_rmse"])
+    if held_out:
+        text += ", decays {:.2f} / {:.2f} / {:.2f} dB".format(*held_out["db_rmse"])
     return text
 
 

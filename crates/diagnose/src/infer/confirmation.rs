@@ -140,6 +140,10 @@ pub(crate) fn confirm(
         if lack_before.p_value < config.significance { Verdict::Unexplained } else { Verdict::Adequate }
     } else if !found.rivals.is_empty() {
         Verdict::Ambiguous
+    } else if predicted.gains.is_empty()
+        && state.chosen.iter().any(|&c| is_of_decays_alone(&search.candidates[c]))
+    {
+        Verdict::Unconfirmed
     } else {
         Verdict::Explained
     };

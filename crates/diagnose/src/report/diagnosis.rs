@@ -15,6 +15,8 @@ pub enum Verdict {
     Adequate,
     /// One or more causes are named.
     Explained,
+    /// Causes are named that nothing confirms: one place was measured, and what bears on decays everywhere is confirmed at positions left out.
+    Unconfirmed,
     /// A law that no catalogue lists is named, by itself or beside causes that are listed; see [`Diagnosis::laws`].
     Law,
     /// Several causes explain the misfit alike; see [`Diagnosis::alternatives`] and [`Diagnosis::would_decide`].
@@ -28,6 +30,7 @@ impl fmt::Display for Verdict {
         f.write_str(match self {
             Self::Adequate => "adequate",
             Self::Explained => "explained",
+            Self::Unconfirmed => "unconfirmed",
             Self::Law => "law",
             Self::Ambiguous => "ambiguous",
             Self::Unexplained => "unexplained",

@@ -1,7 +1,7 @@
 //! A room in Bevy whose walls change their materials while one listens.
 //!
 //! A wall is an entity with [`Wall`] and [`WallMaterial`]. The paths of sound are traced once, when [`RoomPlugin`] is made; when a
-//! material changes, a thread of its own weighs them anew and hands the response to the node of [`sabine_with_firewheel`], which
+//! material changes, a thread of its own weighs them again and hands the response to the node of [`sabine_with_firewheel`], which
 //! cross-fades. No picture and no callback waits for it.
 //!
 //! The stream renders into memory, [`Loudspeaker`]; a game starts firewheel's stream on the sound card in its place.

@@ -16,7 +16,7 @@ const LOUDEST: f32 = 1.0 - f32::EPSILON / 2.0;
 /// Where the sound comes from.
 #[derive(Debug)]
 pub enum Input {
-    /// A recording that begins anew when it has ended, at the sample rate of the device; silence if there is nothing in it.
+    /// A recording that begins again when it has ended, at the sample rate of the device; silence if there is nothing in it.
     Loop(Vec<f32>),
     /// Another device.
     Microphone(MicrophoneReader),

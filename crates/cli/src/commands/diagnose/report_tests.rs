@@ -64,6 +64,11 @@ fn what_a_cause_may_concern_as_well_is_told() {
 fn each_verdict_says_what_it_means() {
     let page = html(&findings("adequate", &json!({ "causes": [] })), None).unwrap();
     assert!(page.contains("The simulation explains this measurement.") && !page.contains("What was found"));
+    let page = html(&findings("unconfirmed", &json!({})), None).unwrap();
+    assert!(
+        page.contains("Found at the one place measured, not confirmed: Air drier or more humid than stated.")
+    );
+    assert!(page.contains("A response at a second place would."));
     let set = json!({ "alternatives": ["surface_absorption"], "would_decide": ["measure on a damp day"] });
     let page = html(&findings("ambiguous", &set), None).unwrap();
     assert!(page.contains("which of 2 causes it is") && page.contains("<li>Measure on a damp day.</li>"));

@@ -48,12 +48,19 @@ pub fn plan_command(findings: &Findings, file: &std::path::Path) -> String {
     format!("sabine plan{room} --diagnosis {}", file.display())
 }
 
+/// What one place cannot say.
+const ONE_PLACE: &str = "One place was measured: causes that bear on the decay everywhere fit it, and nothing confirms them. A response at a \
+                         second place would.";
+
 /// The verdict in a few words.
 pub fn headline(findings: &Findings) -> String {
     let names: Vec<String> = findings.causes.iter().map(named).collect();
     match findings.verdict {
         Verdict::Adequate => "The simulation explains this measurement.".to_owned(),
         Verdict::Explained => format!("Found: {}.", names.join("; ")),
+        Verdict::Unconfirmed => {
+            format!("Found at the one place measured, not confirmed: {}.", names.join("; "))
+        }
         Verdict::Law => format!("A law that no catalogue lists: {}.", names.join("; ")),
         Verdict::Ambiguous => {
             format!(
@@ -87,7 +94,7 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
             "What is left between simulation and measurement is no more than chance leaves in such a measurement ({}). Nothing needs to be added.",
             p_value(fit.p_value)
         )),
-        Verdict::Explained | Verdict::Law => {
+        Verdict::Explained | Verdict::Unconfirmed | Verdict::Law => {
             told.push(if fit.p_value < UNLIKELY {
                 format!("Chance does not explain what was measured ({}).", p_value(fit.p_value))
             } else {
@@ -106,17 +113,25 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
                     p_value(fit.p_value_explained)
                 )
             });
+            if findings.verdict == Verdict::Unconfirmed {
+                told.push(ONE_PLACE.to_owned());
+            }
         }
         Verdict::Ambiguous => {
             if let Some((last, sure)) = findings.causes.split_last() {
                 if !sure.is_empty() {
                     let names: Vec<String> = sure.iter().map(named).collect();
-                    told.push(format!("Sure: {}.", names.join("; ")));
+                    let known = if findings.held_out.is_none() { "Found" } else { "Sure" };
+                    told.push(format!("{known}: {}.", names.join("; ")));
                 }
+
                 told.push(format!("Most likely, but not for sure: {}.", named(last)));
             }
             let names: Vec<String> = set(findings).into_iter().map(effect).collect();
             told.push(format!("Each of these would look the same here: {}.", names.join("; ")));
+            if findings.held_out.is_none() && findings.causes.len() > 1 {
+                told.push(ONE_PLACE.to_owned());
+            }
         }
         _ => {
             told.push(if fit.p_value_explained < UNLIKELY {
@@ -155,8 +170,10 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
     if !failed.is_empty() && fit.p_value_explained < UNLIKELY {
         told.push(format!("What chance does not explain: {}.", failed.join("; ")));
     }
-    if let (Verdict::Unexplained | Verdict::Ambiguous | Verdict::Explained | Verdict::Law, Some(place)) =
-        (findings.verdict, worst_place(findings, findings.verdict == Verdict::Unexplained))
+    if let (
+        Verdict::Unexplained | Verdict::Ambiguous | Verdict::Explained | Verdict::Unconfirmed | Verdict::Law,
+        Some(place),
+    ) = (findings.verdict, worst_place(findings, findings.verdict == Verdict::Unexplained))
     {
         told.push(place);
     }
