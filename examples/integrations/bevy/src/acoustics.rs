@@ -29,61 +29,28 @@ pub struct Shoebox {
 }
 
 /// Why there is no room.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum RoomError {
     /// An unknown material, a place outside of the numbers.
-    Acoustics(sabine_acoustics::Error),
+    #[error(transparent)]
+    Acoustics(#[from] sabine_acoustics::Error),
     /// A box that is none, a place outside of it.
-    Scene(sabine_scene::Error),
+    #[error(transparent)]
+    Scene(#[from] sabine_scene::Error),
     /// What the tracer or the renderer refuses.
-    Propagation(sabine_propagate::Error),
+    #[error(transparent)]
+    Propagation(#[from] sabine_propagate::Error),
     /// What the reverb refuses.
-    Reverb(sabine_eqfilter::Error),
+    #[error(transparent)]
+    Reverb(#[from] sabine_eqfilter::Error),
     /// What firewheel refuses.
+    #[error("{0}")]
     Engine(String),
 }
 
 impl RoomError {
     pub(crate) fn engine(error: impl Display) -> Self {
         Self::Engine(error.to_string())
-    }
-}
-
-impl Display for RoomError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Acoustics(error) => error.fmt(f),
-            Self::Scene(error) => error.fmt(f),
-            Self::Propagation(error) => error.fmt(f),
-            Self::Reverb(error) => error.fmt(f),
-            Self::Engine(error) => error.fmt(f),
-        }
-    }
-}
-
-impl std::error::Error for RoomError {}
-
-impl From<sabine_acoustics::Error> for RoomError {
-    fn from(error: sabine_acoustics::Error) -> Self {
-        Self::Acoustics(error)
-    }
-}
-
-impl From<sabine_scene::Error> for RoomError {
-    fn from(error: sabine_scene::Error) -> Self {
-        Self::Scene(error)
-    }
-}
-
-impl From<sabine_propagate::Error> for RoomError {
-    fn from(error: sabine_propagate::Error) -> Self {
-        Self::Propagation(error)
-    }
-}
-
-impl From<sabine_eqfilter::Error> for RoomError {
-    fn from(error: sabine_eqfilter::Error) -> Self {
-        Self::Reverb(error)
     }
 }
 

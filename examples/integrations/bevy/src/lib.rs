@@ -2,7 +2,7 @@
 //!
 //! A wall is an entity with [`Wall`] and [`WallMaterial`]. The paths of sound are traced once, when [`RoomPlugin`] is made; when a
 //! material changes, a thread of its own weighs them again and hands the response to the node of [`sabine_with_firewheel`], which
-//! cross-fades. No picture and no callback waits for it.
+//! cross-fades. No update and no callback waits for it.
 //!
 //! The stream renders into memory, [`Loudspeaker`]; a game starts firewheel's stream on the sound card in its place.
 
@@ -21,8 +21,8 @@ use std::num::NonZeroU32;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Pictures per second.
-pub const PICTURES_HZ: u32 = 60;
+/// Updates of the app per second.
+pub const UPDATES_HZ: u32 = 60;
 
 /// A wall of the box: x = 0, x = length, y = 0, y = width, floor, ceiling.
 #[derive(Clone, Copy, Component, Debug, PartialEq, Eq)]
@@ -196,7 +196,7 @@ fn follow_materials(
     }
 }
 
-/// Plays for as long as a picture lasts, and lets firewheel do what it does once a picture.
+/// Plays for as long as an update lasts, and lets firewheel do what it does once an update.
 fn play(
     mut engine: NonSendMut<Engine>,
     voice: Res<Voice>,
@@ -205,7 +205,7 @@ fn play(
 ) {
     let engine = &mut *engine;
     let rate_hz = engine.context.stream_info().map_or(0, |stream| stream.sample_rate.get());
-    let frames = (rate_hz / PICTURES_HZ) as usize;
+    let frames = (rate_hz / UPDATES_HZ) as usize;
     let next = voice.0.iter().cycle().skip(engine.position).take(frames);
     let input: Vec<f32> = if voice.0.is_empty() { vec![0.0; frames] } else { next.copied().collect() };
     engine.position = (engine.position + frames) % voice.0.len().max(1);

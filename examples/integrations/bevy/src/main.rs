@@ -7,7 +7,7 @@
 use bevy_app::App;
 use bevy_ecs::prelude::World;
 use sabine_acoustics::{Channel, SampleFormat, read_audio, write_wav_channels};
-use sabine_with_bevy::{Loudspeaker, PICTURES_HZ, RoomPlugin, Rooms, Shoebox, Voice, Wall, WallMaterial};
+use sabine_with_bevy::{Loudspeaker, UPDATES_HZ, RoomPlugin, Rooms, Shoebox, Voice, Wall, WallMaterial};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -35,9 +35,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             println!("{begin_s} s: wall {wall} becomes {material}");
             change(app.world_mut(), wall, material);
         }
-        for _ in 0..4 * PICTURES_HZ {
+        for _ in 0..4 * UPDATES_HZ {
             app.update();
-            // Pictures are made faster here than they are shown.
+            // Updates come faster here than in a game.
             while app.world().resource::<Rooms>().progress().is_under_way() {
                 std::thread::sleep(Duration::from_millis(1));
             }

@@ -5,7 +5,7 @@
 use bevy_app::App;
 use sabine_acoustics::{ImpulseResponse, Material, library_material};
 use sabine_with_bevy::{
-    Acoustics, Loudspeaker, PICTURES_HZ, Progress, RoomPlugin, Rooms, Shoebox, Voice, Wall, WallMaterial,
+    Acoustics, Loudspeaker, UPDATES_HZ, Progress, RoomPlugin, Rooms, Shoebox, Voice, Wall, WallMaterial,
 };
 use std::time::{Duration, Instant};
 
@@ -69,11 +69,11 @@ fn progress(app: &App) -> Progress {
     app.world().resource::<Rooms>().progress()
 }
 
-/// As many pictures, and more until the last change is heard.
-fn pictures(app: &mut App, count: usize) {
+/// As many updates, and more until the last change is heard.
+fn updates(app: &mut App, count: usize) {
     let begin = Instant::now();
-    for picture in 0.. {
-        if picture >= count && !progress(app).is_under_way() {
+    for update in 0.. {
+        if update >= count && !progress(app).is_under_way() {
             return;
         }
         app.update();
@@ -110,10 +110,10 @@ fn level(app: &App, frames: std::ops::Range<usize>) -> f64 {
 fn walls_change_their_materials_while_one_listens() {
     let voice = noise(5003);
     let (mut app, [bare, furnished]) = app(&voice);
-    pictures(&mut app, 50);
-    let picture = (RATE_HZ / PICTURES_HZ) as usize;
+    updates(&mut app, 50);
+    let update = (RATE_HZ / UPDATES_HZ) as usize;
     let before = app.world().resource::<Loudspeaker>().0.len() / 2;
-    assert!(before >= 50 * picture);
+    assert!(before >= 50 * update);
     for frame in (0..before).step_by(97) {
         let (off, peak) = difference(&app, &voice, &bare, frame);
         assert!(off < 1e-5, "bare, frame {frame}: {off} of {peak}");
@@ -121,19 +121,19 @@ fn walls_change_their_materials_while_one_listens() {
 
     change(&mut app, 4, "carpet_thin");
     change(&mut app, 5, "acoustic_plaster");
-    pictures(&mut app, 1);
+    updates(&mut app, 1);
     // Time for the cross-fade, which is 50 ms long.
-    pictures(&mut app, 10);
+    updates(&mut app, 10);
     let faded = app.world().resource::<Loudspeaker>().0.len() / 2;
-    pictures(&mut app, 50);
+    updates(&mut app, 50);
     let end = app.world().resource::<Loudspeaker>().0.len() / 2;
-    assert!(end >= 100 * picture, "a hundred pictures");
+    assert!(end >= 100 * update, "a hundred updates");
     for frame in (faded..end).step_by(97) {
         let (off, peak) = difference(&app, &voice, &furnished, frame);
         assert!(off < 1e-5, "furnished, frame {frame}: {off} of {peak}");
     }
     assert_eq!(progress(&app).problem, None);
-    let fallen = level(&app, before - 20 * picture..before) - level(&app, end - 20 * picture..end);
+    let fallen = level(&app, before - 20 * update..before) - level(&app, end - 20 * update..end);
     assert!((3.0..20.0).contains(&fallen), "carpet and plaster take {fallen} dB");
 }
 
@@ -141,9 +141,9 @@ fn walls_change_their_materials_while_one_listens() {
 fn a_material_that_nobody_knows_is_a_problem_and_no_silence() {
     let voice = noise(1009);
     let (mut app, [bare, furnished]) = app(&voice);
-    pictures(&mut app, 2);
+    updates(&mut app, 2);
     change(&mut app, 4, "cheese");
-    pictures(&mut app, 40);
+    updates(&mut app, 40);
     let problem = progress(&app).problem.unwrap();
     assert!(problem.contains("cheese"), "{problem}");
     let last = app.world().resource::<Loudspeaker>().0.len() / 2 - 1;
@@ -155,8 +155,8 @@ fn a_material_that_nobody_knows_is_a_problem_and_no_silence() {
         change(&mut app, 5, "acoustic_plaster");
         app.update();
     }
-    pictures(&mut app, 3);
-    pictures(&mut app, 40);
+    updates(&mut app, 3);
+    updates(&mut app, 40);
     let last = app.world().resource::<Loudspeaker>().0.len() / 2 - 1;
     assert!(difference(&app, &voice, &furnished, last).0 < 1e-5, "the last walls are heard");
 }
@@ -170,7 +170,7 @@ fn a_room_that_is_none_is_refused_before_the_app_runs() {
         (refused(Shoebox { source_m: [f64::NAN, 2.0, 1.5], ..shoebox() }), "position"),
         (refused(Shoebox { rays: 0, ..shoebox() }), "rays"),
         (refused(Shoebox { sample_rate_hz: 10, ..shoebox() }), "sample_rate_hz"),
-        (refused(Shoebox { listener_m: shoebox().source_m, ..shoebox() }), ""),
+        (refused(Shoebox { listener_m: shoebox().source_m, ..shoebox() }), "forward vector"),
     ] {
         assert!(error.contains(expected), "{error}");
     }
