@@ -7,7 +7,7 @@
 use bevy_app::App;
 use bevy_ecs::prelude::World;
 use sabine_acoustics::{Channel, SampleFormat, read_audio, write_wav_channels};
-use sabine_with_bevy::{Loudspeaker, UPDATES_HZ, RoomPlugin, Rooms, Shoebox, Voice, Wall, WallMaterial};
+use sabine_with_bevy::{Loudspeaker, RoomPlugin, Rooms, Shoebox, UPDATES_HZ, Voice, Wall, WallMaterial};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Duration;

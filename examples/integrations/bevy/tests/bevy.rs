@@ -5,7 +5,7 @@
 use bevy_app::App;
 use sabine_acoustics::{ImpulseResponse, Material, library_material};
 use sabine_with_bevy::{
-    Acoustics, Loudspeaker, UPDATES_HZ, Progress, RoomPlugin, Rooms, Shoebox, Voice, Wall, WallMaterial,
+    Acoustics, Loudspeaker, Progress, RoomPlugin, Rooms, Shoebox, UPDATES_HZ, Voice, Wall, WallMaterial,
 };
 use std::time::{Duration, Instant};
 
