@@ -27,7 +27,7 @@ def main(heard, picture):
     for begin_s, text in WALLS:
         axis.axvline(begin_s, color="#b8860b", linewidth=1)
         axis.text(begin_s + 0.1, 2, text, color="#7a5a08", fontsize=10)
-    axis.set(xlim=(0, 12), ylim=(-60, 8), xlabel="time (s)", ylabel="level at the left ear (dB)")
+    axis.set(xlim=(0, 12), ylim=(-40, 8), xlabel="time (s)", ylabel="level at the left ear (dB)")
     axis.spines[["top", "right"]].set_visible(False)
     figure.tight_layout()
     figure.savefig(picture)
