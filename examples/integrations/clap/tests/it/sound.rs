@@ -4,9 +4,11 @@ use crate::host::{Rack, change, convolved, decay, noise, state};
 use clack_extensions::audio_ports_config::{AudioPortsConfigBuffer, PluginAudioPortsConfig};
 use clack_extensions::tail::TailLength;
 use clack_host::prelude::ClapId;
-use sabine_acoustics::{ImpulseResponse, SampleFormat, resample_response, write_wav_channels};
+use sabine_acoustics::{
+    Channel, ImpulseResponse, SampleFormat, read_audio, resample_response, write_wav_channels,
+};
 use sabine_clap_plugin::{LATENCY_SAMPLES, Parameter};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use tempfile::TempDir;
 
@@ -196,4 +198,34 @@ fn the_built_in_hall_sounds_at_once() {
     assert!(heard[0] != heard[1], "two sides");
     assert_eq!(rack.asked.log(), []);
     rack.stop(player);
+}
+
+/// The sound of docs/img/clap_hall.png: `cargo test -p sabine-clap-plugin --test it what_the_page_draws -- --ignored`, then `draw_heard.py` of the Bevy
+/// scene.
+#[test]
+#[ignore = "writes out/with_clap/heard.wav"]
+fn what_the_page_draws_of_the_built_in_hall() {
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../.."));
+    let voice = read_audio(root.join("fixtures/speech/dry_guest.wav"), Channel::Mono).unwrap();
+    let rate = voice.sample_rate_hz();
+    let input: Vec<f32> = voice.samples().iter().copied().cycle().take(12 * rate as usize).collect();
+    let at = |seconds: usize| seconds * rate as usize;
+    let events = [
+        change(0, Parameter::Wet, -60.0),
+        change(at(4), Parameter::Wet, -14.0),
+        change(at(8), Parameter::Wet, 0.0),
+    ];
+    let mut rack = Rack::new();
+    let mut player = rack.start(f64::from(rate), 1024, 2);
+    let [left, right] = player.render(&[&input, &input], &events, &[1024]);
+    rack.stop(player);
+    let folder = root.join("out/with_clap");
+    std::fs::create_dir_all(&folder).unwrap();
+    write_wav_channels(folder.join("heard.wav"), &[&left, &right], rate, SampleFormat::Float32).unwrap();
+    // Between words the hall is heard, the more of it the louder.
+    let quietest = |from: usize| {
+        let energies = left[at(from + 1)..at(from + 4)].chunks(rate as usize / 20);
+        energies.map(|part| part.iter().map(|s| s * s).sum::<f32>()).fold(f32::INFINITY, f32::min)
+    };
+    assert!(10.0 * quietest(0) < quietest(4) && 3.0 * quietest(4) < quietest(8));
 }
