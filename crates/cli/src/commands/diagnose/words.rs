@@ -124,7 +124,6 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
                     let known = if findings.held_out.is_none() { "Found" } else { "Sure" };
                     told.push(format!("{known}: {}.", names.join("; ")));
                 }
-
                 told.push(format!("Most likely, but not for sure: {}.", named(last)));
             }
             let names: Vec<String> = set(findings).into_iter().map(effect).collect();

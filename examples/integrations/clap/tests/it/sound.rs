@@ -200,8 +200,8 @@ fn the_built_in_hall_sounds_at_once() {
     rack.stop(player);
 }
 
-/// The sound of docs/img/clap_hall.png: `cargo test -p sabine-clap-plugin --test it what_the_page_draws -- --ignored`, then `draw_heard.py` of the Bevy
-/// scene.
+/// The sound of docs/img/clap_hall.png: `cargo test -p sabine-clap-plugin --test it what_the_page_draws -- --ignored`, then
+/// `docs/img/draw_heard.py`.
 #[test]
 #[ignore = "writes out/with_clap/heard.wav"]
 fn what_the_page_draws_of_the_built_in_hall() {

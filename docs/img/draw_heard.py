@@ -1,10 +1,10 @@
 """Draws the level of a sound at the left ear, and what changed when: docs/img/bevy_walls.png and clap_hall.png.
 
     cargo run -p sabine-with-bevy
-    scratch/bin/python examples/integrations/bevy/draw_heard.py out/with_bevy/heard.wav docs/img/bevy_walls.png \\
+    scratch/bin/python docs/img/draw_heard.py out/with_bevy/heard.wav docs/img/bevy_walls.png \\
         "0 brick all around" "4 carpet on the floor" "8 and plaster and a curtain"                   # numpy, scipy, matplotlib
     cargo test -p sabine-clap-plugin --test it what_the_page_draws -- --ignored
-    scratch/bin/python examples/integrations/bevy/draw_heard.py out/with_clap/heard.wav docs/img/clap_hall.png \\
+    scratch/bin/python docs/img/draw_heard.py out/with_clap/heard.wav docs/img/clap_hall.png \\
         "0 wet off" "4 wet -14 dB" "8 wet 0 dB"
 """
 import sys
