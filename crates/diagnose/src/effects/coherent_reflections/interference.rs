@@ -11,7 +11,7 @@ use crate::statistics::exp_all;
 use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
-use sabine_acoustics::{FilterBank, PerBand};
+use sabine_acoustics::{Bands, FilterBank, PerBand};
 use std::f64::consts::PI;
 
 /// Images that are summed for a pair, at most: where more would be heard in time, the last bins are open.
@@ -64,40 +64,46 @@ struct SpecularPaths {
     arrivals: Vec<[f32; 3]>,
     /// `[band][path]`.
     energies: Vec<Vec<f64>>,
-    /// All that arrive before, in seconds after the direct sound.
-    complete_s: f64,
+    /// Until when bins of each band are summed, in seconds after the direct sound: what is heard in them is there, with what arrives
+    /// after them and rings back into them.
+    summed_until_s: Vec<f64>,
     /// Whether those that arrive later are in phase as these are: images of a cuboid, not what a mesh of any shape scatters.
     is_in_phase_to_the_end: bool,
 }
 
 /// Tabulates by how much sums of pressures differ from those of energies at the materials of the expansion.
 pub(super) fn prepare(room: &TracedRoomView<'_>) -> Result<Tables, Unprepared> {
-    let bands = room.survey().bands();
-    let pulses: Vec<(f64, BandPulse)> = (0..bands.len())
-        .map(|band| {
-            let rate_hz = (SAMPLES_PER_PERIOD * bands.exact_hz(band)).max(MIN_RATE_HZ).ceil();
-            let mut own = BandPulse::all(bands.part(band..band + 1), rate_hz as u32, CELL_S)?;
-            Ok((rate_hz, own.swap_remove(0)))
-        })
-        .collect::<Result<_, Error>>()?;
+    let pulses = pulses(room.survey().bands())?;
     Ok(Tables::of_bins(room.by_pair(|pair| of_pair(pair, &pulses))?))
 }
 
+/// The pulse of each band by a filter of its own, at a sample rate that is enough for it.
+fn pulses(bands: Bands) -> Result<Vec<(f64, BandPulse)>, Error> {
+    let of = |band: usize| {
+        let rate_hz = (SAMPLES_PER_PERIOD * bands.exact_hz(band)).max(MIN_RATE_HZ).ceil();
+        let mut own = BandPulse::all(bands.part(band..band + 1), rate_hz as u32, CELL_S)?;
+        Ok((rate_hz, own.swap_remove(0)))
+    };
+    (0..bands.len()).map(of).collect()
+}
+
 fn of_pair(pair: &TracedPairView<'_>, pulses: &[(f64, BandPulse)]) -> Result<Vec<Interference>, Error> {
-    let paths = specular_paths(pair)?;
+    let reaches_s: Vec<f64> = pulses.iter().map(|(_, pulse)| pulse.reach_s()).collect();
+    let paths = specular_paths(pair, &reaches_s)?;
     let moves = moves_m(pair, &paths);
     (0..pulses.len()).map(|band| of_band(pair, band, &paths, &moves, &pulses[band])).collect()
 }
 
-/// All images of a cuboid within the compared time, or the early exact paths of another room; none where there is no direct sound.
-fn specular_paths(pair: &TracedPairView<'_>) -> Result<SpecularPaths, Error> {
+/// All images of a cuboid within the compared time, or the early exact paths of another room, and those that come so soon after that a pulse of
+/// some band rings back (`reaches_s`); none where there is no direct sound.
+fn specular_paths(pair: &TracedPairView<'_>, reaches_s: &[f64]) -> Result<SpecularPaths, Error> {
     let bands = pair.room().survey().bands();
     let mut found = SpecularPaths {
         lengths_m: Vec::new(),
         departures: Vec::new(),
         arrivals: Vec::new(),
         energies: vec![Vec::new(); bands.len()],
-        complete_s: 0.0,
+        summed_until_s: vec![0.0; bands.len()],
         is_in_phase_to_the_end: false,
     };
     if !pair.has_direct() {
@@ -105,10 +111,11 @@ fn specular_paths(pair: &TracedPairView<'_>) -> Result<SpecularPaths, Error> {
     }
     let (air, direct_s) = (pair.air(), pair.direct_s());
     let speed_m_s = air.speed_of_sound_m_s();
+    let longest_s = reaches_s.iter().copied().fold(0.0, f64::max);
     let Some(faces) = pair.room().cuboid_faces() else {
         let energies = pair.energies(pair.room().materials())?;
         let paths = pair.paths();
-        let end_m = (direct_s + EXACT_S) * speed_m_s;
+        let end_m = (direct_s + EXACT_S + longest_s) * speed_m_s;
         let early = |i: &usize| paths.is_exact(*i) && f64::from(paths.lengths_m()[*i]) < end_m;
         for i in (0..paths.len()).filter(early) {
             found.lengths_m.push(f64::from(paths.lengths_m()[i]));
@@ -116,14 +123,15 @@ fn specular_paths(pair: &TracedPairView<'_>) -> Result<SpecularPaths, Error> {
             found.arrivals.push(paths.arrival(i).map(|x| x as f32));
             found.energies.iter_mut().zip(&energies).for_each(|(own, all)| own.push(f64::from(all[i])));
         }
-        found.complete_s = EXACT_S;
+        found.summed_until_s.fill(EXACT_S);
         return Ok(found);
     };
     let compared_s = (0..bands.len()).map(|band| pair.compared_s(band)).fold(0.0, f64::max);
     let volume_m3 = pair.room().scene().volume_m3().abs();
     let most_m = (MOST_IMAGES * volume_m3 * 3.0 / (4.0 * PI)).cbrt();
-    let max_length_m = ((direct_s + compared_s) * speed_m_s).min(most_m);
-    found.complete_s = max_length_m / speed_m_s - direct_s;
+    let max_length_m = ((direct_s + compared_s + longest_s) * speed_m_s).min(most_m);
+    found.summed_until_s =
+        reaches_s.iter().map(|reach_s| max_length_m / speed_m_s - direct_s - reach_s).collect();
     found.is_in_phase_to_the_end = true;
     let mut reflections: Vec<[u16; 6]> = Vec::new();
     pair.for_each_image(max_length_m, &mut |image| {
@@ -195,7 +203,7 @@ fn of_band(
     let bands = pair.room().survey().bands();
     let bins = Bins::new(bands, band);
     let compared = bins.count(pair.compared_s(band) + 1e-9).min(pair.ln_energy(band).len());
-    let count = bins.count(paths.complete_s + 1e-9).min(compared);
+    let count = bins.count(paths.summed_until_s[band] + 1e-9).min(compared);
     if count == 0 || paths.lengths_m.is_empty() {
         return Ok(Interference::default());
     }
@@ -259,7 +267,8 @@ fn energies_apart(
     pulse: &BandPulse,
     after_s: &dyn Fn(usize) -> f64,
 ) -> Vec<f64> {
-    let mut cells = vec![0.0f64; (bins.edge_s(count) / FINE_CELL_S).ceil().max(0.0) as usize + 1];
+    let end_s = bins.edge_s(count) + pulse.reach_s();
+    let mut cells = vec![0.0f64; (end_s / FINE_CELL_S).ceil().max(0.0) as usize + 1];
     for (path, &energy) in paths.energies[band].iter().enumerate() {
         if let Some(cell) = cells.get_mut((after_s(path).max(0.0) / FINE_CELL_S) as usize) {
             *cell += energy;
@@ -293,7 +302,47 @@ fn add_pulse(signal: &mut [f64], at: f64, amplitude: f64) {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)] // a panic is how a test fails
     use super::*;
+    use crate::config::DiagnoseConfig;
+    use crate::infer::baseline::Baseline;
+    use crate::simulate::scene_tracer::{Rays, SceneTracer};
+    use sabine_testkit::{LabConfig, Laboratory};
+    use std::sync::Arc;
+
+    /// A low octave rings for several bins: images that arrive after the last one are heard in it.
+    #[test]
+    fn what_arrives_after_the_last_bin_is_summed_with_it() {
+        let lab = Laboratory::new(LabConfig { seed: 31, receivers: 2, ..LabConfig::default() }).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let room = lab.write(&[], &folder.path().join("room"), None).unwrap();
+        let config = DiagnoseConfig { rays: 200, wave_solutions: false, ..DiagnoseConfig::default() };
+        let tracer: Arc<dyn SceneTracer> = Arc::new(Rays { config: config.tracer() });
+        let baseline = Baseline::new(&room, &[], &config, &tracer, &()).unwrap();
+        let view = baseline.room_view().unwrap();
+        let pair = view.pair(0);
+        let pulses = pulses(view.survey().bands()).unwrap();
+        let reaches_s: Vec<f64> = pulses.iter().map(|(_, pulse)| pulse.reach_s()).collect();
+        let changes = |later_s: &dyn Fn(f64) -> f64| -> Vec<Vec<f64>> {
+            let later: Vec<f64> = reaches_s.iter().map(|&r| later_s(r)).collect();
+            let mut paths = specular_paths(&pair, &later).unwrap();
+            paths.summed_until_s = vec![10.0; pulses.len()];
+            // As they stand: other places would be drawn for other lists of paths.
+            let moves = vec![vec![0.0; paths.lengths_m.len()]; 2];
+            let of = |band| of_band(&pair, band, &paths, &moves, &pulses[band]).unwrap().change;
+            (0..pulses.len()).map(of).collect()
+        };
+        let most_apart = |a: &[Vec<f64>], b: &[Vec<f64>]| -> f64 {
+            let each = a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).abs());
+            each.fold(0.0, f64::max)
+        };
+        let (own, longer) = (changes(&|r| r), changes(&|r| r + 0.05));
+        assert!(own.iter().all(|c| c.len() > 10));
+        assert!(most_apart(&own, &longer) < 0.02, "{}", most_apart(&own, &longer));
+        // The images that make the difference.
+        let short = changes(&|_| 0.0);
+        assert!(most_apart(&short, &longer) > 0.3, "{}", most_apart(&short, &longer));
+    }
 
     #[test]
     fn a_pulse_between_samples_is_a_delay_below_a_fifth_of_the_sample_rate() {
