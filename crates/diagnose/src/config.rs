@@ -29,7 +29,7 @@ pub struct DiagnoseConfig {
     pub naming_nats: f64,
     /// Probability of a lack of fit below which a misfit counts as real, 1e-6 to 0.5.
     pub significance: f64,
-    /// Most causes that are named, 1 to 5.
+    /// Most causes of decays that are named, and most of all others (places, geometry, clocks, channels), 1 to 5.
     pub most_causes: usize,
     /// Simulated measurements behind the calibration of the lack of fit, 10 to 1000.
     pub simulations: usize,

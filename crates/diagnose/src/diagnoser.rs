@@ -35,7 +35,7 @@ const MOST_FALLEN: usize = 3;
 /// 2. Fits every case of every effect beside all of these, and the smooth discrepancy that has no name; the evidence of each is its
 ///    likelihood with all parameters integrated out (Laplace's approximation), which charges for every parameter that is not needed.
 /// 3. Names the strongest if its odds, corrected for the number tried, reach [`DiagnoseConfig::naming_nats`]; and so on up to
-///    [`DiagnoseConfig::most_causes`]; drops those that later ones made superfluous.
+///    [`DiagnoseConfig::most_causes`] of decays and as many others; drops those that later ones made superfluous.
 /// 4. Where a cause of decays could owe its evidence to the rays that were drawn, starts again with four times as many.
 /// 5. Predicts positions that it leaves out.
 ///

@@ -127,12 +127,12 @@ impl Diagnoser {
     ) -> Result<Weighed, Error> {
         let (Some(effect), Some(inherited_nats)) = (self.law_effect(), task.laws) else { return Ok(weighed) };
         let chosen = weighed.found.chosen.clone();
-        let room_left = chosen.len() < weighed.given.len() + self.config.most_causes;
-        if chosen.is_empty() || !room_left || !weighed.found.rivals.is_empty() {
+        let open = weighed.found.open(&weighed.cases, self.config.most_causes);
+        if chosen.is_empty() || !open.decays || !weighed.found.rivals.is_empty() {
             return Ok(weighed);
         }
         let state = weighed.search(task.effects).state(&chosen, None)?;
-        let Weighed { baseline, cases, used, found, arrival_fits, given, .. } = &mut weighed;
+        let Weighed { baseline, cases, used, found, arrival_fits, .. } = &mut weighed;
         let slot = baseline.simulation.tables.len();
         let own = (effect, &UnknownLaw.id(), slot, inherited_nats);
         let more = shortlist(baseline, cases, &state, used, own)?;
@@ -141,12 +141,8 @@ impl Diagnoser {
         }
         baseline.add_slots(more.len());
         cases.extend(more);
-        let most = baseline.config.most_causes;
-        baseline.config.most_causes = most + given.len() - chosen.len();
         let named = std::mem::take(found);
-        let again = select(baseline, cases, task.effects, (&used[..], arrival_fits), named, observer);
-        baseline.config.most_causes = most;
-        weighed.found = again?;
+        weighed.found = select(baseline, cases, task.effects, (&used[..], arrival_fits), named, observer)?;
         weighed.could_be_chance = could_be_chance(&weighed.search(task.effects), &weighed.found.chosen)?;
         Ok(weighed)
     }

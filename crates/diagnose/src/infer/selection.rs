@@ -6,7 +6,7 @@ use crate::extend::extension::changes;
 use crate::extend::model_change::ModelChange;
 use crate::infer::arrival_fits::ArrivalFits;
 use crate::infer::baseline::{self, Baseline};
-use crate::infer::candidates::{CatalogueCase, EffectScore, Score};
+use crate::infer::candidates::{CatalogueCase, EffectScore};
 use crate::infer::ray_dependence::MoreWithHalf;
 use crate::infer::search::{Search, State};
 use sabine_acoustics::Observer;
@@ -19,6 +19,8 @@ const ROUNDS: usize = 4;
 #[derive(Default)]
 pub(crate) struct Selection {
     pub chosen: Vec<usize>,
+    /// Those of them that were given, and not found.
+    given: Vec<usize>,
     probabilities: Vec<(usize, f64)>,
     /// The last cause and those that explain as much: a set.
     pub rivals: Vec<String>,
@@ -43,6 +45,13 @@ impl Selection {
         self.chosen.retain(|&c| c != candidate);
     }
 
+    /// Of which observables more causes may be named: so many of decays (`most`), and as many of all others, for these speak of other data.
+    pub fn open(&self, cases: &[CatalogueCase], most: usize) -> Open {
+        let found = || self.chosen.iter().filter(|c| !self.given.contains(c));
+        let of_decays = found().filter(|&&c| is_of_decays(cases, c)).count();
+        Open { decays: of_decays < most, others: found().count() - of_decays < most }
+    }
+
     pub fn probability(&self, candidate: usize) -> f64 {
         self.probabilities.iter().find(|p| p.0 == candidate).map_or(0.0, |p| p.1)
     }
@@ -51,6 +60,17 @@ impl Selection {
     pub fn interchangeable(&self, candidate: usize) -> &[usize] {
         self.interchangeable.iter().find(|i| i.0 == candidate).map_or(&[], |i| &i.1)
     }
+}
+
+/// Whether more causes may be named that bear on decays alone, and others.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Open {
+    pub decays: bool,
+    pub others: bool,
+}
+
+fn is_of_decays(cases: &[CatalogueCase], candidate: usize) -> bool {
+    cases[candidate].case.observable() == Observable::Decay
 }
 
 /// Puts causes that are given to work, one after the other, as if each had been named; their probabilities are those against their absence.
@@ -73,6 +93,7 @@ pub(crate) fn give(
         };
         named.probabilities.push((candidate, 1.0 / (1.0 + (-odds).exp())));
         named.chosen.push(candidate);
+        named.given.push(candidate);
         put_to_work(baseline, cases, effects, &named.chosen, (used, arrival_fits))?;
     }
     Ok(named)
@@ -88,10 +109,15 @@ pub(crate) fn select(
     mut named: Selection,
     observer: &dyn Observer,
 ) -> Result<Selection, Error> {
-    let most = named.chosen.len() + baseline.config.most_causes;
     // The cause that stands for a set of those that move paths.
     let mut stands_for_set: Option<usize> = None;
-    while named.chosen.len() < most {
+    loop {
+        let mut open = named.open(cases, baseline.config.most_causes);
+        // Whichever of a set moves the paths, decays say the same of what they alone tell.
+        open.others &= stands_for_set.is_none();
+        if !open.decays && !open.others {
+            break;
+        }
         baseline.prepare_rest(cases)?;
         let (ranked, rivals, interchangeable, threshold) = {
             let search = Search::new(baseline, cases, effects, used.to_vec()).knowing(arrival_fits);
@@ -101,9 +127,7 @@ pub(crate) fn select(
             // What a cause stands for as well is not named beside it.
             scores.retain(|s| named.interchangeable.iter().all(|(_, others)| !others.contains(&s.candidate)));
             scores.retain(|s| named.without.iter().all(|&w| cases[w].effect != cases[s.candidate].effect));
-            // Whichever of a set moves the paths, decays say the same of what they alone tell.
-            let of_decays = |s: &Score| cases[s.candidate].case.observable() == Observable::Decay;
-            scores.retain(|s| stands_for_set.is_none() || of_decays(s));
+            scores.retain(|s| if is_of_decays(cases, s.candidate) { open.decays } else { open.others });
             let mut ranked: Vec<EffectScore> = search
                 .by_effect(&scores)
                 .into_iter()
@@ -130,14 +154,14 @@ pub(crate) fn select(
         // A second set beside the first has no name: which of one it is may hang on which of the other.
         let second_set = stands_for_set.is_some() && !rivals.is_empty();
         let Some(best) = ranked.first().filter(|b| b.nats >= threshold && !second_set) else {
-            // Beside a set not all were weighed.
-            named.last = stands_for_set.is_none().then(|| (named.chosen.clone(), ranked));
+            let all_were_weighed = open.decays && open.others;
+            named.last = all_were_weighed.then(|| (named.chosen.clone(), ranked));
             break;
         };
         let strongest = best.nats.max(0.0);
         // One that was put first competes with those that bear on the same data.
-        let of_decays = |r: &&EffectScore| cases[r.best].case.observable() == Observable::Decay;
-        let competes = |r: &&EffectScore| of_decays(&best) || !of_decays(r) || r.nats <= best.nats;
+        let of_decays = |r: &EffectScore| is_of_decays(cases, r.best);
+        let competes = |r: &&EffectScore| of_decays(best) || !of_decays(r) || r.nats <= best.nats;
         let sum: f64 = ranked.iter().filter(competes).map(|r| (r.nats - strongest).exp()).sum::<f64>()
             + (threshold - baseline.config.naming_nats - strongest).exp();
         named.probabilities.push((best.best, (best.nats - strongest).exp() / sum));

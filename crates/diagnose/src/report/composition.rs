@@ -160,7 +160,9 @@ fn notes_on(
         .collect();
     let dropped: Vec<(&str, Doubt)> =
         confirmed.dropped.iter().map(|&(c, doubt)| (search.candidates[c].id, doubt)).collect();
-    let most = state.chosen.len() >= baseline.config.most_causes;
+    let of_decays =
+        state.chosen.iter().filter(|&&c| search.candidates[c].case.observable() == Observable::Decay).count();
+    let most = of_decays.max(state.chosen.len() - of_decays) >= baseline.config.most_causes;
     let more = if most || !alternatives.is_empty() {
         speaking(search, confirmed, candidates, alternatives)
     } else {

@@ -99,7 +99,10 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
     let (most, more) = about.not_sought;
     if !more.is_empty() {
         let ended = if most {
-            format!("No more than {} causes are named", about.baseline.config.most_causes)
+            format!(
+                "No more than {0} causes of decays and {0} others are named",
+                about.baseline.config.most_causes
+            )
         } else {
             "The search ended at causes that cannot be told apart".to_owned()
         };
