@@ -6,6 +6,7 @@ mod file;
 pub(crate) mod materials;
 mod model;
 mod notes;
+mod odeon;
 mod other_model;
 mod parameter_tables;
 mod position_sd;

@@ -2,7 +2,7 @@
 //!
 //! Absorption and scattering in percent from 125 Hz to 4 kHz, after a colon at 8 and 16 kHz; `ABS1` and `L1` hold shares of 1; `{r g b}` is a
 //! colour; a semicolon begins a remark. Source: CATT-Acoustic v8.0, example of the manual (MASTER.GEO), and programs that are public
-//! and read such files. Of Odeon's and EASE's tables no public description was found.
+//! and read such files.
 
 use super::materials::{MaterialTable, Materials};
 use super::{MaterialPrior, tables::DEFAULT_SCATTERING};
