@@ -12,7 +12,7 @@ pub struct Arguments {
     /// Comma-separated values: name, absorption in each octave, depth of the relief in m, description, source
     #[arg(long)]
     csv: bool,
-    /// Tables to be turned into another form: a materials.toml, or a geometry file of CATT-Acoustic (.geo)
+    /// Tables to be turned into another form: a materials.toml, a geometry file of CATT-Acoustic (.geo), or a list of Odeon (.li8)
     #[arg(long, value_name = "FILE", requires = "out", conflicts_with = "csv")]
     from: Option<PathBuf>,
     /// The file to be written: its ending says the form, .toml or .geo
@@ -43,16 +43,26 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 /// Tables from one file to another.
 fn convert(from: &Path, out: &Path) -> Result<(), Failure> {
-    let form = |path: &Path| match path.extension().map(|ending| ending.to_ascii_lowercase()) {
-        Some(ending) if ending == "toml" => Ok(false),
-        Some(ending) if ending == "geo" => Ok(true),
+    let ending = |path: &Path| path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+    let (form, to) = (ending(from), ending(out));
+    if !matches!(to.as_deref(), Some("toml" | "geo")) {
+        let path = out.display();
+        return Err(format!(
+            "{path}: tables of materials are written to .toml, or to .geo for CATT-Acoustic"
+        )
+        .into());
+    }
+    let materials = match form.as_deref() {
+        Some("toml") => Materials::read(from)?,
+        Some("geo") => Materials::read_catt(from)?,
+        Some("li8") => Materials::read_odeon(from)?,
         _ => {
-            Err(format!("{}: tables of materials end in .toml, or in .geo for CATT-Acoustic", path.display()))
+            let path = from.display();
+            let forms = "in .toml, in .geo for CATT-Acoustic, or in .li8 for Odeon";
+            return Err(format!("{path}: tables of materials end {forms}").into());
         }
     };
-    let (catt, to_catt) = (form(from)?, form(out)?);
-    let materials = if catt { Materials::read_catt(from)? } else { Materials::read(from)? };
-    if to_catt {
+    if to.as_deref() == Some("geo") {
         materials.write_catt(out)?;
     } else {
         materials.write(out)?;

@@ -2,7 +2,7 @@
 
 use crate::sabine;
 use base64::Engine as _;
-use sabine::scene::{Levels, MeasuredRoom, TimeZero};
+use sabine::scene::{Levels, Materials, MeasuredRoom, TimeZero};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::Output;
@@ -217,7 +217,7 @@ fn tables_of_catt_go_in_and_out() {
         [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
     );
     for (arguments, words) in [
-        (["--from", "master.geo", "--out", "x.li8"], "x.li8: tables of materials end in"),
+        (["--from", "master.geo", "--out", "x.li8"], "x.li8: tables of materials are written to .toml"),
         (["--from", "none.geo", "--out", "x.toml"], "none.geo"),
     ] {
         let text = refused(folder, &run(folder, "materials", &arguments), 5);
@@ -226,4 +226,21 @@ fn tables_of_catt_go_in_and_out() {
     std::fs::write(folder.join("master.geo"), geo.replace("<1 2", "<1 200")).unwrap();
     let text = refused(folder, &run(folder, "materials", &["--from", "master.geo", "--out", "x.toml"]), 5);
     assert!(text.contains("master.geo: line 2: absorption"), "{text}");
+}
+
+#[test]
+fn a_list_of_odeon_becomes_tables() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let values = "\t0.1\t0.1\t0.2\t0.3\t0.4\t0.5\t0.6\t0.7\n\n";
+    std::fs::write(folder.join("List.Li8"), format!("0\tTransparent\n{values}17\tTimber floor\n{values}"))
+        .unwrap();
+    let text = printed(&run(folder, "materials", &["--from", "List.Li8", "--out", "m.toml"]));
+    assert!(text.contains("1 materials"), "{text}");
+    let read = Materials::read(folder.join("m.toml")).unwrap();
+    let timber = read.get("17 Timber floor").unwrap();
+    assert_eq!(timber.absorption.as_ref().unwrap().values(), [0.1, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]);
+    std::fs::write(folder.join("List.Li8"), "17\tTimber floor\n\t0,1\n").unwrap();
+    let text = refused(folder, &run(folder, "materials", &["--from", "List.Li8", "--out", "x.toml"]), 2);
+    assert!(text.contains("List.Li8: line 2: cannot read `0,1`"), "{text}");
 }
