@@ -103,12 +103,12 @@ class Prism:
         return nearest if inside else -abs(nearest)
 
 
-def draw(random, receivers, with_cut):
+def draw(random, receivers, with_cut, uneven):
     """A room: its shape, tables, places, climate."""
     sides = [random.uniform(4.0, 7.5), random.uniform(3.5, 6.0), random.uniform(2.4, 3.3)]
     level = {name: random.uniform(0.15, 0.4) for name in SHAPES}
     absorption = {
-        name: np.clip(level[name] * 10 ** (0.05 * np.array(SHAPES[name]) + random.normal(0, 0.06, 6)), 0.03, 0.7)
+        name: np.clip(level[name] * 10 ** (uneven * (0.05 * np.array(SHAPES[name]) + random.normal(0, 0.06, 6))), 0.03, 0.7)
         for name in SHAPES
     }
     if with_cut:
@@ -260,6 +260,7 @@ def main():
     parser.add_argument("--effect", choices=EFFECTS, default="null")
     parser.add_argument("--shape", choices=["box", "l"], default="box", help="l needs --method rays")
     parser.add_argument("--receivers", type=int, default=8)
+    parser.add_argument("--uneven", type=float, default=1.0, help="how much absorption differs from octave to octave; 0 for the same in all")
     parser.add_argument("--rays", type=int, default=100_000, help="of pyroomacoustics")
     parser.add_argument(
         "--scattering",
@@ -275,7 +276,7 @@ def main():
         parser.error("--shape l needs --method rays: images of every order are those of a box")
 
     random = np.random.default_rng(arguments.seed)
-    prism, absorption, places, climate = draw(random, arguments.receivers, arguments.shape == "l")
+    prism, absorption, places, climate = draw(random, arguments.receivers, arguments.shape == "l", arguments.uneven)
     true = planted(arguments.effect, random, prism, absorption, places, climate)
     true_prism, true_absorption, true_places, true_climate, recorder, hidden = true
     # Nobody knows tables and places exactly: the file is off, the truth is what was drawn.

@@ -305,16 +305,30 @@ impl Baseline {
         used: &[bool],
         before: WarmStart<'_>,
     ) -> Result<Option<f64>, Error> {
+        let within = |ends: Vec<Vec<usize>>| self.evidence_within(&ends, cases, used, Some(before));
+        self.ends_above_modes().map(within).transpose()
+    }
+
+    /// First bins that are not compared, `[pair][band]`, if octaves below the Schroeder frequency are left out; none where no other is left.
+    pub fn ends_above_modes(&self) -> Option<Vec<Vec<usize>>> {
         let modes = self.survey().bands_of_modes;
         let above = |ends: &Vec<usize>| -> Vec<usize> {
             ends.iter().enumerate().map(|(band, &end)| if band < modes { 0 } else { end }).collect()
         };
         let ends: Vec<Vec<usize>> = self.simulation.ends.iter().map(above).collect();
-        if ends.iter().flatten().all(|&end| end == 0) {
-            return Ok(None);
-        }
-        let data = EnergyData { ends: &ends, ..self.energy_data() };
-        Ok(Some(decay::fit(&data, cases, used, Some(before))?.0.log_evidence))
+        ends.iter().flatten().any(|&end| end > 0).then_some(ends)
+    }
+
+    /// Evidence of the decays in the bins before `ends`, `[pair][band]`.
+    pub fn evidence_within(
+        &self,
+        ends: &[Vec<usize>],
+        cases: &[&Case],
+        used: &[bool],
+        before: Option<WarmStart<'_>>,
+    ) -> Result<f64, Error> {
+        let data = EnergyData { ends, ..self.energy_data() };
+        Ok(decay::fit(&data, cases, used, before)?.0.log_evidence)
     }
 
     /// The rival without a name.

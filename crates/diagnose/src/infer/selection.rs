@@ -6,14 +6,16 @@ use crate::extend::extension::changes;
 use crate::extend::model_change::ModelChange;
 use crate::infer::arrival_fits::ArrivalFits;
 use crate::infer::baseline::{self, Baseline};
-use crate::infer::candidates::{CatalogueCase, EffectScore};
+use crate::infer::candidates::{CatalogueCase, EffectScore, Score};
 use crate::infer::ray_dependence::MoreWithHalf;
-use crate::infer::search::{Search, State};
+use crate::infer::search::{RIVAL_NATS, Search, State};
 use sabine_acoustics::Observer;
 use std::sync::Arc;
 
 /// Expansions about the fit with one cause more, at most.
 const ROUNDS: usize = 4;
+/// Cases of one effect that are compared each with the materials that it asks for, at most: each takes up to so many expansions.
+const MOST_COMPARED: usize = 4;
 
 /// What the search found.
 #[derive(Default)]
@@ -119,7 +121,7 @@ pub(crate) fn select(
             break;
         }
         baseline.prepare_rest(cases)?;
-        let (ranked, rivals, interchangeable, threshold) = {
+        let (mut ranked, rivals, mut interchangeable, near, threshold) = {
             let search = Search::new(baseline, cases, effects, used.to_vec()).knowing(arrival_fits);
             let base = search.state(&[], None)?;
             let state = search.state(&named.chosen, Some(&base))?;
@@ -140,13 +142,18 @@ pub(crate) fn select(
             let threshold = search.threshold();
             put_first_what_moves_paths(&search, &state, &mut ranked)?;
             let named_now = ranked.first().is_some_and(|best| best.nats >= threshold);
-            let (mut rivals, mut interchangeable) = (Vec::new(), Vec::new());
+            let (mut rivals, mut interchangeable, mut near) = (Vec::new(), Vec::new(), Vec::new());
             if named_now {
+                near = worth_a_name(&search, &scores, &ranked[0]);
                 (ranked[0], interchangeable) = search.best_case(&state, &scores, &ranked[0])?;
                 rivals = search.rivals(&state, &ranked)?;
             }
-            (ranked, rivals, interchangeable, threshold)
+            (ranked, rivals, interchangeable, near, threshold)
         };
+        if near.len() > 1 && follows_materials(cases, &named.chosen) {
+            (ranked[0].best, interchangeable) =
+                best_where_each_fits(baseline, cases, effects, (&named.chosen, &near), (used, arrival_fits))?;
+        }
         if named.first.is_empty() {
             named.first.clone_from(&ranked);
             named.first.sort_by(|a, b| b.nats.total_cmp(&a.nats));
@@ -191,6 +198,56 @@ pub(crate) fn select(
     Ok(named)
 }
 
+/// Whether a cause predicts something else about other materials (sums of pressures do).
+fn follows_materials(cases: &[CatalogueCase], chosen: &[usize]) -> bool {
+    chosen.iter().any(|&c| cases[c].case.decay_term().is_some_and(DecayTerm::depends_on_expansion))
+}
+
+/// Cases of an effect that bear on decays alone and each would be worth a name, the best first.
+fn worth_a_name(search: &Search<'_>, scores: &[Score], effect: &EffectScore) -> Vec<usize> {
+    let least = search.threshold() + search.price(effect.best);
+    let mut own: Vec<&Score> = scores
+        .iter()
+        .filter(|s| search.candidates[s.candidate].effect == effect.effect && s.nats >= least)
+        .filter(|s| search.candidates[s.candidate].case.observable() == Observable::Decay)
+        .collect();
+    own.sort_by(|a, b| b.nats.total_cmp(&a.nats));
+    own.iter().take(MOST_COMPARED).map(|s| s.candidate).collect()
+}
+
+/// The best of several cases of one effect beside what is named, and those that explain as much, each with the materials that it asks for:
+/// beside a cause that follows materials all but the right one would else be judged by what it predicts about wrong ones.
+fn best_where_each_fits(
+    baseline: &mut Baseline,
+    cases: &[CatalogueCase],
+    effects: usize,
+    (named, near): (&[usize], &[usize]),
+    fits: (&[bool], &Arc<ArrivalFits>),
+) -> Result<(usize, Vec<usize>), Error> {
+    let absorption = baseline.simulation.absorption.clone();
+    // Evidence can be compared in the same bins alone.
+    let ends = baseline.ends_above_modes().unwrap_or_else(|| baseline.simulation.ends.clone());
+    let mut found: Vec<(usize, f64)> = Vec::new();
+    for &candidate in near {
+        let chosen = [named, &[candidate]].concat();
+        expand_about_fit(baseline, cases, effects, &chosen, fits)?;
+        found.push((
+            candidate,
+            baseline.evidence_within(&ends, &cases_of_decays(cases, &chosen), fits.0, None)?,
+        ));
+        baseline.simulation.absorption.clone_from(&absorption);
+        baseline.expand(cases, &[named, near].concat())?;
+    }
+    found.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let (best, most) = found[0];
+    let as_good = |(_, nats): &&(usize, f64)| most - nats < RIVAL_NATS;
+    Ok((best, found[1..].iter().filter(as_good).map(|(candidate, _)| *candidate).collect()))
+}
+
+fn cases_of_decays<'c>(cases: &'c [CatalogueCase], chosen: &[usize]) -> Vec<&'c Case> {
+    chosen.iter().map(|&c| &cases[c].case).filter(|c| c.observable().concerns(Observable::Decay)).collect()
+}
+
 /// Takes the cause named last into paths, expansion and scatter.
 fn put_to_work(
     baseline: &mut Baseline,
@@ -202,12 +259,7 @@ fn put_to_work(
     for change in &expand_about_fit(baseline, cases, effects, chosen, fits)? {
         baseline.retrace(change, cases, chosen)?;
     }
-    let of_decays: Vec<&Case> = chosen
-        .iter()
-        .map(|&c| &cases[c].case)
-        .filter(|c| c.observable().concerns(Observable::Decay))
-        .collect();
-    baseline.calibrate_scatter(&of_decays, fits.0)
+    baseline.calibrate_scatter(&cases_of_decays(cases, chosen), fits.0)
 }
 
 /// With a cause at work the materials are others: what is compared, and with which spread, follows them. Expands about their fit, where a
@@ -220,8 +272,7 @@ fn expand_about_fit(
     (used, arrival_fits): (&[bool], &Arc<ArrivalFits>),
 ) -> Result<Vec<ModelChange>, Error> {
     let Some(&last) = chosen.last() else { return Ok(Vec::new()) };
-    let again =
-        chosen.iter().any(|&c| cases[c].case.decay_term().is_some_and(DecayTerm::depends_on_expansion));
+    let again = follows_materials(cases, chosen);
     // Of the expansion before: evidence, absorption, changes.
     let mut before: Option<(f64, Vec<Vec<f64>>, Vec<ModelChange>)> = None;
     let mut round = 0;

@@ -3,6 +3,7 @@
 //! The laboratory sums the modes of its box in closed form; the diagnosis solves the wave equation on voxels.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
+use crate::rivals::diagnoser_among;
 use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, Verdict};
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
 
@@ -90,4 +91,23 @@ fn reflections_that_add_in_phase_are_named() {
 #[ignore = "nightly: minutes"]
 fn in_another_room_reflections_that_add_in_phase_are_named() {
     reflections_in_phase_are_all_that_is_named(9102);
+}
+
+/// What sums of pressures predict hangs on the materials: the right one is told if each is weighed with those that it asks for.
+#[test]
+fn beside_reflections_in_phase_the_material_that_is_another_is_told() {
+    let config = LabConfig { seed: 9103, receivers: 8, positive_reflections: true, ..LabConfig::default() };
+    let lab = Laboratory::new(config).unwrap();
+    let hidden = Hidden::random("surface_absorption", 1.0, &lab, 9103).unwrap();
+    let Hidden::SurfaceAbsorption { material, .. } = hidden else { panic!("{hidden:?}") };
+    let folder = tempfile::tempdir().unwrap();
+    let room = lab.write(&[hidden], &folder.path().join("room"), None).unwrap();
+    let config = DiagnoseConfig { rays: 1000, ..DiagnoseConfig::default() };
+    let effects = ["coherent_reflections", "surface_absorption", "coupled_volume"];
+    let found = diagnoser_among(config, &effects).diagnose(&room, &[], &()).unwrap();
+    let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
+    assert_eq!(named, ["coherent_reflections", "surface_absorption"], "{:?}", found.lack_of_fit);
+    let cause = &found.causes[1];
+    assert_eq!(cause.subject.as_deref(), Some(lab.scene().materials()[material].name.as_str()));
+    assert!(cause.other_subjects.is_empty(), "{:?}", cause.other_subjects);
 }
