@@ -121,34 +121,9 @@ pub(crate) fn select(
             break;
         }
         baseline.prepare_rest(cases)?;
-        let (mut ranked, rivals, mut interchangeable, near, threshold) = {
+        let Ranking { mut ranked, rivals, mut interchangeable, near, threshold } = {
             let search = Search::new(baseline, cases, effects, used.to_vec()).knowing(arrival_fits);
-            let base = search.state(&[], None)?;
-            let state = search.state(&named.chosen, Some(&base))?;
-            let mut scores = search.scores(&state, observer)?;
-            // What a cause stands for as well is not named beside it.
-            scores.retain(|s| named.interchangeable.iter().all(|(_, others)| !others.contains(&s.candidate)));
-            scores.retain(|s| named.without.iter().all(|&w| cases[w].effect != cases[s.candidate].effect));
-            scores.retain(|s| if is_of_decays(cases, s.candidate) { open.decays } else { open.others });
-            let mut ranked: Vec<EffectScore> = search
-                .by_effect(&scores)
-                .into_iter()
-                .filter(|s| {
-                    named.chosen.iter().all(|&c| {
-                        search.candidates[c].effect != s.effect || search.candidates[c].case.subject.is_some()
-                    })
-                })
-                .collect();
-            let threshold = search.threshold();
-            put_first_what_moves_paths(&search, &state, &mut ranked)?;
-            let named_now = ranked.first().is_some_and(|best| best.nats >= threshold);
-            let (mut rivals, mut interchangeable, mut near) = (Vec::new(), Vec::new(), Vec::new());
-            if named_now {
-                near = worth_a_name(&search, &scores, &ranked[0]);
-                (ranked[0], interchangeable) = search.best_case(&state, &scores, &ranked[0])?;
-                rivals = search.rivals(&state, &ranked)?;
-            }
-            (ranked, rivals, interchangeable, near, threshold)
+            rank(&search, cases, &named, open, observer)?
         };
         if near.len() > 1 && follows_materials(cases, &named.chosen) {
             (ranked[0].best, interchangeable) =
@@ -165,13 +140,8 @@ pub(crate) fn select(
             named.last = all_were_weighed.then(|| (named.chosen.clone(), ranked));
             break;
         };
-        let strongest = best.nats.max(0.0);
-        // One that was put first competes with those that bear on the same data.
-        let of_decays = |r: &EffectScore| is_of_decays(cases, r.best);
-        let competes = |r: &&EffectScore| of_decays(best) || !of_decays(r) || r.nats <= best.nats;
-        let sum: f64 = ranked.iter().filter(competes).map(|r| (r.nats - strongest).exp()).sum::<f64>()
-            + (threshold - baseline.config.naming_nats - strongest).exp();
-        named.probabilities.push((best.best, (best.nats - strongest).exp() / sum));
+        let nothing_nats = threshold - baseline.config.naming_nats;
+        named.probabilities.push((best.best, probability_of_first(&ranked, nothing_nats, cases)));
         named.chosen.push(best.best);
         named.interchangeable.push((best.best, interchangeable));
         if !rivals.is_empty() {
@@ -196,6 +166,67 @@ pub(crate) fn select(
     }
     named.chosen = state.chosen;
     Ok(named)
+}
+
+/// What the data speak for beside what is named.
+struct Ranking {
+    /// The best case of each effect, the one to be named first.
+    ranked: Vec<EffectScore>,
+    /// Effects that explain as much as the first.
+    rivals: Vec<EffectScore>,
+    /// Cases of the first effect that explain as much as the best.
+    interchangeable: Vec<usize>,
+    /// Cases of the first effect that would each be worth a name, the best first.
+    near: Vec<usize>,
+    /// What a name asks for.
+    threshold: f64,
+}
+
+fn rank(
+    search: &Search<'_>,
+    cases: &[CatalogueCase],
+    named: &Selection,
+    open: Open,
+    observer: &dyn Observer,
+) -> Result<Ranking, Error> {
+    let base = search.state(&[], None)?;
+    let state = search.state(&named.chosen, Some(&base))?;
+    let mut scores = search.scores(&state, observer)?;
+    // What a cause stands for as well is not named beside it.
+    scores.retain(|s| named.interchangeable.iter().all(|(_, others)| !others.contains(&s.candidate)));
+    scores.retain(|s| named.without.iter().all(|&w| cases[w].effect != cases[s.candidate].effect));
+    scores.retain(|s| if is_of_decays(cases, s.candidate) { open.decays } else { open.others });
+    let mut ranked: Vec<EffectScore> = search
+        .by_effect(&scores)
+        .into_iter()
+        .filter(|s| {
+            named.chosen.iter().all(|&c| {
+                search.candidates[c].effect != s.effect || search.candidates[c].case.subject.is_some()
+            })
+        })
+        .collect();
+    let threshold = search.threshold();
+    put_first_what_moves_paths(search, &state, &mut ranked)?;
+    let named_now = ranked.first().is_some_and(|best| best.nats >= threshold);
+    let (mut rivals, mut interchangeable, mut near) = (Vec::new(), Vec::new(), Vec::new());
+    if named_now {
+        near = worth_a_name(search, &scores, &ranked[0]);
+        (ranked[0], interchangeable) = search.best_case(&state, &scores, &ranked[0])?;
+        rivals = search.rivals(&state, &ranked)?;
+    }
+    Ok(Ranking { ranked, rivals, interchangeable, near, threshold })
+}
+
+/// Of the first of ranked effects, among all that compete with it and none of them (`nothing_nats`).
+fn probability_of_first(ranked: &[EffectScore], nothing_nats: f64, cases: &[CatalogueCase]) -> f64 {
+    let best = &ranked[0];
+    let strongest = best.nats.max(0.0);
+    // One that was put first competes with those that bear on the same data.
+    let of_decays = |r: &EffectScore| is_of_decays(cases, r.best);
+    let competes = |r: &&EffectScore| of_decays(best) || !of_decays(r) || r.nats <= best.nats;
+    let sum: f64 = ranked.iter().filter(competes).map(|r| (r.nats - strongest).exp()).sum::<f64>()
+        + (nothing_nats - strongest).exp();
+    (best.nats - strongest).exp() / sum
 }
 
 /// Whether a cause predicts something else about other materials (sums of pressures do).
