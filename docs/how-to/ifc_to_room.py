@@ -30,7 +30,7 @@ PASSED_OVER = ("IfcFeatureElement", "IfcVirtualElement", "IfcFurnishingElement",
 def settings():
     made = ifcopenshell.geom.settings()
     made.set("use-world-coords", True)
-    # Faces of a space are often not oriented alike.
+    # Faces of a space are often not oriented consistently.
     made.set("reorient-shells", True)
     return made
 
@@ -67,7 +67,7 @@ def triangles(shape):
 
 
 def unmatched_edges(corners):
-    """Edges that no second triangle runs along the other way: of holes, and where triangles are not oriented alike."""
+    """Edges that no second triangle runs along the other way: of holes, and where triangles are not oriented consistently."""
     count = collections.Counter()
     for triangle in np.round(corners, 4):
         a, b, c = map(tuple, triangle)
@@ -165,7 +165,7 @@ def convert(building, space, out):
         sys.exit(f"{sys.argv[1]}: the space {sys.argv[2]} has no surface")
     unmatched = unmatched_edges(inner)
     if unmatched:
-        print(f"the space is not closed, or its faces are not oriented alike, at {unmatched} edges: do not trust volume and names", file=sys.stderr)
+        print(f"the space is not closed, or its faces are not oriented consistently, at {unmatched} edges: do not trust volume and names", file=sys.stderr)
     local = inner - inner[0, 0]
     volume = np.einsum("ij,ij->i", local[:, 0], np.cross(local[:, 1], local[:, 2])).sum() / 6
     if volume < 0:
