@@ -25,13 +25,18 @@ pub(crate) struct BestFormula {
 pub(crate) struct Formulas {
     grammar: Grammar,
     features: Features,
+    /// The lowest band that is asked.
+    from_band: usize,
 }
 
 impl Formulas {
     pub fn of(baseline: &Baseline) -> Result<Self, Error> {
         let grammar = Grammar::of(baseline.survey());
         let features = Features::gather(baseline, &grammar)?;
-        Ok(Self { grammar, features })
+        // Below the Schroeder frequency few modes decide how decays differ from place to place, and no quantity of paths.
+        let survey = baseline.survey();
+        let from_band = if survey.bands_of_modes < survey.bands.len() { survey.bands_of_modes } else { 0 };
+        Ok(Self { grammar, features, from_band })
     }
 
     /// What the best of them goes with, in words, beside a fit of the decays under some cases, and what is said for it. Those for which the screen
@@ -44,7 +49,8 @@ impl Formulas {
         used: &[bool],
     ) -> Result<Option<(String, BestFormula)>, Error> {
         let survey = baseline.survey();
-        let screen = LawScreen::of(baseline, &self.grammar, &self.features, cases, fit, used);
+        let screen =
+            LawScreen::of(baseline, (&self.grammar, &self.features, self.from_band), cases, fit, used);
         let mut best: Option<(usize, f64)> = None;
         for (formula, promised) in screen.best(FITTED) {
             if best.is_some_and(|(_, nats)| nats > promised) {

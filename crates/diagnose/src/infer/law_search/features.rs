@@ -47,6 +47,20 @@ impl Features {
         Ok(Self { of, covariates: grammar.covariates.len(), turned })
     }
 
+    /// Numbers without meaning, other ones in each bin.
+    #[cfg(test)]
+    pub fn by_hand(grammar: &Grammar, (pairs, bands, bins): (usize, usize, usize)) -> Self {
+        let turned: Vec<usize> =
+            (0..grammar.covariates.len()).filter(|&c| grammar.covariates[c].has_direction()).collect();
+        let columns = grammar.covariates.len() + turned.len();
+        let value = |pair: usize, band: usize, bin: usize, column: usize| {
+            (1.0 + 1.7 * bin as f64 + 2.3 * column as f64 + 3.1 * pair as f64 + 4.7 * band as f64).sin().abs()
+        };
+        let of_band = |pair, band| DMatrix::from_fn(bins, columns, |bin, c| value(pair, band, bin, c));
+        let of = (0..pairs).map(|pair| (0..bands).map(|band| of_band(pair, band)).collect()).collect();
+        Self { of, covariates: grammar.covariates.len(), turned }
+    }
+
     /// A covariate in the first `count` bins of a pair and band.
     pub fn of(&self, pair: usize, band: usize, covariate: usize, count: usize) -> Vec<f64> {
         let column = self.of[pair][band].column(covariate);

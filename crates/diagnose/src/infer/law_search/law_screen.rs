@@ -39,6 +39,8 @@ pub(crate) struct LawScreen<'a> {
     /// Shams, each with the formula whose covariate it was.
     shams: Vec<(Sham, usize, ReadyTerm)>,
     places: ShamPlaces,
+    /// The lowest band in which laws act.
+    from_band: usize,
     seed: u64,
 }
 
@@ -60,11 +62,10 @@ pub(crate) struct LawClass {
 }
 
 impl<'a> LawScreen<'a> {
-    /// Beside a fit of the decays under some cases to the responses that are used.
+    /// Beside a fit of the decays under some cases to the responses that are used. Laws act from a band upwards.
     pub fn of(
         baseline: &Baseline,
-        grammar: &'a Grammar,
-        features: &Features,
+        (grammar, features, from_band): (&'a Grammar, &Features, usize),
         cases: &[&Case],
         fit: &LaplaceFit,
         used: &[bool],
@@ -84,7 +85,8 @@ impl<'a> LawScreen<'a> {
             let mut x = DMatrix::zeros(through.len(), all.len() * bands);
             let mut first = 0;
             for &(band, count) in &rows {
-                for (place, column) in all.iter().enumerate() {
+                let acting = if band < from_band { &[] } else { &all[..] };
+                for (place, column) in acting.iter().enumerate() {
                     let values = column.values((features, grammar, &sham_places), (pair, band, count));
                     for (bin, value) in values.into_iter().flatten().enumerate() {
                         x[(first + bin, place * bands + band)] = -LN_PER_DB * value * through[first + bin];
@@ -101,7 +103,7 @@ impl<'a> LawScreen<'a> {
         let null = NullModel::of(&screened, &places, model.priors().iter().map(|p| p.sd).collect());
         let screen = Screen::new(bands, screened, &fit.covariance);
         let (terms, shams) = terms(grammar, survey, &screen, &all);
-        Self { grammar, screen, null, terms, shams, places: sham_places, seed }
+        Self { grammar, screen, null, terms, shams, places: sham_places, from_band, seed }
     }
 
     /// Evidence of a formula (by its place), times its probability beforehand, in nats.
@@ -196,7 +198,8 @@ impl<'a> LawScreen<'a> {
         let column = Column { covariate: formula.covariate, sham };
         let of_band = |(pair, band, &count): (usize, usize, &usize)| {
             let known = (features, self.grammar, &self.places);
-            column.values(known, (pair, band, count)).filter(|_| count > 0).unwrap_or_default()
+            let acts = count > 0 && band >= self.from_band;
+            column.values(known, (pair, band, count)).filter(|_| acts).unwrap_or_default()
         };
         let of_pair = |(pair, ends): (usize, &Vec<usize>)| {
             ends.iter().enumerate().map(|(band, count)| of_band((pair, band, count))).collect()
@@ -238,4 +241,37 @@ fn terms(
         }
     }
     (ready, shams)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::DiagnoseConfig;
+    use crate::hand_made::Tables;
+    use sabine_scene::{Levels, TimeZero};
+
+    #[test]
+    fn octaves_below_the_lowest_in_which_laws_act_say_nothing() {
+        let baseline = Tables::new(Levels::Common, TimeZero::Emission).baseline(DiagnoseConfig::default());
+        let survey = baseline.survey();
+        let grammar = Grammar::of(survey);
+        let features = Features::by_hand(&grammar, (3, 2, 14));
+        let used = [true; 3];
+        let (fit, _) = baseline.fit_energy(&[], &used, None).expect("a fit");
+        let screens =
+            [0, 1].map(|from| LawScreen::of(&baseline, (&grammar, &features, from), &[], &fit, &used));
+        let acting_in = |shares: [f64; 2]| {
+            let acts = |f: &Formula| {
+                let terms = f.bands.terms(survey);
+                terms.len() == 1 && terms[0].shares == shares
+            };
+            grammar.formulas.iter().position(acts).expect("one octave alone")
+        };
+        let (lower, upper) = (acting_in([1.0, 0.0]), acting_in([0.0, 1.0]));
+        let beyond_prior = |screen: &LawScreen<'_>, f: usize| screen.nats(f) - grammar.formulas[f].ln_prior;
+        assert!(beyond_prior(&screens[0], lower).abs() > 0.1);
+        assert!(beyond_prior(&screens[1], lower).abs() < 1e-9);
+        assert!(beyond_prior(&screens[0], upper).abs() > 0.1);
+        assert!((screens[0].nats(upper) - screens[1].nats(upper)).abs() < 1e-9);
+    }
 }

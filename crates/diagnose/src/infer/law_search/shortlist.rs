@@ -33,7 +33,7 @@ pub(crate) fn shortlist(
         .map(|&c| &cases[c].case)
         .filter(|case| case.observable().concerns(Observable::Decay))
         .collect();
-    let screen = LawScreen::of(baseline, &grammar, &features, &of_decays, &state.energy, used);
+    let screen = LawScreen::of(baseline, (&grammar, &features, 0), &of_decays, &state.energy, used);
     let classes = screen.classes(MAX_FITTED);
     let best = classes.first().map_or(0.0, |class| class.nats);
     let known = |formula: &Formula| cases.iter().any(|own| own.formula.as_ref() == Some(formula));

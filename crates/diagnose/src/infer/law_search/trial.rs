@@ -91,7 +91,7 @@ pub(crate) fn trials(
         let without = search.state(&rest, Some(state))?;
         let cases = search.cases_of(&rest, Observable::Decay);
         let screen =
-            LawScreen::of(search.baseline, &grammar, &features, &cases, &without.energy, &search.used);
+            LawScreen::of(search.baseline, (&grammar, &features, 0), &cases, &without.energy, &search.used);
         let others = screen.not_told_from(formula).into_iter().take(MAX_LISTED);
         let ln_prior = grammar.formulas[formula].ln_prior;
         found.push(Trial {
