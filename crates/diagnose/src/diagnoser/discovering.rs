@@ -8,10 +8,11 @@ use crate::infer::confirmation::{Confirmation, Doubt, confirm};
 use crate::infer::law_search::shortlist::shortlist;
 use crate::infer::law_search::trial::{Trial, trials};
 use crate::infer::law_search::vault;
+use crate::infer::law_search::visible::visible_from;
 use crate::infer::naming::select;
 use crate::infer::ray_dependence::could_be_chance;
 use crate::infer::search::Search;
-use crate::report::diagnosis::{Diagnosis, FallenLaw, LawSearch, Verdict};
+use crate::report::diagnosis::{Diagnosis, FallenLaw, LawSearch, Verdict, VisibleLaw};
 use crate::report::found_laws::{found_law, reason};
 use sabine_acoustics::Observer;
 use sabine_scene::MeasuredRoom;
@@ -49,7 +50,7 @@ impl Diagnoser {
     ) -> Result<Diagnosis, Error> {
         let vault = self.vault(room, held);
         let names = |receivers: &[usize]| receivers.iter().map(|&r| room.receivers()[r].id.clone()).collect();
-        let mut told = LawSearch { vault: names(&vault), fallen: Vec::new() };
+        let mut told = LawSearch { vault: names(&vault), ..LawSearch::default() };
         // Where every effect has been weighed in vain, what is beyond them all is as probable as all together were.
         let in_vain = plain.as_ref().is_some_and(|plain| plain.causes.is_empty());
         let inherited_nats = if in_vain { (self.effects.len() as f64).ln() } else { 0.0 };
@@ -70,6 +71,11 @@ impl Diagnoser {
         }
         told.fallen.extend(doubted(&weighed, &confirmed));
         let still = laws_among(&weighed, &confirmed.state.chosen);
+        if still.is_empty() {
+            let visible = visible_from(&weighed.search(effects), &confirmed.state)?;
+            let one = |(goes_with, from_db)| VisibleLaw { goes_with, from_db };
+            told.visible = visible.into_iter().map(one).collect();
+        }
         let mut diagnosis = if still.is_empty() && !vault.is_empty() {
             match plain {
                 Some(plain) => plain,

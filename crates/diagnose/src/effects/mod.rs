@@ -55,7 +55,7 @@ pub use time_zero::TimeZeroOffset;
 pub use transducer_response::TransducerResponse;
 pub use truncation::Truncation;
 pub use unknown_law::UnknownLaw;
-pub(crate) use unknown_law::{Covariate, Formula, Grammar};
+pub(crate) use unknown_law::{BandLaw, Covariate, Formula, Grammar};
 
 use crate::effect::Effect;
 

@@ -204,6 +204,21 @@ pub struct LawSearch {
     pub vault: Vec<String>,
     /// Laws that were chosen and did not stand, and why.
     pub fallen: Vec<FallenLaw>,
+    /// What the positions of the search would have shown, where no law stands; the most visible first.
+    #[serde(default)]
+    pub visible: Vec<VisibleLaw>,
+}
+
+/// How strong a law would have to be to be found at these positions.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct VisibleLaw {
+    /// What it would go with, in words.
+    pub goes_with: String,
+    /// Its amplitude, the same in all octaves, at which it would move the decays by ten standard deviations once everything is taken out that a
+    /// diagnosis leaves open (d' of 10: weaker ones are found less often), in dB where the quantity is 1. `None` beyond 100 dB: these positions
+    /// do not show it.
+    pub from_db: Option<f64>,
 }
 
 /// A law that was chosen and did not stand.

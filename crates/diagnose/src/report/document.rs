@@ -198,7 +198,7 @@ mod tests {
                 not_told_from: vec!["-b".into()],
                 points: Vec::new(),
             }],
-            law_search: Some(LawSearch { vault: vec!["r1".into()], fallen: Vec::new() }),
+            law_search: Some(LawSearch { vault: vec!["r1".into()], ..LawSearch::default() }),
             alternatives: Vec::new(),
             would_decide: Vec::new(),
             candidates: Vec::new(),

@@ -1,7 +1,7 @@
 //! A law that no catalogue lists, hidden in a laboratory room, is told from laws that are not at work.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
-use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, Error, Verdict};
+use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, Error, LawSearch, Verdict};
 use sabine_paths::laws::{Law, LawParameter, LawTarget};
 use sabine_scene::MeasuredRoom;
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
@@ -132,11 +132,39 @@ fn where_no_law_is_at_work_none_is_named() {
     let found = diagnoser(laws(&room), 1000).unwrap().discovering().diagnose(&room, &[], &()).unwrap();
     assert_eq!(found.verdict, Verdict::Adequate, "{:?}", found.causes);
     assert!(found.causes.is_empty() && found.model.causes.is_empty() && found.laws.is_empty());
-    assert_eq!(found.law_search.unwrap().vault.len(), 2);
+    let search = found.law_search.unwrap();
+    assert_eq!(search.vault.len(), 2);
+    would_be_seen(&room, &search);
     // An adequate room does not call for a search.
     let diagnoser = diagnoser(Vec::new(), 1000).unwrap().with_effects(Vec::new()).discovering_if_needed();
     let found = diagnoser.diagnose(&room, &[], &()).unwrap();
     assert!(found.verdict == Verdict::Adequate && found.law_search.is_none(), "{:?}", found.law_search);
+}
+
+/// Laws of the size that the search would have seen move decays by about ten standard deviations, where traced paths are weighed again under them.
+fn would_be_seen(room: &MeasuredRoom, search: &LawSearch) {
+    let fitted = room.with_responses(|r| !search.vault.contains(&room.receivers()[r.receiver].id));
+    let diagnoser = diagnoser(Vec::new(), 1000).unwrap();
+    let material = room.scene().materials()[0].name.clone();
+    let grazing = (LawTarget::Reflection, Some(material.as_str()), "(1 - cos_incidence)^2");
+    let upwards = (LawTarget::Path, None, "sin(departure_elevation_deg)");
+    for (target, surface, covariate) in [grazing, upwards] {
+        let words = surface
+            .map_or("the level of paths goes with".to_owned(), |s| format!("reflections from {s} go with"));
+        let seen = search.visible.iter().find(|v| v.goes_with == format!("{words} {covariate}")).unwrap();
+        let law = law("seen", target, surface, &format!("-a * {covariate}"), "dB");
+        // A tenth of it: what larger ones take from a path they cannot take again.
+        let tenth = law.with_fitted(&[0.1 * seen.from_db.unwrap()], &[[0.0, 15.0]]).unwrap();
+        let d_prime = diagnoser.d_prime_of_law(&fitted, &tenth, &()).unwrap();
+        println!("{seen:?}: d' {d_prime}");
+        assert!((0.8..1.2).contains(&d_prime), "{seen:?}: {d_prime}");
+    }
+    assert!(
+        search
+            .visible
+            .windows(2)
+            .all(|w| w[1].from_db.is_none_or(|db| w[0].from_db.is_some_and(|a| a <= db)))
+    );
 }
 
 #[test]

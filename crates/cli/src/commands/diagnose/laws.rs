@@ -5,7 +5,7 @@ use super::words::{interval, number};
 use crate::chart::{Chart, Look, Scale, Series};
 use crate::failure::Failure;
 use crate::page::{Page, escape};
-use sabine::diagnose::{FoundLaw, LawPoint};
+use sabine::diagnose::{FoundLaw, LawPoint, VisibleLaw};
 
 /// The section on them, where there was a search.
 pub fn section(page: &mut Page, findings: &Findings) -> Result<(), Failure> {
@@ -42,12 +42,29 @@ pub fn section(page: &mut Page, findings: &Findings) -> Result<(), Failure> {
             escape(&super::words::capital(&fallen.reason))
         ));
     }
+    if findings.laws.is_empty() && !search.visible.is_empty() {
+        page.paragraph(
+            "What these positions would have shown: a law that is the same in all octaves and moves the decays by ten standard deviations, \
+             everything taken out that a fit leaves open. In dB where its quantity is 1.",
+        );
+        page.table(&visible(&search.visible));
+    }
     page.paragraph(&if search.vault.is_empty() {
         "Too few positions were measured to set any aside: six are needed.".to_owned()
     } else {
         format!("Set aside from the search, to confirm what it finds: {}.", search.vault.join(", "))
     });
     Ok(())
+}
+
+/// From which size on laws would have been found.
+fn visible(laws: &[VisibleLaw]) -> Vec<Vec<String>> {
+    let row = |law: &VisibleLaw| {
+        let db = law.from_db.map_or("not at all".to_owned(), |db| format!("from {db:.1} dB on"));
+        vec![super::words::capital(&law.goes_with), db]
+    };
+    let head = vec!["A law by which".to_owned(), "would be found".to_owned()];
+    std::iter::once(head).chain(laws.iter().map(row)).collect()
 }
 
 /// What is known of a law, as a table.

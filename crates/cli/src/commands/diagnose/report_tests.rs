@@ -111,10 +111,15 @@ fn a_law_is_told_with_its_trials_and_drawn_through_what_is_left_without_it() {
     // The vault has a colour of its own.
     let drawn = &page[page.find("The search for a law").unwrap()..];
     assert!(drawn.contains("#0072B2") && drawn.contains("#D55E00"));
-    let none = html(
-        &findings("adequate", &json!({ "causes": [], "law_search": { "vault": [], "fallen": [] } })),
-        None,
-    )
-    .unwrap();
+    let visible = json!([{ "goes_with": "reflections from <carpet> go with cos_incidence^2", "from_db": 3.25 },
+        { "goes_with": "what is recorded goes with file_time_s / t", "from_db": null }]);
+    let search = json!({ "vault": [], "fallen": [], "visible": visible });
+    let none = html(&findings("adequate", &json!({ "causes": [], "law_search": search })), None).unwrap();
     assert!(none.contains("No law is named beside the catalogue.") && none.contains("six are needed"));
+    assert!(
+        none.contains(
+            "<td>Reflections from &lt;carpet&gt; go with cos_incidence^2</td><td>from 3.2 dB on</td>"
+        )
+    );
+    assert!(none.contains("file_time_s / t</td><td>not at all</td>"));
 }

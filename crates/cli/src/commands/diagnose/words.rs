@@ -145,7 +145,7 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
             }
             told.push(
                 if findings.law_search.is_some() {
-                    "A formula beyond the list of causes was looked for, and none stands."
+                    "A formula beyond the list of causes was looked for, and none stands; the report says how strong one would have to be."
                 } else {
                     "The option --discover looks for a formula that no list of causes has."
                 }

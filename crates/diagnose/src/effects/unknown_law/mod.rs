@@ -4,6 +4,7 @@ mod band_law;
 mod covariate;
 mod formula;
 
+pub(crate) use band_law::BandLaw;
 pub(crate) use covariate::Covariate;
 pub(crate) use formula::{Formula, Grammar};
 

@@ -111,6 +111,11 @@ impl<'a> LawScreen<'a> {
         self.screen.nats(&self.terms[formula], &self.screen.slopes)
     }
 
+    /// Standard deviation of the amplitude of a formula of one parameter, as these data alone tell it, in dB.
+    pub fn sd_db(&self, formula: usize) -> f64 {
+        self.screen.sd(&self.terms[formula])
+    }
+
     /// All formulas, the best first.
     fn ranked(&self) -> Vec<(usize, f64)> {
         let mut ranked: Vec<(usize, f64)> = (0..self.terms.len()).map(|f| (f, self.nats(f))).collect();

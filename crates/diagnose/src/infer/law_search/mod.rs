@@ -12,3 +12,4 @@ mod screen;
 pub(crate) mod shortlist;
 pub(crate) mod trial;
 pub(crate) mod vault;
+pub(crate) mod visible;

@@ -102,6 +102,12 @@ impl Screen {
         ReadyTerm { term, spread, constant }
     }
 
+    /// Standard deviation of the only parameter of a term by the data alone, nothing known of it beforehand.
+    pub fn sd(&self, ready: &ReadyTerm) -> f64 {
+        let shares = &ready.term.shares[0];
+        shares.dot(&(&self.blocks[ready.term.column] * shares)).max(0.0).sqrt().recip()
+    }
+
     /// Logarithm of how much more probable the data are under a term than without, times its probability beforehand, in nats. `slopes` are
     /// those of the data, or of others that were drawn.
     pub fn nats(&self, ready: &ReadyTerm, slopes: &DVector<f64>) -> f64 {
@@ -247,5 +253,7 @@ pub(super) mod tests {
         assert!((screen.cosine_of((1, &first), (3, &first)) - expected).abs() < 1e-9);
         let own = screen.ready(term(2, &[&[1.0, 0.0]], &[1.0]));
         assert!((screen.cosine(&own, &own) - 1.0).abs() < 1e-12);
+        // As sure of a coefficient as generalised least squares is.
+        assert!((screen.sd(&own) * of(2, 2).sqrt() - 1.0).abs() < 1e-9);
     }
 }

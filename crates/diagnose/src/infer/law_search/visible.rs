@@ -1,0 +1,36 @@
+//! How strong a law would have to be for these positions to show it.
+
+use super::features::Features;
+use super::law_screen::LawScreen;
+use crate::effect::Observable;
+use crate::effects::{BandLaw, Grammar};
+use crate::error::Error;
+use crate::infer::search::{Search, State};
+
+/// Size at which laws were found whenever they were hidden (five rooms of five, `docs/validation/laws.md`), in standard deviations.
+const PLAIN_D_PRIME: f64 = 10.0;
+/// Decibels beyond which no figure means anything.
+const BEYOND_DB: f64 = 100.0;
+
+/// Each quantity of the grammar, products left out, with the amplitude in dB from which a law that goes with it, the same in all octaves, would
+/// be plain beside what is named; none beyond 100 dB. The smallest first.
+pub(crate) fn visible_from(search: &Search<'_>, state: &State) -> Result<Vec<(String, Option<f64>)>, Error> {
+    let baseline = search.baseline;
+    let grammar = Grammar::of(baseline.survey());
+    let features = Features::gather(baseline, &grammar)?;
+    let cases = search.cases_of(&state.chosen, Observable::Decay);
+    let screen = LawScreen::of(baseline, (&grammar, &features, 0), &cases, &state.energy, &search.used);
+    let plain = (0..grammar.formulas.len()).filter(|&f| {
+        let formula = &grammar.formulas[f];
+        formula.bands == BandLaw::Same && grammar.covariates[formula.covariate].forms.len() == 1
+    });
+    let from_db = |formula: usize| {
+        let db = PLAIN_D_PRIME * screen.sd_db(formula);
+        (db < BEYOND_DB).then_some(db)
+    };
+    let words = |formula: usize| grammar.covariates[grammar.formulas[formula].covariate].words();
+    let mut found: Vec<(String, Option<f64>)> = plain.map(|f| (words(f), from_db(f))).collect();
+    let place = |db: Option<f64>| db.unwrap_or(f64::INFINITY);
+    found.sort_by(|a, b| place(a.1).total_cmp(&place(b.1)));
+    Ok(found)
+}
