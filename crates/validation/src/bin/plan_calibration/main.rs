@@ -63,6 +63,9 @@ pub struct Trial {
     pub rival: String,
     /// Size of the hidden effect, 1 being typical.
     pub strength: f64,
+    /// Evidence for the hidden effect over the other before the plan, in nats; none in records made before it was kept.
+    #[serde(default)]
+    pub before_nats: Option<f64>,
     /// Number of the place among the candidates.
     pub place: usize,
     /// Nats that the plan promises.
@@ -89,8 +92,9 @@ fn main() -> Result<(), AnyError> {
         match room(seed, arguments.rays) {
             Ok(found) => {
                 for t in &found {
+                    let before = t.before_nats.unwrap_or(f64::NAN);
                     eprintln!(
-                        "{seed} {} ({}): expected {:.2}, realised {:.2}",
+                        "{seed} {} ({}), {before:.1} nats before: expected {:.2}, realised {:.2}",
                         t.hidden, t.rival, t.expected_nats, t.realised_nats
                     );
                 }
@@ -158,6 +162,7 @@ fn room(seed: u64, rays: usize) -> Result<Vec<Trial>, AnyError> {
                 hidden: hidden_id.to_owned(),
                 rival: rival.to_owned(),
                 strength,
+                before_nats: Some(before),
                 place,
                 expected_nats,
                 realised_nats: after - before,
