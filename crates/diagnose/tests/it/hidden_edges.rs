@@ -58,8 +58,12 @@ fn what_bends_is_found_with_any_rays() {
 #[test]
 fn where_there_is_no_screen_nothing_bends() {
     let room = ScreenedRoom::new(ScreenedConfig { screen: false, ..ROOM }).unwrap();
-    // It has no edge, so that the effect has no case: few others are needed to see that.
-    let few = diagnoser().with_only(&["edge_diffraction", "scattering"].map(str::to_owned)).unwrap();
+    // It has no edge, so that the effect has no case: few others, and few rays, are needed to see that.
+    let config = DiagnoseConfig { rays: 500, ..DiagnoseConfig::default() };
+    let few = Diagnoser::new(config)
+        .unwrap()
+        .with_only(&["edge_diffraction", "scattering"].map(str::to_owned))
+        .unwrap();
     let found = diagnose(&room, room.responses().unwrap(), &few);
     assert!(found.causes.iter().all(|c| c.effect != "edge_diffraction"));
     assert!(found.candidates.iter().all(|c| c.effect != "edge_diffraction"));
