@@ -1,7 +1,7 @@
 //! What decays go with most, and whether chance would make as much of it.
 
 use super::features::Features;
-use super::law_screen::LawScreen;
+use super::law_screen::{Family, LawScreen};
 use crate::effect::Case;
 use crate::effects::Grammar;
 use crate::error::Error;
@@ -49,8 +49,9 @@ impl Formulas {
         used: &[bool],
     ) -> Result<Option<(String, BestFormula)>, Error> {
         let survey = baseline.survey();
-        let screen =
-            LawScreen::of(baseline, (&self.grammar, &self.features, self.from_band), cases, fit, used);
+        let Self { grammar, features, from_band } = self;
+        let family = Family { grammar, features, from_band: *from_band, shams: false };
+        let screen = LawScreen::of(baseline, family, cases, fit, used);
         let mut best: Option<(usize, f64)> = None;
         for (formula, promised) in screen.best(FITTED) {
             if best.is_some_and(|(_, nats)| nats > promised) {

@@ -29,6 +29,17 @@ const SAME_NATS: f64 = 3.0;
 /// Formulas that are compared with each other, the best.
 const MAX_COMPARED: usize = 120;
 
+/// What is screened.
+#[derive(Clone, Copy)]
+pub(crate) struct Family<'a> {
+    pub grammar: &'a Grammar,
+    pub features: &'a Features,
+    /// The lowest band in which laws act.
+    pub from_band: usize,
+    /// Whether shams compete: three columns in five.
+    pub shams: bool,
+}
+
 /// Laws beside a fit.
 pub(crate) struct LawScreen<'a> {
     grammar: &'a Grammar,
@@ -62,10 +73,10 @@ pub(crate) struct LawClass {
 }
 
 impl<'a> LawScreen<'a> {
-    /// Beside a fit of the decays under some cases to the responses that are used. Laws act from a band upwards.
+    /// Beside a fit of the decays under some cases to the responses that are used.
     pub fn of(
         baseline: &Baseline,
-        (grammar, features, from_band): (&'a Grammar, &Features, usize),
+        Family { grammar, features, from_band, shams }: Family<'a>,
         cases: &[&Case],
         fit: &LaplaceFit,
         used: &[bool],
@@ -74,7 +85,10 @@ impl<'a> LawScreen<'a> {
         let model = EnergyModel::new(&data, cases, used);
         let bands = survey.bands().len();
         let pairs: Vec<usize> = (0..used.len()).filter(|&p| used[p]).collect();
-        let all = columns(grammar, pairs.len());
+        let mut all = columns(grammar, pairs.len());
+        if !shams {
+            all.truncate(grammar.covariates.len());
+        }
         let seed = baseline.config.seed;
         let sham_places = ShamPlaces::draw(&pairs, used.len(), survey.materials().len(), seed);
         let one = |&pair: &usize| {
@@ -263,8 +277,11 @@ mod tests {
         let features = Features::by_hand(&grammar, (3, 2, 14));
         let used = [true; 3];
         let (fit, _) = baseline.fit_energy(&[], &used, None).expect("a fit");
-        let screens =
-            [0, 1].map(|from| LawScreen::of(&baseline, (&grammar, &features, from), &[], &fit, &used));
+        let screens = [0, 1].map(|from_band| {
+            let family = Family { grammar: &grammar, features: &features, from_band, shams: from_band == 0 };
+            LawScreen::of(&baseline, family, &[], &fit, &used)
+        });
+        assert!(screens[1].shams.is_empty() && !screens[0].shams.is_empty());
         let acting_in = |shares: [f64; 2]| {
             let acts = |f: &Formula| {
                 let terms = f.bands.terms(survey);

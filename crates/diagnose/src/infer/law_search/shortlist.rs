@@ -1,7 +1,7 @@
 //! The few laws that are fitted: those for which the screen says most, and that can be told apart.
 
 use super::features::Features;
-use super::law_screen::LawScreen;
+use super::law_screen::{Family, LawScreen};
 use crate::effect::{Case, Observable};
 use crate::effects::{Formula, Grammar};
 use crate::error::Error;
@@ -33,7 +33,8 @@ pub(crate) fn shortlist(
         .map(|&c| &cases[c].case)
         .filter(|case| case.observable().concerns(Observable::Decay))
         .collect();
-    let screen = LawScreen::of(baseline, (&grammar, &features, 0), &of_decays, &state.energy, used);
+    let family = Family { grammar: &grammar, features: &features, from_band: 0, shams: false };
+    let screen = LawScreen::of(baseline, family, &of_decays, &state.energy, used);
     let classes = screen.classes(MAX_FITTED);
     let best = classes.first().map_or(0.0, |class| class.nats);
     let known = |formula: &Formula| cases.iter().any(|own| own.formula.as_ref() == Some(formula));

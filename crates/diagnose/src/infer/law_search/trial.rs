@@ -1,7 +1,7 @@
 //! What laws that were chosen must stand before they are named.
 
 use super::features::Features;
-use super::law_screen::LawScreen;
+use super::law_screen::{Family, LawScreen};
 use crate::effect::{Case, Observable};
 use crate::effects::Grammar;
 use crate::error::Error;
@@ -90,8 +90,8 @@ pub(crate) fn trials(
         let rest: Vec<usize> = state.chosen.iter().copied().filter(|&c| c != candidate).collect();
         let without = search.state(&rest, Some(state))?;
         let cases = search.cases_of(&rest, Observable::Decay);
-        let screen =
-            LawScreen::of(search.baseline, (&grammar, &features, 0), &cases, &without.energy, &search.used);
+        let family = Family { grammar: &grammar, features: &features, from_band: 0, shams: true };
+        let screen = LawScreen::of(search.baseline, family, &cases, &without.energy, &search.used);
         let others = screen.not_told_from(formula).into_iter().take(MAX_LISTED);
         let ln_prior = grammar.formulas[formula].ln_prior;
         found.push(Trial {

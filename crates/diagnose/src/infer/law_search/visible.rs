@@ -1,7 +1,7 @@
 //! How strong a law would have to be for these positions to show it.
 
 use super::features::Features;
-use super::law_screen::LawScreen;
+use super::law_screen::{Family, LawScreen};
 use crate::effect::Observable;
 use crate::effects::{BandLaw, Grammar};
 use crate::error::Error;
@@ -19,7 +19,8 @@ pub(crate) fn visible_from(search: &Search<'_>, state: &State) -> Result<Vec<(St
     let grammar = Grammar::of(baseline.survey());
     let features = Features::gather(baseline, &grammar)?;
     let cases = search.cases_of(&state.chosen, Observable::Decay);
-    let screen = LawScreen::of(baseline, (&grammar, &features, 0), &cases, &state.energy, &search.used);
+    let family = Family { grammar: &grammar, features: &features, from_band: 0, shams: false };
+    let screen = LawScreen::of(baseline, family, &cases, &state.energy, &search.used);
     let plain = (0..grammar.formulas.len()).filter(|&f| {
         let formula = &grammar.formulas[f];
         formula.bands == BandLaw::Same && grammar.covariates[formula.covariate].forms.len() == 1
