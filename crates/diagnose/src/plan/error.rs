@@ -56,6 +56,12 @@ pub enum PlanError {
         /// How many there are.
         found: usize,
     },
+    /// Only one of the hypotheses can be planned in this room.
+    #[error("{names} cannot be weighed for a plan of this room, and nothing is left to decide between")]
+    NotPlanned {
+        /// Those that cannot.
+        names: String,
+    },
     /// None of the hypotheses shows in what a plan predicts.
     #[error(
         "{names} show in single channels or before the direct sound: no other place or air decides between them"

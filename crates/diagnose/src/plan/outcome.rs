@@ -102,7 +102,7 @@ pub struct Plan {
     pub effects: Vec<EffectSize>,
     /// Effects that look alike (cosine above 0.95) at the positions of the room file or with those chosen.
     pub look_alikes: Vec<LookAlikes>,
-    /// Effects that no place or air shows: they are found in single channels, in unexplained peaks or before the direct sound.
+    /// Effects that no place or air shows: they are found in single channels, in unexplained peaks, in waves or before the direct sound.
     pub not_planned: Vec<String>,
     /// Responses that the room file has or that its places would give.
     pub stated_responses: usize,

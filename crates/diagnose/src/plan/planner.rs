@@ -10,7 +10,7 @@ use crate::plan::composition::{Names, Parts, composed};
 use crate::plan::config::PlanConfig;
 use crate::plan::contest::Contest;
 use crate::plan::error::PlanError;
-use crate::plan::hypothesis::{Fit, OpenQuestion, fit_all, keep_used};
+use crate::plan::hypothesis::{Fit, Hypothesis, OpenQuestion, fit_all, keep_used};
 use crate::plan::measurement::Kind;
 use crate::plan::outcome::Plan;
 use crate::plan::places::{grid, microphone_height_m};
@@ -117,12 +117,12 @@ impl Planner {
         let mut setting = Setting::new(room, &self.config.diagnose, &self.tracer, rate_hz)?;
         clock.lap("places");
         let fitted = question.map(|question| self.fitted(room, question, observer)).transpose()?;
-        let (fitted_cases, fits) = match fitted {
-            Some((cases, fits, fitted)) => {
+        let (fitted_cases, fits, planned) = match fitted {
+            Some(FittedQuestion { planned, cases, fits, fitted }) => {
                 setting = setting.about(fitted);
-                (Some(cases), fits)
+                (Some(cases), fits, Some(planned))
             }
-            None => (None, Vec::new()),
+            None => (None, Vec::new(), None),
         };
         clock.lap("fits");
         let mut base = setting.trace(&stated(room), &[])?;
@@ -138,11 +138,19 @@ impl Planner {
         let scales = Scales { campaign, contest, stated };
         let prospects = scales.prospects(&candidates, &setting, observer)?;
         clock.lap("candidates");
-        let names = Names { question, effects: &self.effects, naming_nats: self.config.diagnose.naming_nats };
+        let names = Names {
+            question: planned.as_ref(),
+            effects: &self.effects,
+            naming_nats: self.config.diagnose.naming_nats,
+        };
         let asked = [(Kind::Microphone, self.config.microphones), (Kind::Source, self.config.sources)];
         let stated_responses = if is_planned { 0 } else { base.pairs() };
         let parts = Parts { scales: &scales, prospects: &prospects, names: &names, cost: &self.config.cost };
         let mut plan = composed(&parts, asked, candidates.grid.spacing_m, stated_responses);
+        if let (Some(asked), Some(planned)) = (question, &planned) {
+            let left_out = asked.leading.iter().filter(|h| !planned.leading.contains(h));
+            plan.not_planned.extend(left_out.map(|h| h.effect.clone()));
+        }
         clock.lap("choice");
         plan.seconds = clock.laps;
         Ok(plan)
@@ -159,7 +167,7 @@ impl Planner {
         question: &OpenQuestion,
         observer: &dyn Observer,
     ) -> Result<Vec<f64>, PlanError> {
-        let (_, fits, _) = self.fitted(room, question, observer)?;
+        let FittedQuestion { fits, .. } = self.fitted(room, question, observer)?;
         Ok(fits.iter().map(|fit| fit.log_evidence).collect())
     }
 
@@ -202,7 +210,7 @@ impl Planner {
         room: &MeasuredRoom,
         question: &OpenQuestion,
         observer: &dyn Observer,
-    ) -> Result<(Vec<CatalogueCase>, Vec<Fit>, Fitted), PlanError> {
+    ) -> Result<FittedQuestion, PlanError> {
         let mut baseline = Baseline::new(room, &[], &self.config.diagnose, &self.tracer, observer)?;
         let mut cases = all_cases(&self.effects, baseline.survey());
         // Tables of the others would only take time.
@@ -210,13 +218,34 @@ impl Planner {
         cases.retain(|c| asked().any(|h| h.effect == c.id));
         let mut refused = baseline.prepare(&cases)?.into_iter();
         cases.retain(|_| !refused.next().unwrap_or(false));
+        let planned = self.planned(question, &cases)?;
         let used = vec![true; baseline.pairs()];
         baseline.calibrate_scatter(&[], &used)?;
-        let mut fits = fit_all(&baseline, &cases, self.effects.len(), question)?;
-        keep_used(&mut cases, &mut fits, question);
+        let mut fits = fit_all(&baseline, &cases, self.effects.len(), &planned)?;
+        keep_used(&mut cases, &mut fits, &planned);
         let fitted = Fitted::of(&baseline);
-        Ok((cases, fits, fitted))
+        Ok(FittedQuestion { planned, cases, fits, fitted })
     }
+
+    /// A question without effects that it knows and that have no case here: for a plan no waves are solved, and some need what this room has not.
+    fn planned(&self, question: &OpenQuestion, cases: &[CatalogueCase]) -> Result<OpenQuestion, PlanError> {
+        let is_planned = |h: &Hypothesis| !self.knows(&h.effect) || cases.iter().any(|c| c.id == h.effect);
+        let kept = |all: &[Hypothesis]| all.iter().filter(|h| is_planned(h)).cloned().collect();
+        let planned = OpenQuestion { sure: kept(&question.sure), leading: kept(&question.leading) };
+        if planned.leading.len() < 2 && question.leading.len() > 1 {
+            let missing = question.leading.iter().filter(|h| !is_planned(h)).map(ToString::to_string);
+            return Err(PlanError::NotPlanned { names: missing.collect::<Vec<_>>().join(", ") });
+        }
+        Ok(planned)
+    }
+}
+
+/// A question as it can be planned, and its hypotheses as fitted to what was measured.
+struct FittedQuestion {
+    planned: OpenQuestion,
+    cases: Vec<CatalogueCase>,
+    fits: Vec<Fit>,
+    fitted: Fitted,
 }
 
 /// Seconds by stage.
