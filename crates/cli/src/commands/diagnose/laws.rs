@@ -57,13 +57,13 @@ pub fn section(page: &mut Page, findings: &Findings) -> Result<(), Failure> {
     Ok(())
 }
 
-/// From which size on laws would have been found.
+/// From which size on laws are visible.
 fn visible(laws: &[VisibleLaw]) -> Vec<Vec<String>> {
     let row = |law: &VisibleLaw| {
         let db = law.from_db.map_or("not at all".to_owned(), |db| format!("from {db:.1} dB on"));
         vec![super::words::capital(&law.goes_with), db]
     };
-    let head = vec!["A law by which".to_owned(), "would be found".to_owned()];
+    let head = vec!["A law by which".to_owned(), "is visible".to_owned()];
     std::iter::once(head).chain(laws.iter().map(row)).collect()
 }
 
