@@ -163,7 +163,7 @@ fn put_to_work(
     baseline.calibrate_scatter(&cases_of_decays(cases, chosen), fits.0)
 }
 
-/// With a cause at work the materials are others: what is compared, and with which spread, follows them. Expands about their fit, where a
+/// Beside a named cause the materials are others: what is compared, and with which spread, follows them. Expands about their fit, where a
 /// cause's tables ask for it until it stays or explains less than before, and gives the changes of the cause named last.
 fn expand_about_fit(
     baseline: &mut Baseline,

@@ -148,8 +148,12 @@ impl Planner {
         let parts = Parts { scales: &scales, prospects: &prospects, names: &names, cost: &self.config.cost };
         let mut plan = composed(&parts, asked, candidates.grid.spacing_m, stated_responses);
         if let (Some(asked), Some(planned)) = (question, &planned) {
-            let left_out = asked.leading.iter().filter(|h| !planned.leading.contains(h));
-            plan.not_planned.extend(left_out.map(|h| h.effect.clone()));
+            let kept = |h: &Hypothesis| planned.sure.contains(h) || planned.leading.contains(h);
+            for left_out in asked.sure.iter().chain(&asked.leading).filter(|h| !kept(h)) {
+                if !plan.not_planned.contains(&left_out.effect) {
+                    plan.not_planned.push(left_out.effect.clone());
+                }
+            }
         }
         clock.lap("choice");
         plan.seconds = clock.laps;

@@ -102,6 +102,9 @@ fn what_no_plan_weighs_is_left_out_of_the_question() {
     assert_eq!(found.question, Some(question(&["surface_absorption", "sound_speed"])));
     assert_eq!(found.candidates[0].decides[0].what, "surface_absorption or sound_speed");
     assert_eq!(found.not_planned, ["room_modes"]);
+    // A cause that is sure is not left out in silence either.
+    with_waves.leading = question(&["surface_absorption", "sound_speed"]).leading;
+    assert_eq!(plan(&room, Some(&with_waves)).not_planned, ["room_modes"]);
 }
 
 #[test]
