@@ -3,6 +3,7 @@
 //! In each time bin the measured energy E is Gamma distributed about the predicted M with shape 1 / (relative variance), as
 //! the energy of band-limited noise is (Kuttruff, Room Acoustics, 6th ed., 3.5), and the prediction's own Monte-Carlo error makes it wider.
 
+mod chance;
 mod drift;
 mod expansion;
 mod fit;

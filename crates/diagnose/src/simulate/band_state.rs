@@ -28,7 +28,8 @@ pub(crate) struct BandState {
     /// Expected variance of a measured bin about the prediction, as a share of its energy squared: what each bin scatters for itself.
     /// Without the tracer's part until modes are found.
     pub variance: Vec<f64>,
-    /// The tracer's own part of it.
+    /// The tracer's own part of it; once modes are found, that which a prediction pays for on average: what they leave, and what they hold
+    /// as far as they are narrow.
     pub monte_carlo: Vec<f64>,
     /// What the tracer's chance moves together.
     pub modes: Modes,

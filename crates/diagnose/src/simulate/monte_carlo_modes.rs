@@ -62,6 +62,10 @@ pub(crate) fn find(bands: &mut [BandState], ends: &[usize]) {
             let taken: f64 = moves[bin * order.len()..].iter().map(|m| m * m).sum();
             let left = (state.monte_carlo[bin] - taken).max(0.0);
             state.variance[bin] = (state.variance[bin] + left).min(MOST_VARIANCE);
+            // A direction that is free to follow the data costs the less the wider it is.
+            let costly = |(i, m): (usize, &f64)| m * m / (1.0 + found.eigenvalues[order[i]]);
+            state.monte_carlo[bin] =
+                left + moves[bin * order.len()..].iter().enumerate().map(costly).sum::<f64>();
             state.correction[bin] += (0.5 * taken + left).min(MOST_BIAS);
         }
         state.modes = Modes::new(order.len(), moves);
@@ -105,6 +109,9 @@ mod tests {
             assert!((state.modes.of(30)[0].abs() - expected).abs() < 0.02, "{:?}", state.modes.of(30));
             // What is left to each bin is what it has of its own, and its share of the other directions.
             assert!(state.variance[30] < 0.12 && state.variance[30] >= 0.1, "{}", state.variance[30]);
+            // A prediction pays for less than all of it: the direction follows the data.
+            let (all, pays) = (expected * expected, state.monte_carlo[30]);
+            assert!(pays > 0.0 && pays < 0.5 * all, "{pays} {all}");
         }
         // The same ray is behind both bands.
         assert!(states[0].modes.of(30)[0] * states[1].modes.of(30)[0] > 0.0);

@@ -53,13 +53,18 @@ pub enum Unprepared {
     Failed(#[from] crate::error::Error),
 }
 
-/// What a table, `[grid][bin]`, says between the places of its grid.
-pub(crate) fn between(grid: &[f64], table: &[Vec<f64>], bin: usize, x: f64) -> f64 {
+/// Between which place of a grid and the next a value lies, and which share of the way from the one to the other; outside, at its end.
+pub(crate) fn place_in(grid: &[f64], x: f64) -> (usize, f64) {
     let x = x.clamp(grid[0], grid[grid.len() - 1]);
     let upper = grid.iter().position(|&g| g >= x).unwrap_or(1).max(1);
     let (low, high) = (grid[upper - 1], grid[upper]);
-    let share = (x - low) / (high - low);
-    table[upper - 1][bin] * (1.0 - share) + table[upper][bin] * share
+    (upper - 1, (x - low) / (high - low))
+}
+
+/// What a table, `[grid][bin]`, says between the places of its grid.
+pub(crate) fn between(grid: &[f64], table: &[Vec<f64>], bin: usize, x: f64) -> f64 {
+    let (lower, share) = place_in(grid, x);
+    table[lower][bin] * (1.0 - share) + table[lower + 1][bin] * share
 }
 
 #[cfg(test)]

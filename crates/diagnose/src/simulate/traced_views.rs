@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::observe::band_pulse::BandPulse;
 use crate::simulate::band_state::BandState;
+use crate::simulate::monte_carlo_modes::deviations;
 use crate::simulate::simulation::Simulation;
 use crate::simulate::traced_pair::TracedPair;
 use crate::simulate::traced_pair::class_sums::ClassedPaths;
@@ -81,6 +82,17 @@ impl TracedRoomView<'_> {
     ) -> Result<Vec<T>, Error> {
         (0..self.len()).into_par_iter().map(|index| one(&self.pair(index))).collect()
     }
+}
+
+/// What paths let expect in the bins of one band.
+#[derive(Clone, Debug)]
+pub struct ExpectedBins {
+    /// Natural logarithm of the energy of each bin.
+    pub ln_energy: Vec<f64>,
+    /// Variance of it by the tracer's chance, from the scatter between batches of rays.
+    pub variance: Vec<f64>,
+    /// What each batch of rays moves it by, `[bin][batch]`: the products of two such rows add up to a covariance.
+    pub chance: Vec<Vec<f64>>,
 }
 
 /// The traced paths of one pair, and the bins in which their energy is predicted.
@@ -200,11 +212,21 @@ impl<'a> TracedPairView<'a> {
         Ok(self.pair.paths().energies(&conditions)?)
     }
 
-    /// The same that are to be expected, sampled ones being smoothed over time as far as chance explains their scatter, with their
-    /// variance by chance, from the scatter between batches of rays.
-    pub fn expected_energies_and_variance(&self, band: usize, energies: &[f32]) -> (Vec<f64>, Vec<f64>) {
+    /// Energies of the paths (one each) that are to be expected in the bins of a band: sampled ones are smoothed over time as far as chance
+    /// explains their scatter.
+    pub fn expected_energies(&self, band: usize, energies: &[f32]) -> ExpectedBins {
         let (bins, pulse) = (self.state(band).bins, &self.room.pulses[band]);
-        self.pair.expected(energies, bins, pulse, self.room.simulation.traced_s).sums_and_variances()
+        let expected = self.pair.expected(energies, bins, pulse, self.room.simulation.traced_s);
+        let all: Vec<f64> = (0..expected.len()).map(|bin| expected.sum(bin)).collect();
+        let floor = NOTHING * all.iter().copied().fold(0.0, f64::max).max(1e-30);
+        let energies = || all.iter().map(|e| e.max(floor));
+        let chance: Vec<Vec<f64>> =
+            energies().enumerate().map(|(bin, e)| deviations(expected.batches(bin), e).collect()).collect();
+        ExpectedBins {
+            ln_energy: energies().map(f64::ln).collect(),
+            variance: chance.iter().map(|batches| batches.iter().map(|d| d * d).sum()).collect(),
+            chance,
+        }
     }
 
     /// Spreads a pulse of energy 1 that arrives so long after the first path over the bins of a band, as the band's filter does; returns one

@@ -84,6 +84,14 @@ impl DecayTerm for Scattering {
             *v += table.variance(bin, extra);
         }
     }
+
+    fn chance(&self, values: &[f64], view: &BandView<'_>, share: &mut [f64]) {
+        let Some(table) = view.table::<ScatteringTable>() else { return };
+        let extra = extra(values, view);
+        for (bin, share) in share.iter_mut().enumerate() {
+            *share *= table.chance(bin, extra);
+        }
+    }
 }
 
 /// Extra share in the octave of a view.

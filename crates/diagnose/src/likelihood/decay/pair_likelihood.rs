@@ -1,5 +1,6 @@
 //! The likelihood of one response and its slopes.
 
+use super::chance::{Place, TakenOff};
 use super::offsets::{BandBins, Directions, SharedInformation};
 use super::{EnergyModel, LN_PER_DB, STEP};
 use crate::effect::DecayTerm;
@@ -29,6 +30,10 @@ pub(super) struct ComparedBand<'a> {
 }
 
 impl ComparedBand<'_> {
+    fn place(&self, pair: usize) -> Place<'_> {
+        Place { pair, band: self.band, paths: &self.paths.0, predicted: &self.predicted }
+    }
+
     pub fn bins(&self) -> BandBins<'_> {
         let Self { ln_ratio, shapes, modes, level_sd, drift_sd, .. } = self;
         BandBins { ln_ratio, shapes, modes, level_sd: *level_sd, drift_sd: *drift_sd }
@@ -69,7 +74,10 @@ impl EnergyModel<'_> {
         let directions = Directions::new(&bins);
         let offsets = directions.top();
         let tops: f64 = compared.iter().map(|one| self.tops((pair, one.band), &one.variances)).sum();
-        let value = offsets.log_likelihood + tops;
+        let taken_off: Vec<Option<TakenOff>> =
+            compared.iter().map(|one| self.chance_taken_off(values, one.place(pair))).collect();
+        let chance: f64 = taken_off.iter().flatten().map(|t| t.nats).sum();
+        let value = offsets.log_likelihood + tops + chance;
         let Some(slopes) = slopes else { return value };
         let mut shared = SharedInformation::new(&directions);
         for (place, (one, offset)) in compared.iter().zip(&offsets.of).enumerate() {
@@ -78,6 +86,9 @@ impl EnergyModel<'_> {
             add_slopes(slopes, (&columns, &rows), (&one.shapes, &ln_ratio));
             shared.add(place, (&columns, &rows));
             self.add_variance_slopes(values, (pair, one.band), &one.variances, &ln_ratio, slopes);
+            if let Some(taken_off) = &taken_off[place] {
+                self.add_chance_gradient(values, one.place(pair), (taken_off, &one.paths.1), slopes);
+            }
         }
         shared.take_off(slopes);
         value

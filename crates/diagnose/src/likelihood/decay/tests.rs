@@ -32,7 +32,10 @@ fn the_gradient_is_that_of_central_differences() {
         &Truncation,
     ];
     for levels in [Levels::Common, Levels::Absolute, Levels::PerResponse] {
-        let tables = HandMade::new(levels, TimeZero::Emission);
+        let mut tables = HandMade::new(levels, TimeZero::Emission);
+        for state in tables.states.iter_mut().flatten() {
+            state.monte_carlo = state.variance.iter().map(|v| 0.4 * v).collect();
+        }
         let used = [true; 3];
         for effect in effects {
             let mut cases = effect.cases(&tables.survey);

@@ -39,20 +39,20 @@ pub(crate) struct ExpectedEnergy {
 }
 
 impl ExpectedEnergy {
-    fn batches(&self, bin: usize) -> &[f64] {
+    /// Energies of the batches of rays in a bin.
+    pub fn batches(&self, bin: usize) -> &[f64] {
         let batches = usize::from(PathSet::BATCHES);
         &self.sampled[bin * batches..(bin + 1) * batches]
     }
 
-    fn sum(&self, bin: usize) -> f64 {
-        self.exact[bin] + self.batches(bin).iter().sum::<f64>()
+    /// Number of bins.
+    pub fn len(&self) -> usize {
+        self.exact.len()
     }
 
-    /// Energy of each bin, and its variance by chance, from the scatter between batches of rays.
-    pub fn sums_and_variances(&self) -> (Vec<f64>, Vec<f64>) {
-        let variance = |bin: usize| deviations(self.batches(bin), 1.0).map(|d| d * d).sum();
-        let bins = 0..self.exact.len();
-        (bins.clone().map(|bin| self.sum(bin)).collect(), bins.map(variance).collect())
+    /// Energy of a bin.
+    pub fn sum(&self, bin: usize) -> f64 {
+        self.exact[bin] + self.batches(bin).iter().sum::<f64>()
     }
 }
 
