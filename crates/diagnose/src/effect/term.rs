@@ -64,10 +64,12 @@ pub trait DecayTerm: Send + Sync {
     /// case predicts what else is left to chance.
     fn variance(&self, _values: &[f64], _view: &BandView<'_>, _variance: &mut [f64]) {}
 
-    /// Changes what the tracer's chance is of the bins of one band and pair where other paths count with the case than without: the variance
-    /// of the logarithm of the paths' energy in each, as a share of what it is as stated. Energy that is added beside the paths needs no
-    /// word here.
-    fn chance(&self, _values: &[f64], _view: &BandView<'_>, _share: &mut [f64]) {}
+    /// What each batch of rays moves the logarithm of the paths' energy in each bin of one band and pair by, `[bin * batches + batch]`
+    /// ([`PathSet::BATCHES`](sabine_paths::PathSet::BATCHES)), where other paths count with the case than without. Energy that is added
+    /// beside the paths needs no word here. `None` where all count as stated.
+    fn chance(&self, _values: &[f64], _view: &BandView<'_>) -> Option<Vec<f64>> {
+        None
+    }
 
     /// What single first-order reflections say for it, where they are to be asked.
     fn reflection_evidence(&self) -> Option<&dyn ReflectionEvidence> {

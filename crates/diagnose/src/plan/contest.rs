@@ -56,17 +56,32 @@ impl Contest<'_> {
     pub fn weighed(&self, prospect: &Baseline, moved: Option<Nuisance>, rate_hz: f64) -> Weighed {
         let mut decay = self.nothing().0[0].clone();
         for pair in 0..prospect.pairs() {
-            let all: Vec<(Expansion, Vec<usize>)> =
-                self.fits.iter().map(|fit| self.decays(fit, prospect, pair)).collect();
+            let (all, chance): (Vec<_>, Vec<_>) =
+                self.fits.iter().map(|fit| self.decays(fit, prospect, pair)).unzip();
             decay += products(&all);
+            self.take_off_chance(&mut decay, &chance);
         }
         let times: Vec<(Expansion, Vec<usize>)> =
             self.fits.iter().map(|fit| self.times(fit, prospect, moved, rate_hz)).collect();
         Weighed([decay, products(&times)])
     }
 
-    /// Decays of a pair under a hypothesis, and which parameters it shares with those measured.
-    fn decays(&self, fit: &Fit, prospect: &Baseline, pair: usize) -> (Expansion, Vec<usize>) {
+    /// Takes off the products of predictions with each other what the tracer's chance makes of their differences, given what each batch of rays
+    /// moves the bins by under each hypothesis: two predictions that differ by chance alone are told apart by no measurement.
+    fn take_off_chance(&self, products: &mut DMatrix<f64>, chance: &[DMatrix<f64>]) {
+        let Some(first) = chance.first() else { return };
+        let places: Vec<usize> = self.ranges(0).iter().map(|own| own.end).collect();
+        let apart: Vec<DMatrix<f64>> = chance.iter().map(|one| one - first).collect();
+        for (a, one) in places.iter().zip(&apart) {
+            for (b, other) in places.iter().zip(&apart) {
+                // A nat is half of a squared standard deviation.
+                products[(*a, *b)] -= 2.0 * one.dot(other);
+            }
+        }
+    }
+
+    /// Decays of a pair under a hypothesis, which parameters it shares with those measured, and the chance in them.
+    fn decays(&self, fit: &Fit, prospect: &Baseline, pair: usize) -> ((Expansion, Vec<usize>), DMatrix<f64>) {
         let cases: Vec<&Case> = fit.cases[0].iter().map(|&c| &self.cases[c].case).collect();
         let (data, used) = (prospect.energy_data(), vec![true; prospect.pairs()]);
         let model = EnergyModel::new(&data, &cases, &used);
@@ -77,7 +92,7 @@ impl Contest<'_> {
         let mut one = model.expansion(&values, pair);
         let gain = model.layout.gain(pair);
         one.owning(gain, model.priors()[gain].sd);
-        (one, places)
+        ((one, places), model.chance(&values, pair))
     }
 
     /// Arrival times of all pairs, likewise.

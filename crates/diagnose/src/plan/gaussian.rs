@@ -89,7 +89,8 @@ pub(crate) fn expected_nats(
     let (t, r) = (truth.predicted, rival.predicted);
     let squared = products[(t, t)] - 2.0 * products[(t, r)] + products[(r, r)];
     let onto = difference(&rival.slopes);
-    let distance = over_rival(&DMatrix::from_element(1, 1, squared), (&onto, &onto))[(0, 0)];
+    // Below zero where predictions differ by no more than the tracer's chance, which was taken off.
+    let distance = over_rival(&DMatrix::from_element(1, 1, squared), (&onto, &onto))[(0, 0)].max(0.0);
     // tr((V + S)^-1 T) - tr((V + S)^-1 S).
     let spread = |one: &Predictive<'_>| {
         let onto = block(&rival.slopes, &one.slopes);

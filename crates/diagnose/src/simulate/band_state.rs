@@ -36,7 +36,7 @@ pub(crate) struct BandState {
     /// By how much the logarithm of the energy that is to be expected lies above that of what the rays have found in the bin: these are
     /// smoothed, and corrected for what chance does to logarithms.
     pub correction: Vec<f64>,
-    /// What modes are made of, `[bin * batches + batch]`; none once they are.
+    /// What each batch of rays moves the logarithm of the energy by, `[bin * batches + batch]`: modes are made of it.
     pub batch_deviations: Vec<f32>,
 }
 
@@ -62,6 +62,14 @@ impl BandState {
             correction: Vec::with_capacity(count),
             batch_deviations: Vec::with_capacity(count * usize::from(PathSet::BATCHES)),
         }
+    }
+
+    /// Nats of log-likelihood that the tracer's chance costs on average in each bin; variances exceed what is expected by `dispersion`.
+    pub fn weights_of_chance(&self, dispersion: f64) -> impl Iterator<Item = f64> {
+        self.monte_carlo
+            .iter()
+            .zip(&self.variance)
+            .map(move |(chance, variance)| 0.5 * chance / (variance * dispersion))
     }
 }
 
@@ -94,7 +102,9 @@ impl BandState {
                 (0..count).flat_map(|bin| [0.1 * (0.7 * bin as f64).sin(), 0.004 * bin as f64]).collect(),
             ),
             correction: (0..count).map(|bin| 0.002 * bin as f64).collect(),
-            batch_deviations: Vec::new(),
+            batch_deviations: (0..count * usize::from(PathSet::BATCHES))
+                .map(|i| 0.02 * (1.7 * i as f32).sin())
+                .collect(),
         }
     }
 }

@@ -69,7 +69,6 @@ pub(crate) fn find(bands: &mut [BandState], ends: &[usize]) {
             state.correction[bin] += (0.5 * taken + left).min(MOST_BIAS);
         }
         state.modes = Modes::new(order.len(), moves);
-        state.batch_deviations = Vec::new();
     }
 }
 
@@ -86,6 +85,7 @@ mod tests {
         let mut states: Vec<BandState> = (0..2)
             .map(|band| {
                 let mut state = BandState::by_hand(Bins::new(bands, band), 40, 2, 0.0);
+                state.batch_deviations.clear();
                 for bin in 0..40 {
                     // One batch in four has found more than the others, the more the later, and all bins have a little of their own.
                     let energy = |batch: usize| {

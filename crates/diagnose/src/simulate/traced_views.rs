@@ -91,8 +91,8 @@ pub struct ExpectedBins {
     pub ln_energy: Vec<f64>,
     /// Variance of it by the tracer's chance, from the scatter between batches of rays.
     pub variance: Vec<f64>,
-    /// What each batch of rays moves it by, `[bin][batch]`: the products of two such rows add up to a covariance.
-    pub chance: Vec<Vec<f64>>,
+    /// What each batch of rays moves it by, `[bin * batches + batch]`: the products of two such rows add up to a covariance.
+    pub chance: Vec<f32>,
 }
 
 /// The traced paths of one pair, and the bins in which their energy is predicted.
@@ -220,12 +220,13 @@ impl<'a> TracedPairView<'a> {
         let all: Vec<f64> = (0..expected.len()).map(|bin| expected.sum(bin)).collect();
         let floor = NOTHING * all.iter().copied().fold(0.0, f64::max).max(1e-30);
         let energies = || all.iter().map(|e| e.max(floor));
-        let chance: Vec<Vec<f64>> =
-            energies().enumerate().map(|(bin, e)| deviations(expected.batches(bin), e).collect()).collect();
+        let chance: Vec<f64> =
+            energies().enumerate().flat_map(|(bin, e)| deviations(expected.batches(bin), e)).collect();
+        let batches = usize::from(PathSet::BATCHES);
         ExpectedBins {
             ln_energy: energies().map(f64::ln).collect(),
-            variance: chance.iter().map(|batches| batches.iter().map(|d| d * d).sum()).collect(),
-            chance,
+            variance: chance.chunks_exact(batches).map(|own| own.iter().map(|d| d * d).sum()).collect(),
+            chance: chance.iter().map(|d| *d as f32).collect(),
         }
     }
 

@@ -85,12 +85,8 @@ impl DecayTerm for Scattering {
         }
     }
 
-    fn chance(&self, values: &[f64], view: &BandView<'_>, share: &mut [f64]) {
-        let Some(table) = view.table::<ScatteringTable>() else { return };
-        let extra = extra(values, view);
-        for (bin, share) in share.iter_mut().enumerate() {
-            *share *= table.chance(bin, extra);
-        }
+    fn chance(&self, values: &[f64], view: &BandView<'_>) -> Option<Vec<f64>> {
+        Some(view.table::<ScatteringTable>()?.chance(extra(values, view)))
     }
 }
 

@@ -6,11 +6,11 @@ use crate::simulate::scattering_share::scattering_more;
 use crate::simulate::tables::{Tables, between, place_in};
 use crate::simulate::traced_views::{ExpectedBins, TracedPairView, TracedRoomView};
 use sabine_acoustics::Material;
+#[cfg(test)]
+use sabine_paths::PathSet;
 
 /// Place of none in the grid.
 const NO_EXTRA: usize = 2;
-/// Variance of a logarithm below which nothing is left to chance.
-const NO_CHANCE: f64 = 1e-12;
 
 /// What other scattering does to the bins of one band and pair, `[grid][bin]`.
 #[derive(Clone, Debug, Default)]
@@ -19,9 +19,8 @@ pub(super) struct ScatteringTable {
     change: Vec<Vec<f64>>,
     /// By how much the tracer's own relative variance is more: what scatters is found by chance. None for single reflections.
     variance: Vec<Vec<f64>>,
-    /// The tracer's own variance at this place of the grid, that at the next, and the covariance of both, as shares of that without extra
-    /// scattering. None for single reflections.
-    chance: Vec<Vec<[f64; 3]>>,
+    /// What each batch of rays moves the logarithm of energy by, `[grid][bin * batches + batch]`. None for single reflections.
+    chance: Vec<Vec<f32>>,
 }
 
 impl ScatteringTable {
@@ -35,13 +34,15 @@ impl ScatteringTable {
         if self.variance.is_empty() { 0.0 } else { between(&GRID, &self.variance, bin, extra) }
     }
 
-    /// The tracer's own variance as a share of what it is as stated: between two places of the grid the prediction is a mixture of both,
-    /// and chance of the one is not that of the other.
-    pub fn chance(&self, bin: usize, extra: f64) -> f64 {
+    /// What each batch of rays moves the logarithm of energy by, `[bin * batches + batch]`: between two places of the grid the prediction is a
+    /// mixture of both, and chance of the one is not that of the other.
+    pub fn chance(&self, extra: f64) -> Vec<f64> {
         let (lower, share) = place_in(&GRID, extra);
-        let Some(bins) = self.chance.get(lower) else { return 1.0 };
-        let [here, next, both] = bins[bin];
-        (1.0 - share).powi(2) * here + share.powi(2) * next + 2.0 * share * (1.0 - share) * both
+        let [Some(here), Some(next)] = [lower, lower + 1].map(|place| self.chance.get(place)) else {
+            return Vec::new();
+        };
+        let mixed = |(a, b): (&f32, &f32)| (1.0 - share) * f64::from(*a) + share * f64::from(*b);
+        here.iter().zip(next).map(mixed).collect()
     }
 }
 
@@ -72,8 +73,7 @@ fn of_bins(pair: &TracedPairView<'_>) -> Result<Vec<ScatteringTable>, Error> {
                 .variance
                 .push(differences(&now.variance, &stated.variance).map(|more| more.max(0.0)).collect());
         }
-        table.chance =
-            all.windows(2).map(|two| chance_between([&two[0][band], &two[1][band]], stated)).collect();
+        table.chance = all.iter().map(|bands| bands[band].chance.clone()).collect();
         table
     };
     Ok((0..materials[0].bands().len()).map(of_band).collect())
@@ -81,18 +81,6 @@ fn of_bins(pair: &TracedPairView<'_>) -> Result<Vec<ScatteringTable>, Error> {
 
 fn differences(of: &[f64], from: &[f64]) -> impl Iterator<Item = f64> {
     of.iter().zip(from).map(|(a, b)| a - b)
-}
-
-/// What chance the bins have of their own at two places of the grid, and together, as shares of that as stated.
-fn chance_between([here, next]: [&ExpectedBins; 2], stated: &ExpectedBins) -> Vec<[f64; 3]> {
-    let product = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
-    let of_bin = |bin: usize| {
-        let [here, next, stated] = [here, next, stated].map(|at| &at.chance[bin][..]);
-        let whole = product(stated, stated);
-        let share = |a: &[f64], b: &[f64]| if whole > NO_CHANCE { product(a, b) / whole } else { 1.0 };
-        [share(here, here), share(next, next), share(here, next)]
-    };
-    (0..stated.chance.len()).map(of_bin).collect()
 }
 
 /// A share more of each reflection is scattered, and lost to the mirror; what was scattered never comes back as one.
@@ -108,16 +96,17 @@ impl ScatteringTable {
     pub fn by_hand(bins: usize) -> Self {
         let change = |extra: &f64| (0..bins).map(|bin| 0.4 * extra * (1.3 * bin as f64).sin()).collect();
         let variance = |extra: &f64| vec![0.05 * extra.abs(); bins];
-        // Two places of the grid have half of their chance in common.
-        let chance = |places: &[f64]| -> Vec<[f64; 3]> {
-            let own = |extra: f64| (1.0 + 0.4 * extra).powi(2);
-            let (here, next) = (own(places[0]), own(places[1]));
-            vec![[here, next, 0.5 * (here * next).sqrt()]; bins]
+        // Each place of the grid has a chance of its own.
+        let batches = usize::from(PathSet::BATCHES);
+        let chance = |extra: &f64| -> Vec<f32> {
+            (0..bins * batches)
+                .map(|i| (0.05 * (1.0 + 0.4 * extra) * (0.7 * i as f64 + 2.0 * extra).sin()) as f32)
+                .collect()
         };
         Self {
             change: GRID.iter().map(change).collect(),
             variance: GRID.iter().map(variance).collect(),
-            chance: GRID.windows(2).map(chance).collect(),
+            chance: GRID.iter().map(chance).collect(),
         }
     }
 }
@@ -128,27 +117,16 @@ mod tests {
 
     #[test]
     fn chance_between_two_places_of_the_grid_is_that_of_their_mixture() {
-        // Errors of four batches in one bin: as stated, and with a tenth more scattered.
-        let (stated, more) = ([0.3, -0.1, -0.1, -0.1], [0.05, 0.1, -0.2, 0.05]);
-        let at = |chance: [f64; 4]| ExpectedBins {
-            ln_energy: vec![0.0],
-            variance: vec![chance.iter().map(|d| d * d).sum()],
-            chance: vec![chance.to_vec()],
-        };
-        let all = [at(stated), at(more)];
-        let mut table = ScatteringTable::default();
-        for places in GRID.windows(2) {
-            let of = |extra: f64| &all[usize::from(extra != GRID[NO_EXTRA])];
-            table.chance.push(chance_between([of(places[0]), of(places[1])], &all[0]));
-        }
+        let table = ScatteringTable::by_hand(3);
+        let at = |place: usize, i: usize| f64::from(table.chance[place][i]);
         for (extra, share) in [(0.0, 0.0), (0.03, 0.3), (0.08, 0.8), (0.1, 1.0)] {
-            let squares = |mixed: &dyn Fn(usize) -> f64| -> f64 { (0..4).map(|i| mixed(i).powi(2)).sum() };
-            let expected =
-                squares(&|i| (1.0 - share) * stated[i] + share * more[i]) / squares(&|i| stated[i]);
-            let found = table.chance(0, extra);
-            assert!((found - expected).abs() < 1e-9, "{extra}: {found} {expected}");
+            let found = table.chance(extra);
+            assert_eq!(found.len(), 3 * usize::from(PathSet::BATCHES));
+            for (i, found) in found.iter().enumerate() {
+                let expected = (1.0 - share) * at(NO_EXTRA, i) + share * at(NO_EXTRA + 1, i);
+                assert!((found - expected).abs() < 1e-9, "{extra}: {found} {expected}");
+            }
         }
-        // Where nothing is left to chance, nothing changes.
-        assert_eq!(chance_between([&at([0.0; 4]), &at([0.0; 4])], &at([0.0; 4])), [[1.0; 3]]);
+        assert!(ScatteringTable::default().chance(0.1).is_empty());
     }
 }

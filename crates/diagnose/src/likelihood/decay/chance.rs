@@ -10,11 +10,17 @@ use super::{EnergyModel, LN_PER_DB, STEP};
 use crate::likelihood::laplace::Slopes;
 use crate::simulate::reflection_reweighting::HitChanges;
 use crate::simulate::views::BandView;
+use nalgebra::DMatrix;
+use sabine_paths::PathSet;
 
 /// Step of second differences, as a logarithm of energy.
 const BEND_STEP: f64 = 1e-3;
 /// Step of one-sided differences, in prior standard deviations.
 const SIDE_STEP: f64 = 1e-5;
+/// Variance of a logarithm below which nothing is left to chance.
+const NO_CHANCE: f64 = 1e-12;
+/// Batches of rays.
+const BATCHES: usize = PathSet::BATCHES as usize;
 /// Less than this is nothing, in nats.
 const LEAST_NATS: f64 = 1e-6;
 
@@ -106,27 +112,73 @@ impl EnergyModel<'_> {
 
     /// Nats in each bin that all of its chance costs on average; none where no effect is at work, or nothing is left to chance.
     fn weights_of_chance(&self, at: Place<'_>) -> Option<Vec<f64>> {
-        let state = &self.data.states[at.pair][at.band];
-        let dispersion = self.data.dispersion[at.band];
-        let own = || state.monte_carlo.iter().zip(&state.variance).take(at.paths.len());
-        let some = !self.terms.is_empty() && own().any(|(chance, _)| *chance > 0.0);
-        some.then(|| own().map(|(chance, variance)| 0.5 * chance / (variance * dispersion)).collect())
+        let weights = self.data.states[at.pair][at.band].weights_of_chance(self.data.dispersion[at.band]);
+        let weights: Vec<f64> = weights.take(at.paths.len()).collect();
+        (!self.terms.is_empty() && weights.iter().any(|w| *w > 0.0)).then_some(weights)
     }
 
     /// Variance of the logarithm of each predicted bin by the tracer's chance, as a share of that without any effect.
     fn shares_of_chance(&self, values: &[f64], at: Place<'_>) -> Vec<f64> {
+        let through = self.through_paths(values, at);
+        let Some(mixed) = self.mixed_chance(values, at) else {
+            return through.iter().map(|t| t * t).collect();
+        };
+        let stated = &self.data.states[at.pair][at.band].batch_deviations;
+        let bins = mixed.chunks_exact(BATCHES).zip(stated.chunks_exact(BATCHES)).zip(&through);
+        let share = |((mixed, stated), through): ((&[f64], &[f32]), &f64)| {
+            let whole: f64 = stated.iter().map(|d| f64::from(d * d)).sum();
+            let now: f64 = mixed.iter().map(|d| d * d).sum();
+            if whole > NO_CHANCE { through * through * now / whole } else { 1.0 }
+        };
+        bins.map(share).collect()
+    }
+
+    /// How much of a change of the logarithm of the paths' energy, those of neighbouring octaves among them, is predicted.
+    fn through_paths(&self, values: &[f64], at: Place<'_>) -> Vec<f64> {
         let gain_db = self.gain_db(values, at.pair);
         let changes = HitChanges::default();
         let view = self.view((at.pair, at.band), gain_db, &changes);
         let louder = self.with_paths(values, &view, gain_db, at.paths, STEP);
-        let through = louder.iter().zip(at.predicted).map(|(up, here)| ((up - here) / STEP).powi(2));
-        let mut shares: Vec<f64> = through.collect();
+        louder.iter().zip(at.predicted).map(|(up, here)| (up - here) / STEP).collect()
+    }
+
+    /// What each batch of rays moves the paths' energy by, `[bin * batches + batch]`, if not all paths count as stated.
+    fn mixed_chance(&self, values: &[f64], at: Place<'_>) -> Option<Vec<f64>> {
+        let changes = HitChanges::default();
+        let view = self.view((at.pair, at.band), self.gain_db(values, at.pair), &changes);
+        let stated = || self.data.states[at.pair][at.band].batch_deviations.iter().map(|d| f64::from(*d));
+        let mut mixed: Option<Vec<f64>> = None;
         for placed in &self.terms {
-            if let Some(term) = placed.case.decay_term() {
-                term.chance(placed.own(values), &view.with_table(placed.case.slot), &mut shares);
+            let Some(term) = placed.case.decay_term() else { continue };
+            let Some(own) = term.chance(placed.own(values), &view.with_table(placed.case.slot)) else {
+                continue;
+            };
+            let all = mixed.get_or_insert_with(|| stated().collect());
+            all.iter_mut().zip(own.iter().zip(stated())).for_each(|(d, (now, stated))| *d += now - stated);
+        }
+        mixed
+    }
+
+    /// What each batch of rays moves the predicted logarithms of all compared bins of a pair by, `(bin, batch)`, in the order of
+    /// [`EnergyModel::expansion`], each bin in units of what costs a nat.
+    pub fn chance(&self, values: &[f64], pair: usize) -> DMatrix<f64> {
+        let mut rows = Vec::new();
+        for one in self.compared_bands(values, pair, false) {
+            let at = one.place(pair);
+            let state = &self.data.states[pair][one.band];
+            let mixed = self.mixed_chance(values, at);
+            let mixed =
+                mixed.unwrap_or_else(|| state.batch_deviations.iter().map(|d| f64::from(*d)).collect());
+            let weights = state.weights_of_chance(self.data.dispersion[one.band]);
+            let through = self.through_paths(values, at);
+            for (bin, (weight, through)) in weights.zip(&through).enumerate() {
+                let whole: f64 =
+                    state.batch_deviations[bin * BATCHES..][..BATCHES].iter().map(|d| f64::from(d * d)).sum();
+                let unit = if whole > NO_CHANCE { (weight / whole).sqrt() } else { 0.0 };
+                rows.extend(mixed[bin * BATCHES..][..BATCHES].iter().map(|d| unit * through * d));
             }
         }
-        shares
+        DMatrix::from_row_slice(rows.len() / BATCHES, BATCHES, &rows)
     }
 
     /// Logarithm of what is predicted if the paths, those of neighbouring octaves among them, carried more by this logarithm.
@@ -162,9 +214,18 @@ mod tests {
     const CHANCE: f64 = 0.01;
     const DRAWS: usize = 4000;
 
+    /// Neutral values, but for a coupled volume, where the model has one, that is far louder than the paths late in the decay.
+    fn loud(model: &EnergyModel<'_>) -> Vec<f64> {
+        let mut values = model.start(None);
+        if let [level, _, decay_s, ..] = &mut values[model.layout.len()..] {
+            (*level, *decay_s) = (10.0, 2.0);
+        }
+        values
+    }
+
     /// Mean of the log-likelihood of predictions with an error of [`CHANCE`] less that without any, where the measurement is what the latter
-    /// says: of the model with these cases at the values that `set` makes of the neutral ones.
-    fn mean_cost(cases: &[&Case], set: impl Fn(&mut [f64])) -> f64 {
+    /// says: of the model with these cases.
+    fn mean_cost(cases: &[&Case]) -> f64 {
         let mut tables = Tables::new(Levels::Absolute, TimeZero::Emission);
         for state in tables.states.iter_mut().flatten() {
             state.variance.fill(0.05);
@@ -176,18 +237,15 @@ mod tests {
         let of = |tables: &Tables| -> f64 {
             let data = EnergyData { level_sd: &[1e-6; 2], drift_sd: &[0.0; 2], ..tables.energy_data() };
             let model = EnergyModel::new(&data, cases, &used);
-            let mut values = model.start(None);
-            set(&mut values[model.layout.len()..]);
-            model.log_likelihood(&values, None)
+            model.log_likelihood(&loud(&model), None)
         };
         for pair in 0..3 {
             for band in 0..2 {
                 let data = tables.energy_data();
                 let model = EnergyModel::new(&data, cases, &used);
-                let mut values = model.start(None);
-                set(&mut values[model.layout.len()..]);
                 let count = tables.states[pair][band].ln_energy.len();
-                let energies = model.predicted(&values, pair, band, count).iter().map(|l| l.exp()).collect();
+                let energies =
+                    model.predicted(&loud(&model), pair, band, count).iter().map(|l| l.exp()).collect();
                 tables.measured[pair].energies[band] = Some(energies);
             }
         }
@@ -213,16 +271,63 @@ mod tests {
 
     #[test]
     fn what_makes_chance_less_gains_nothing_by_it() {
-        let plain = mean_cost(&[], |_| {});
+        let plain = mean_cost(&[]);
         // 0.01 / (2 x 0.05 x dispersion) in each of 84 bins, the dispersion being some 1.
         assert!((-12.0..-5.0).contains(&plain), "{plain}");
         let cases = CoupledVolume.cases(&Tables::new(Levels::Absolute, TimeZero::Emission).survey);
         let cases: Vec<&Case> = cases.iter().collect();
-        // Far more energy than the paths have late in the decay: three quarters of what chance costs are no more.
-        let with = mean_cost(&cases, |own| {
-            own[0] = 10.0;
-            own[2] = 2.0;
-        });
+        // Three quarters of what chance costs are no more.
+        let with = mean_cost(&cases);
         assert!((with / plain - 1.0).abs() < 0.06, "{with} {plain}");
+    }
+
+    #[test]
+    fn what_chance_makes_of_the_difference_of_two_predictions_is_told() {
+        let mut tables = Tables::new(Levels::Absolute, TimeZero::Emission);
+        for state in tables.states.iter_mut().flatten() {
+            // All of the chance is paid for.
+            let own = state.batch_deviations.chunks_exact(BATCHES);
+            state.monte_carlo = own.map(|own| own.iter().map(|d| f64::from(d * d)).sum()).collect();
+        }
+        let cases = CoupledVolume.cases(&tables.survey);
+        let cases: Vec<&Case> = cases.iter().collect();
+        let used = [true; 3];
+        let exact = tables.states.clone();
+        let (pair, dispersion) = (1, tables.energy_data().dispersion.to_vec());
+        // Predictions with a coupled volume less those without.
+        let apart = |tables: &Tables| -> DMatrix<f64> {
+            let data = tables.energy_data();
+            let [without, with] = [&[][..], &cases].map(|cases| {
+                let model = EnergyModel::new(&data, cases, &used);
+                model.prediction(&loud(&model), pair)
+            });
+            DMatrix::from_column_slice(with.len(), 1, (with - without).as_slice())
+        };
+        let exactly = apart(&tables);
+        let mut random = Pcg64Mcg::seed_from_u64(6);
+        let mut sum = 0.0;
+        for _ in 0..DRAWS {
+            let deviates: Vec<f64> = (0..BATCHES).map(|_| StandardNormal.sample(&mut random)).collect();
+            for (state, exact) in tables.states[pair].iter_mut().zip(&exact[pair]) {
+                for bin in 0..exact.ln_energy.len() {
+                    let own = &exact.batch_deviations[bin * BATCHES..][..BATCHES];
+                    let error: f64 = own.iter().zip(&deviates).map(|(d, z)| f64::from(*d) * z).sum();
+                    for group in exact.groups[bin]..exact.groups[bin + 1] {
+                        state.group_energy[group] = exact.group_energy[group] * error.exp();
+                    }
+                }
+            }
+            let off = apart(&tables) - &exactly;
+            let variances = exact[pair].iter().zip(&dispersion);
+            let weights = variances.flat_map(|(state, d)| state.variance.iter().map(move |v| 1.0 / (v * d)));
+            sum += off.iter().zip(weights).map(|(off, weight)| weight * off * off).sum::<f64>();
+        }
+        let data = tables.energy_data();
+        let [without, with] = [&[][..], &cases].map(|cases| {
+            let model = EnergyModel::new(&data, cases, &used);
+            model.chance(&loud(&model), pair)
+        });
+        let (found, expected) = (2.0 * (with - without).norm_squared(), sum / DRAWS as f64);
+        assert!(expected > 0.01 && (found / expected - 1.0).abs() < 0.1, "{found} {expected}");
     }
 }

@@ -30,7 +30,7 @@ pub(super) struct ComparedBand<'a> {
 }
 
 impl ComparedBand<'_> {
-    fn place(&self, pair: usize) -> Place<'_> {
+    pub fn place(&self, pair: usize) -> Place<'_> {
         Place { pair, band: self.band, paths: &self.paths.0, predicted: &self.predicted }
     }
 
