@@ -169,13 +169,13 @@ impl EnergyModel<'_> {
             let mixed = self.mixed_chance(values, at);
             let mixed =
                 mixed.unwrap_or_else(|| state.batch_deviations.iter().map(|d| f64::from(*d)).collect());
-            let weights = state.weights_of_chance(self.data.dispersion[one.band]);
             let through = self.through_paths(values, at);
-            for (bin, (weight, through)) in weights.zip(&through).enumerate() {
-                let whole: f64 =
-                    state.batch_deviations[bin * BATCHES..][..BATCHES].iter().map(|d| f64::from(d * d)).sum();
-                let unit = if whole > NO_CHANCE { (weight / whole).sqrt() } else { 0.0 };
-                rows.extend(mixed[bin * BATCHES..][..BATCHES].iter().map(|d| unit * through * d));
+            for (bin, (through, variance)) in through.iter().zip(&one.variances).enumerate() {
+                let own = &state.batch_deviations[bin * BATCHES..][..BATCHES];
+                let whole: f64 = own.iter().map(|d| f64::from(d * d)).sum();
+                let paid = if whole > NO_CHANCE { state.monte_carlo[bin] / whole } else { 1.0 };
+                let unit = through * (0.5 * paid / (variance * self.data.dispersion[one.band])).sqrt();
+                rows.extend(mixed[bin * BATCHES..][..BATCHES].iter().map(|d| unit * d));
             }
         }
         DMatrix::from_row_slice(rows.len() / BATCHES, BATCHES, &rows)
