@@ -125,7 +125,7 @@ pub use report::diagnosis::{
 };
 pub use simulate::scene_tracer::{EachScene, PreparedTracer, SceneTracer};
 pub use simulate::tables::{Tables, Unprepared};
-pub use simulate::traced_views::{TracedPairView, TracedRoomView};
+pub use simulate::traced_views::{ExpectedBins, TracedPairView, TracedRoomView};
 pub use simulate::views::{ArrivalView, BandView};
 pub use survey::planes::Plane;
 pub use survey::surfaces::Surface;

@@ -7,7 +7,8 @@ use crate::effects::{BandLaw, Grammar};
 use crate::error::Error;
 use crate::infer::search::{Search, State};
 
-/// Size at which laws of grazing absorption were found whenever they were hidden (five rooms of five, `docs/validation/laws.md`), in standard deviations.
+/// Size at which laws of grazing absorption were found whenever they were hidden (five rooms of five, `docs/validation/laws.md`), in standard
+/// deviations.
 const PLAIN_D_PRIME: f64 = 10.0;
 /// Decibels beyond which no figure means anything.
 const BEYOND_DB: f64 = 100.0;

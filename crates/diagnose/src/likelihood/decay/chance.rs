@@ -110,7 +110,7 @@ impl EnergyModel<'_> {
         change.map(|((now, before), w)| w * (now - before)).sum::<f64>() / (moved[index] - values[index])
     }
 
-    /// Nats in each bin that all of its chance costs on average; none where no effect is at work, or nothing is left to chance.
+    /// Nats in each bin that all of its chance costs on average; none where there is no effect, or nothing is left to chance.
     fn weights_of_chance(&self, at: Place<'_>) -> Option<Vec<f64>> {
         let weights = self.data.states[at.pair][at.band].weights_of_chance(self.data.dispersion[at.band]);
         let weights: Vec<f64> = weights.take(at.paths.len()).collect();
