@@ -311,7 +311,7 @@ fn least_confirmed(
         let nearer = after < MAX_RMSE_RATIO * before;
         // Likelier bins under decays that lie farther off: the cause stands for something else.
         let farther = MAX_RMSE_RATIO * after > before && change.is_farther_surely;
-        let gains = gain.low > 0.0 || predicted.gains_everywhere[place];
+        let gains = gain.low > 0.0 || gain.in_every_group;
         (gains && !farther)
             || (gain.nats_per_bin > 0.0 && nearer)
             || (rests_on_tables[place] && gain.high > 0.0 && !farther)
@@ -414,15 +414,20 @@ mod tests {
         let cases = cases(&effects, baseline.survey());
         let search = Search::new(&baseline, &cases, 1, vec![true; 3]);
         let state = search.state(&[0], None).expect("a fit");
-        let gain =
-            HeldOutGain { nats_per_bin: 0.1, low: 0.05, high: 0.15, db_rmse_before: 1.0, db_rmse_after: 1.1 };
+        let gain = HeldOutGain {
+            nats_per_bin: 0.1,
+            low: 0.05,
+            high: 0.15,
+            db_rmse_before: 1.0,
+            db_rmse_after: 1.1,
+            in_every_group: true,
+        };
         // That curves of one group lie far off may be chance.
         for (rmse_db, is_farther_surely, doubted) in
             [([0.8, 0.8], true, None), ([0.8, 0.85], true, Some(0)), ([0.8, 0.85], false, None)]
         {
             let predicted = Predicted {
                 gains: vec![gain.clone()],
-                gains_everywhere: vec![true],
                 decay_changes: vec![DecayChange { rmse_db: [1.0, 1.1], is_farther_surely: true }],
                 diffuse_changes: vec![DecayChange { rmse_db, is_farther_surely }],
                 ..Predicted::default()

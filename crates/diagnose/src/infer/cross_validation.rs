@@ -84,8 +84,6 @@ pub(crate) struct Predicted {
     pub gains: Vec<HeldOutGain>,
     /// Of each cause, summed over all bins of the receivers that were left out, in nats.
     pub gains_nats: Vec<f64>,
-    /// Whether every group of positions that was left out gains by each cause.
-    pub gains_everywhere: Vec<bool>,
     /// What each cause does to decay curves at positions left out, in all octaves and in those above the Schroeder frequency; in all where
     /// none lies above it.
     pub decay_changes: Vec<DecayChange>,
@@ -283,7 +281,9 @@ fn summary(baseline: &Baseline, causes: usize, folds: &Folds, splits: &[SplitGai
         .map(|i| {
             let [low, high] = interval(&|s| s.each[i]);
             let [db_rmse_before, db_rmse_after] = decay_changes[i].rmse_db;
-            HeldOutGain { nats_per_bin: mean(&|s| s.each[i]), low, high, db_rmse_before, db_rmse_after }
+            let in_every_group = splits.iter().all(|s| s.each[i] > 0.0);
+            let nats_per_bin = mean(&|s| s.each[i]);
+            HeldOutGain { nats_per_bin, low, high, db_rmse_before, db_rmse_after, in_every_group }
         })
         .collect();
     let curves = |s: &SplitGain| decay_curves(baseline, &s.predicted[0], &s.predicted[1], true);
@@ -293,7 +293,6 @@ fn summary(baseline: &Baseline, causes: usize, folds: &Folds, splits: &[SplitGai
         gains_nats: (0..causes).map(|i| splits.iter().map(|s| s.each[i]).sum()).collect(),
         decay_changes,
         diffuse_changes: changes(first_diffuse_band(baseline.survey())),
-        gains_everywhere: (0..causes).map(|i| splits.iter().all(|s| s.each[i] > 0.0)).collect(),
         decays: splits.iter().flat_map(curves).collect(),
     }
 }

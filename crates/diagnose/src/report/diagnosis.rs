@@ -91,6 +91,9 @@ pub struct HeldOutGain {
     pub db_rmse_before: f64,
     /// The same with it.
     pub db_rmse_after: f64,
+    /// Whether every group of positions that was left out gains: one that gains far more than the others takes the interval below zero.
+    #[serde(default)]
+    pub in_every_group: bool,
 }
 
 /// JSON has no infinity: an end that is null is infinite.
@@ -392,7 +395,14 @@ mod tests {
     #[test]
     fn intervals_of_one_position_come_back_from_json() {
         let (low, high) = (f64::NEG_INFINITY, f64::INFINITY);
-        let gain = HeldOutGain { nats_per_bin: 0.1, low, high, db_rmse_before: 1.0, db_rmse_after: 0.5 };
+        let gain = HeldOutGain {
+            nats_per_bin: 0.1,
+            low,
+            high,
+            db_rmse_before: 1.0,
+            db_rmse_after: 0.5,
+            in_every_group: true,
+        };
         let text = serde_json::to_string(&gain).unwrap();
         assert!(text.contains("\"low\":null"), "{text}");
         assert_eq!(serde_json::from_str::<HeldOutGain>(&text).unwrap(), gain);

@@ -35,9 +35,10 @@ fn what_bends_around_a_screen_is_found() {
     // Alone: `scattering` stood wrongly beside it as long as less of the tracer's chance was evidence.
     let [cause] = &found.causes[..] else { panic!("{:?}", found.causes) };
     assert_eq!(cause.effect, "edge_diffraction");
-    // Half of the receivers hear nothing of the edge: the interval of the gain is wide, and reaches below zero.
+    // Each of the eight groups gains, by chance once in 256; one gains ten times as much as the others, and so the interval is wide.
     let gain = cause.held_out_gain.clone().unwrap();
-    assert!(gain.nats_per_bin > 0.0 && gain.db_rmse_after < gain.db_rmse_before, "{gain:?}");
+    assert!(gain.in_every_group && gain.nats_per_bin > 0.1, "{gain:?}");
+    assert!(gain.db_rmse_after < gain.db_rmse_before, "{gain:?}");
     // Found: 1 to 2 dB; what is reflected before or after the edge makes it more than theory says.
     let level = &cause.parameters[0];
     assert!(level.value.abs() < 3.0 && level.high - level.low < 6.0, "{level:?}");
