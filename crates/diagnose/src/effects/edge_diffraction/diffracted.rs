@@ -51,3 +51,13 @@ fn of_bins(pair: &TracedPairView<'_>) -> Result<Vec<DiffractedEnergy>, Error> {
     };
     Ok((0..bands).map(of_band).collect())
 }
+
+#[cfg(test)]
+impl DiffractedEnergy {
+    /// Slower decays than those of the paths, in two octaves.
+    pub fn by_hand(bins: usize) -> Self {
+        let energies =
+            |octave: usize| (0..bins).map(|bin| 0.1 * (-0.1 * (bin + octave) as f64).exp()).collect();
+        Self { columns: (0..2).map(|octave| (octave, energies(octave))).collect() }
+    }
+}

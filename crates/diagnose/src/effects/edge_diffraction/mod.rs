@@ -59,6 +59,11 @@ impl DecayTerm for MissingDiffraction {
         true
     }
 
+    #[cfg(test)]
+    fn by_hand(&self, bins: usize) -> Option<Box<dyn std::any::Any + Send + Sync>> {
+        Some(Box::new(DiffractedEnergy::by_hand(bins)))
+    }
+
     fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
         let Some(table) = view.table::<DiffractedEnergy>() else { return };
         let level = 10f64.powf(values[0] / 10.0);

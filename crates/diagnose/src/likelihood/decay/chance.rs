@@ -70,7 +70,6 @@ impl EnergyModel<'_> {
         let [up, down] =
             [BEND_STEP, -BEND_STEP].map(|more| self.with_paths(values, &view, gain_db, at.paths, more));
         let m = self.data.absorption.len();
-        let mut louder = 0.0;
         for (bin, (weight, share)) in weights.iter().zip(shares).enumerate() {
             let slope = (up[bin] - down[bin]) / (2.0 * BEND_STEP);
             let bend = (up[bin] - 2.0 * at.predicted[bin] + down[bin]) / (BEND_STEP * BEND_STEP);
@@ -78,15 +77,14 @@ impl EnergyModel<'_> {
                 continue;
             }
             let with_paths = weight * 2.0 * share * bend / slope;
-            louder += with_paths;
             for k in 0..m {
                 slopes.gradient[self.layout.absorption(k, at.band)] += with_paths * path_slopes[bin * m + k];
             }
         }
-        // With gains, all together; added sound of the source goes with them, which counts for nothing here.
-        for index in self.layout.common_gain().into_iter().chain([self.layout.gain(self.assignment[at.pair])])
-        {
-            slopes.gradient[index] += louder * LN_PER_DB;
+        let own_gain = self.layout.gain(self.assignment[at.pair]);
+        let with_gain = self.chance_slope(values, at, taken_off, own_gain);
+        for index in self.layout.common_gain().into_iter().chain([own_gain]) {
+            slopes.gradient[index] += with_gain;
         }
         for placed in &self.terms {
             for (i, p) in placed.case.parameters.iter().enumerate() {
@@ -98,14 +96,16 @@ impl EnergyModel<'_> {
         }
     }
 
-    /// Change of what is taken off with a parameter of an effect.
+    /// Change of what is taken off with a gain or a parameter of an effect.
     fn chance_slope(&self, values: &[f64], at: Place<'_>, taken_off: &TakenOff, index: usize) -> f64 {
         let (prior, mut moved) = (self.priors[index], values.to_vec());
         let step = SIDE_STEP * prior.sd;
         moved[index] =
             if values[index] + step < prior.high { values[index] + step } else { values[index] - step };
-        let predicted = self.affected(&moved, (at.pair, at.band), at.paths.to_vec());
-        let shares = self.shares_of_chance(&moved, Place { predicted: &predicted, ..at });
+        let louder = (self.gain_db(&moved, at.pair) - self.gain_db(values, at.pair)) * LN_PER_DB;
+        let paths: Vec<f64> = at.paths.iter().map(|p| p + louder).collect();
+        let predicted = self.affected(&moved, (at.pair, at.band), paths.clone());
+        let shares = self.shares_of_chance(&moved, Place { paths: &paths, predicted: &predicted, ..at });
         let change = shares.iter().zip(&taken_off.shares).zip(&taken_off.weights);
         change.map(|((now, before), w)| w * (now - before)).sum::<f64>() / (moved[index] - values[index])
     }

@@ -3,8 +3,8 @@
 use super::*;
 use crate::effect::Effect;
 use crate::effects::{
-    AirAbsorption, AngleDependentAbsorption, BackgroundNoise, CoupledVolume, RoomModes, Scattering,
-    SourceDirectivity, TransducerResponse, Truncation,
+    AirAbsorption, AngleDependentAbsorption, BackgroundNoise, CoupledVolume, MissingDiffraction, RoomModes,
+    Scattering, SourceDirectivity, TransducerResponse, Truncation,
 };
 use crate::hand_made::Tables as HandMade;
 use sabine_scene::TimeZero;
@@ -20,11 +20,12 @@ fn somewhere(model: &EnergyModel<'_>) -> Vec<f64> {
 
 #[test]
 fn the_gradient_is_that_of_central_differences() {
-    let effects: [&dyn Effect; 9] = [
+    let effects: [&dyn Effect; 10] = [
         &AirAbsorption,
         &AngleDependentAbsorption,
         &BackgroundNoise,
         &CoupledVolume,
+        &MissingDiffraction,
         &RoomModes,
         &Scattering,
         &SourceDirectivity,
@@ -33,6 +34,7 @@ fn the_gradient_is_that_of_central_differences() {
     ];
     for levels in [Levels::Common, Levels::Absolute, Levels::PerResponse] {
         let mut tables = HandMade::new(levels, TimeZero::Emission);
+        tables.survey.diffracted = vec![0, 1, 2];
         for state in tables.states.iter_mut().flatten() {
             state.monte_carlo = state.variance.iter().map(|v| 0.4 * v).collect();
         }
