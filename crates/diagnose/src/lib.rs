@@ -100,6 +100,7 @@ pub use effect::{
 pub use effects::*;
 pub use error::Error;
 pub use extend::applied_changes::{AppliedChanges, CoupledDecay, Dimensions, GainOverTime, ThinPanel};
+pub use extend::box_object::BoxObject;
 pub use extend::displaced_surface::DisplacedSurface;
 pub use extend::extended_model::{ExtendedModel, ModelCause};
 pub use extend::extended_room::ExtendedRoom;
@@ -109,7 +110,7 @@ pub use extend::moved_mesh::DisplacementError;
 pub use extend::rigid_motion::RigidMotion;
 pub use extend::uncertainty::Uncertainty;
 pub use found_parameter::FoundParameter;
-pub use likelihood::multilateration::{UnassignedPeak, UnassignedPeaks};
+pub use likelihood::multilateration::{PredictedPath, UnassignedPeak, UnassignedPeaks};
 pub use observe::pre_arrival::PreArrival;
 pub use plan::config::PlanConfig;
 pub use plan::cost::CostTable;

@@ -95,13 +95,30 @@ pub trait ArrivalTerm: Send + Sync {
     }
 }
 
-/// A reflection that the mesh does not have. Its fit starts from the peaks that nothing predicted explains.
+/// Reflections that the mesh does not have. Their fit starts from the peaks that nothing predicted explains.
 pub trait ReflectionTerm: Send + Sync {
     /// Values to start from.
     fn starts(&self, peaks: &UnassignedPeaks<'_>) -> Vec<Vec<f64>>;
 
-    /// The reflection in a response (index), where there is one.
-    fn reflection(&self, values: &[f64], survey: &Survey, response: usize) -> Option<AddedReflection>;
+    /// Reflections that it may add to one response: one by default.
+    fn ways(&self) -> usize {
+        1
+    }
+
+    /// A reflection (index below [`ReflectionTerm::ways`]) in a response (index), where there is one.
+    fn reflection(
+        &self,
+        values: &[f64],
+        survey: &Survey,
+        response: usize,
+        way: usize,
+    ) -> Option<AddedReflection>;
+
+    /// Whether it stands in the way of a predicted path, given the places in metres from each of which to the next that goes straight on: source,
+    /// reflections, receiver. Nothing is hidden by default.
+    fn hides(&self, _values: &[f64], _stops: &[[f64; 3]]) -> bool {
+        false
+    }
 }
 
 /// Something that shows before the direct sound.

@@ -68,7 +68,13 @@ impl ReflectionTerm for ExtraReflector {
         peaks.images().into_iter().map(|[x, y, z]| vec![x, y, z, REFLECTANCE_DB.0]).collect()
     }
 
-    fn reflection(&self, values: &[f64], survey: &Survey, response: usize) -> Option<AddedReflection> {
+    fn reflection(
+        &self,
+        values: &[f64],
+        survey: &Survey,
+        response: usize,
+        _way: usize,
+    ) -> Option<AddedReflection> {
         let pair = &survey.responses()[response];
         let source = survey.sources()[pair.source].position_m;
         let receiver = survey.receivers()[pair.receiver].position_m;

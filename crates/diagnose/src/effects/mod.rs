@@ -11,6 +11,7 @@ mod coupled_volume;
 mod edge_diffraction;
 mod extra_reflector;
 mod law_effect;
+mod missing_object;
 mod nonlinear_distortion;
 mod open_patch;
 mod position_error;
@@ -39,6 +40,7 @@ pub use coupled_volume::CoupledVolume;
 pub use edge_diffraction::MissingDiffraction;
 pub use extra_reflector::ExtraReflector;
 pub use law_effect::LawEffect;
+pub use missing_object::MissingObject;
 pub use nonlinear_distortion::NonlinearDistortion;
 pub use open_patch::OpenPatch;
 pub use position_error::PositionError;
@@ -87,6 +89,7 @@ pub fn catalogue() -> Vec<Box<dyn Effect>> {
         Box::new(CoherentReflections),
         Box::new(SurfaceDisplacement),
         Box::new(CoordinateShift),
+        Box::new(MissingObject),
     ]
 }
 

@@ -1,5 +1,6 @@
 //! What the changes of a model make of a room, taken together.
 
+use crate::extend::box_object::BoxObject;
 use crate::extend::displaced_surface::DisplacedSurface;
 use crate::extend::rigid_motion::RigidMotion;
 use sabine_paths::laws::Law;
@@ -69,6 +70,8 @@ pub struct AppliedChanges {
     pub coherent_reflections: bool,
     /// Flat surfaces that the mesh lacks.
     pub sheets: Vec<ThinPanel>,
+    /// Box-shaped obstacles that the mesh lacks, as they stand in the room: neither its size nor displaced surfaces move them.
+    pub objects: Vec<BoxObject>,
     /// Formulas that change what paths carry, with the 90 % intervals of their parameters.
     pub laws: Vec<Law>,
 }

@@ -127,6 +127,9 @@ impl AppliedChanges {
         if !self.surfaces.is_empty() {
             check_places(room.scene(), &moved, &built.sources, &built.receivers)?;
         }
+        if !self.objects.is_empty() {
+            check_places(room.scene(), &built.scene, &built.sources, &built.receivers)?;
+        }
         Ok(built)
     }
 
@@ -220,8 +223,11 @@ impl AppliedChanges {
 
     fn scene(&self, stated: &Scene, moved: &Scene, materials: Vec<Material>) -> Result<Scene, Cause> {
         let scene = self.with_sheets(moved.with_materials(materials)?)?;
-        let Some(change) = &self.dimensions else { return Ok(scene) };
-        change.applied(stated, &scene)
+        let scene = match &self.dimensions {
+            Some(change) => change.applied(stated, &scene)?,
+            None => scene,
+        };
+        self.objects.iter().try_fold(scene, |scene, object| object.added_to(&scene))
     }
 
     /// Corners of a sheet. One that lies on a surface (a hole just before its wall) stands where that surface stands.

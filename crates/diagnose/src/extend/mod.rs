@@ -1,6 +1,7 @@
 //! The model with the named causes in it, and its rendering.
 
 pub(crate) mod applied_changes;
+pub(crate) mod box_object;
 pub(crate) mod displaced_surface;
 pub(crate) mod extended_model;
 pub(crate) mod extended_room;

@@ -1,6 +1,7 @@
 //! A change of the model: what a named cause does to the room and to the recording.
 
 use crate::extend::applied_changes::{AppliedChanges, CoupledDecay, Dimensions, GainOverTime, ThinPanel};
+use crate::extend::box_object::BoxObject;
 use crate::extend::displaced_surface::{DisplacedSurface, put};
 use crate::extend::rigid_motion::RigidMotion;
 use sabine_paths::laws::Law;
@@ -61,6 +62,8 @@ pub enum ModelChange {
     /// A flat surface that the mesh lacks.
     #[serde(rename = "sheet")]
     Panel(ThinPanel),
+    /// A box-shaped obstacle that the mesh lacks.
+    Object(BoxObject),
     /// Sound is diffracted at the edges of the mesh.
     Diffraction,
     /// Specular reflections add as pressures.
@@ -113,6 +116,7 @@ impl ModelChange {
                 | Self::Temperature(_)
                 | Self::Dimensions(_)
                 | Self::SurfaceDisplacement(_)
+                | Self::Object(_)
         )
     }
 }
@@ -141,6 +145,7 @@ impl AppliedChanges {
             ModelChange::Dimensions(dimensions) => self.dimensions = Some(dimensions),
             ModelChange::SurfaceDisplacement(surface) => put(&mut self.surfaces, surface),
             ModelChange::Panel(panel) => self.sheets.push(panel),
+            ModelChange::Object(object) => self.objects.push(object),
             ModelChange::Diffraction => self.diffraction = true,
             ModelChange::CoherentReflections => self.coherent_reflections = true,
             ModelChange::Law(law) => {

@@ -93,6 +93,11 @@ impl AppliedChanges {
             check.each("sheet.corners_m", corners, (-1e5, 1e5), "a finite coordinate")?;
             check.each("sheet.absorption", &[sheet.absorption], (0.0, 1.0), "between 0 and 1")?;
         }
+        for object in &self.objects {
+            check.each("object.foot_m", &object.foot_m, (-1e5, 1e5), "a finite coordinate")?;
+            check.each("object.size_m", &object.size_m, (0.05, 20.0), "between 0.05 and 20 m")?;
+            check.each("object.turn_deg", &[object.turn_deg], (-180.0, 180.0), "within 180 degrees")?;
+        }
         self.check_gain_over_time(check)?;
         for (field, values, limits, range) in [
             (
@@ -146,6 +151,7 @@ impl AppliedChanges {
         for (field, names, known) in [
             ("absorption", keys(&self.absorption), &materials),
             ("scattering", keys(&self.scattering), &materials),
+            ("object.material", self.objects.iter().map(|o| o.material.clone()).collect(), &materials),
             ("source_pattern.axis", keys(&self.axis), &sources),
             ("receiver_pattern.directed_share", keys(&self.receiver_directed_share), &receivers),
             ("receiver_pattern.axis", keys(&self.receiver_axis), &receivers),

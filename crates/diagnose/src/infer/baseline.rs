@@ -182,8 +182,8 @@ impl Baseline {
             Ok(false) => Ok(()),
             Err(Error::Displacement(reason)) => {
                 self.observations.notes.push(format!(
-                    "A surface cannot stand where arrival times say that it stands ({reason}): decays are predicted as if it stood where \
-                     the mesh has it."
+                    "A surface or an object cannot stand where arrival times say that it stands ({reason}): decays are predicted for the room as it was \
+                     before."
                 ));
                 Ok(())
             }

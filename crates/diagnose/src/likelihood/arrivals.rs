@@ -3,20 +3,23 @@
 //! The direct sound comes when it should, give or take; every later peak belongs to one of the predicted specular reflections or to none
 //! (a mixture of normal distributions about the predicted times and an even background).
 
+mod edges;
 pub(crate) mod expansion;
+mod fit;
 mod peak_origins;
 mod places;
+mod stops;
 mod unassigned_peaks;
 
 use crate::effect::Case;
-use crate::error::Error;
 use crate::extend::displaced_surface::{DisplacedSurface, Mirror, mirrors};
-use crate::likelihood::laplace::{LaplaceFit, Model, Prior, Slopes, maximise};
+use crate::likelihood::laplace::{Model, Prior, Slopes};
 use crate::likelihood::parameters::{ArrivalLayout, ModelTerm, ModelTerms};
 use crate::observe::observed_response::{Measured, PEAKS_S};
 use crate::simulate::traced_pair::Arrival;
 use crate::simulate::views::ArrivalView;
 use crate::survey::Survey;
+pub(crate) use fit::fit;
 use peak_origins::PeakOrigins;
 use sabine_scene::TimeZero;
 
@@ -36,12 +39,6 @@ const MISREAD_SHARE: f64 = 0.02;
 const WIDTHS_S: [f64; 3] = [4e-4, 1.2e-4, 0.0];
 /// Standard deviations from which a normal density counts as nothing: 5e-32 of its top.
 const FAR_SD: f64 = 12.0;
-/// Of the starts that an effect offers, those that are followed from the widest of these on, and from the next one on.
-const MAX_STARTS: [usize; 2] = [3, 2];
-/// Tops whose evidence differs by less than this, in nats, ...
-const SAME_NATS: f64 = 0.02;
-/// ... and whose values differ by less than so many posterior standard deviations, are one.
-const SAME_SD: f64 = 0.1;
 /// Latency of a recording whose time zero means nothing.
 const FREE_LATENCY_S: f64 = 1.0;
 /// Time zero where the file says that it is the emission: half a sample or so.
@@ -66,6 +63,8 @@ pub(crate) struct ArrivalModel<'a> {
     assignment: Vec<usize>,
     /// By pair.
     origins: Vec<PeakOrigins>,
+    /// Where each arrival runs ([`stops`]), by pair; none where nothing asks.
+    stops: Vec<Vec<Vec<[f64; 3]>>>,
     /// Reflections count with this much more than their own width; `None`: only the direct sound counts, and is never misread.
     width_s: Option<f64>,
 }
@@ -110,7 +109,9 @@ impl<'a> ArrivalModel<'a> {
         let all = ModelTerms::new(priors, cases, survey, |nuisance| layout.nuisance(nuisance));
         let ModelTerms { priors, terms, assignment, .. } = all;
         let origins = PeakOrigins::of(data, &assignment, used);
-        Self { data, layout, terms, priors, used, assignment, origins, width_s: None }
+        let may_hide = terms.iter().any(|p| p.case.reflection_term().is_some());
+        let stops = if may_hide { stops::of_all(data) } else { vec![Vec::new(); survey.responses.len()] };
+        Self { data, layout, terms, priors, used, assignment, origins, stops, width_s: None }
     }
 
     /// Values, with what their terms make of the mirrors; a step farther, too, where slopes are wanted.
@@ -253,20 +254,27 @@ impl<'a> ArrivalModel<'a> {
             return -0.5 * (residual / direct_sd_s).powi(2);
         };
         let sd = direct_sd_s.hypot(width_s);
-        let (right, wrong) = ((1.0 - MISREAD_SHARE) * normal(residual, sd), MISREAD_SHARE / PEAKS_S);
+        let hidden = self.hidden(at.values, pair);
+        let is_hidden = |arrival: usize| hidden.get(arrival).copied().unwrap_or(false);
+        let heard = if is_hidden(0) { 0.0 } else { normal(residual, sd) };
+        let (right, wrong) = ((1.0 - MISREAD_SHARE) * heard, MISREAD_SHARE / PEAKS_S);
         push(&found, weighed(residual, sd, right / (right + wrong)));
         let mut value = (right + wrong).ln();
 
         let sd = (REFLECTION_SD_S * measured.slowness()).hypot(width_s);
         let origins = &self.origins[pair];
         let times_s: Vec<f64> = later.iter().map(|a| self.time_s(at, pair, a)).collect();
-        let mut in_time: Vec<(f64, usize)> = times_s.iter().copied().zip(0..).collect();
+        let shown = times_s.iter().copied().zip(0..).filter(|(_, i)| !is_hidden(i + 1));
+        let mut in_time: Vec<(f64, usize)> = shown.collect();
         in_time.sort_by(|a, b| a.0.total_cmp(&b.0));
         // Sums over the peaks whose partner each may be.
         let mut sums = vec![[0.0; 2]; later.len()];
         let more = self.added(at, pair);
         // Where it should be seen, and is not.
         value -= SEEN_SHARE * more.len() as f64;
+        // What is hidden should not be.
+        let worth = |i: usize| if is_hidden(i + 1) { self.worth_of_hiding(pair, i) } else { 0.0 };
+        value += (0..later.len()).map(worth).sum::<f64>();
         let mut partners: Vec<(usize, f64)> = Vec::new();
         for (peak, height_db) in measured.peaks_s.iter().zip(&measured.peaks_db) {
             partners.clear();
@@ -276,14 +284,7 @@ impl<'a> ArrivalModel<'a> {
                 let density = normal(peak - time_s, sd);
                 (i, origins.predicted(i, *height_db) * density)
             }));
-            let added: Vec<f64> = more
-                .iter()
-                .map(|m| {
-                    SEEN_SHARE
-                        * normal(peak - m.time_s, sd)
-                        * normal(height_db - m.level_db, ADDED_HEIGHT_SD_DB)
-                })
-                .collect();
+            let added: Vec<f64> = more.iter().map(|m| m.density(*peak, *height_db, sd)).collect();
             let stray = origins.stray(peak - measured.direct_s, *height_db);
             let total =
                 partners.iter().map(|(_, density)| density).sum::<f64>() + added.iter().sum::<f64>() + stray;
@@ -330,77 +331,6 @@ impl Model for ArrivalModel<'_> {
             .map(|pair| self.pair_likelihood(&at, pair, slopes.as_deref_mut()))
             .sum()
     }
-}
-
-/// Fits from the direct sounds on, reflections joining with ever less tolerance.
-pub(crate) fn fit(
-    data: &ArrivalData<'_>,
-    cases: &[&Case],
-    used: &[bool],
-) -> Result<(LaplaceFit, Vec<usize>), Error> {
-    if let Some(place) = cases.iter().rposition(|c| c.reflection_term().is_some()) {
-        return unassigned_peaks::fit(data, cases, used, place);
-    }
-    let mut model = ArrivalModel::new(data, cases, used);
-    let start: Vec<f64> = model.priors.iter().map(|p| p.mean).collect();
-    // From where the direct sounds point, and from where everything should be: a single response far off must not carry the
-    // others away.
-    let direct = maximise(&model, &start, "arrival times")?.values;
-    let mut firsts = offered(&mut model, &start);
-    firsts.extend(places::starts(&mut model, &direct));
-    firsts.extend([(direct, 0), (start, 0)]);
-    let mut tops: Vec<LaplaceFit> = Vec::new();
-    for (number, width_s) in WIDTHS_S.into_iter().enumerate() {
-        model.width_s = Some(width_s);
-        let joining = firsts.iter().filter(|(_, widest)| *widest == number).map(|(x, _)| x.clone());
-        let starts: Vec<Vec<f64>> = tops.drain(..).map(|top| top.values).chain(joining).collect();
-        for x in starts {
-            let top = maximise(&model, &x, "arrival times")?;
-            // What has come to a top that another has reached goes on as the other does.
-            if tops.iter().all(|other| !is_same_top(other, &top)) {
-                tops.push(top);
-            }
-        }
-    }
-    let best = tops.into_iter().rev().max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence));
-    let places = model.terms.iter().map(|p| p.first).collect();
-    best.map(|b| (b, places)).ok_or(Error::Singular { what: "arrival times" })
-}
-
-/// Whether two searches have come to rest at one place, as far as the data tell places apart.
-fn is_same_top(one: &LaplaceFit, other: &LaplaceFit) -> bool {
-    let mut apart = one.values.iter().zip(&other.values).enumerate();
-    (one.log_evidence - other.log_evidence).abs() < SAME_NATS
-        && apart.all(|(i, (a, b))| (a - b).abs() < SAME_SD * one.sd(i))
-}
-
-/// The most promising of the values that the effects offer to start from, and the width ([`WIDTHS_S`]) with which each is followed:
-/// reflections that lie several of their distances off find no partners from the neutral values. Where reflections are dense, the widest
-/// hardly tells one start from another; the next one does, where starts are so close that one is near the truth.
-fn offered(model: &mut ArrivalModel<'_>, neutral: &[f64]) -> Vec<(Vec<f64>, usize)> {
-    let mut starts: Vec<Vec<f64>> = Vec::new();
-    for placed in &model.terms {
-        let options = &placed.case.starts;
-        let at = placed.range();
-        starts.extend(options.iter().filter(|o| o[..] != neutral[at.clone()]).map(|option| {
-            let mut x = neutral.to_vec();
-            x[at.clone()].copy_from_slice(option);
-            x
-        }));
-    }
-    let mut found: Vec<(Vec<f64>, usize)> = Vec::new();
-    for (width, count) in MAX_STARTS.into_iter().enumerate() {
-        model.width_s = Some(WIDTHS_S[width]);
-        let mut ranked: Vec<(f64, &Vec<f64>)> =
-            starts.iter().map(|x| (model.log_likelihood(x, None), x)).collect();
-        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-        // From what is less probable than the neutral values nothing is reached that these would not reach.
-        let least = model.log_likelihood(neutral, None);
-        let better = ranked.into_iter().take(count).filter(|(likelihood, _)| *likelihood > least);
-        found.extend(better.map(|(_, x)| (x.clone(), width)));
-    }
-    model.width_s = None;
-    found
 }
 
 impl Measured {

@@ -30,12 +30,23 @@ pub struct UnassignedPeak {
     pub stray: f64,
 }
 
+/// A predicted path, and what is known of whether it is there.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct PredictedPath {
+    /// The places in metres from each of which to the next it goes straight on: source, reflections, receiver.
+    pub stops: Vec<[f64; 3]>,
+    /// What the peaks say for its being hidden, in nats: far below zero where one lies where it should come, above zero where none does.
+    pub hidden_nats: f64,
+}
+
 /// What peaks the mesh leaves unexplained.
 #[derive(Clone, Debug)]
 pub struct UnassignedPeaks<'a> {
     pub(crate) survey: &'a Survey,
     /// By response; empty for one that is not fitted.
     pub(crate) peaks: Vec<Vec<UnassignedPeak>>,
+    pub(crate) paths: Vec<PredictedPath>,
 }
 
 /// How one plane reflects from a source to a receiver.
@@ -131,6 +142,16 @@ impl UnassignedPeaks<'_> {
     /// What was measured.
     pub fn survey(&self) -> &Survey {
         self.survey
+    }
+
+    /// Peaks by response (index), empty for one that is not fitted.
+    pub fn by_response(&self) -> &[Vec<UnassignedPeak>] {
+        &self.peaks
+    }
+
+    /// Predicted paths of all responses that are fitted, as far as they can be followed.
+    pub fn paths(&self) -> &[PredictedPath] {
+        &self.paths
     }
 
     /// Places at which a plane may mirror the first source, in metres, the best confirmed first.

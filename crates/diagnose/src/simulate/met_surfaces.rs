@@ -29,7 +29,7 @@ pub(crate) struct MetSurfaces {
 }
 
 impl MetSurfaces {
-    /// The surfaces `stated` of the mesh as the room file has it, in a mesh with the same triangles.
+    /// The surfaces `stated` of the mesh as the room file has it, in a mesh that begins with the same triangles.
     pub fn new(scene: &Scene, stated: &Surfaces) -> Result<Self, Error> {
         Ok(Self {
             mesh: MeshScene::new(scene)?,
@@ -71,7 +71,8 @@ impl MetSurfaces {
             if met.len() == MAX_ORDER {
                 return None;
             }
-            met.push(self.of_triangle[hit.triangle as usize]?);
+            // An object that stands in the room is none of the surfaces.
+            met.push((*self.of_triangle.get(hit.triangle as usize)?)?);
             let way = hit.distance - BEFORE_M;
             place = std::array::from_fn(|k| place[k] + way * direction[k]);
             left_m -= way;

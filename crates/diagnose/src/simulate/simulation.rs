@@ -5,6 +5,7 @@ mod retracing;
 use crate::config::DiagnoseConfig;
 use crate::error::Error;
 use crate::extend::applied_changes::Dimensions;
+use crate::extend::box_object::BoxObject;
 use crate::extend::displaced_surface::DisplacedSurface;
 use crate::extend::moved_mesh::find_ranges;
 use crate::extend::rigid_motion::RigidMotion;
@@ -71,6 +72,8 @@ pub(crate) struct Simulation {
     dimensions: Option<Dimensions>,
     /// Surfaces that were found to stand elsewhere, by their number.
     pub displaced: Vec<(usize, DisplacedSurface)>,
+    /// Objects that were found in the room.
+    objects: Vec<BoxObject>,
     /// The motion of all places that was found: sources and receivers stand where it has brought them.
     coordinate_shift: Option<RigidMotion>,
     /// The surfaces of the mesh as stated.
@@ -131,6 +134,7 @@ impl Simulation {
             resized: None,
             dimensions: None,
             displaced: Vec::new(),
+            objects: Vec::new(),
             coordinate_shift: None,
             tracer: Arc::clone(tracer),
             prepared,
@@ -267,6 +271,7 @@ impl Simulation {
             resized: None,
             dimensions: None,
             displaced: Vec::new(),
+            objects: Vec::new(),
             coordinate_shift: None,
             edges: None,
             sources: survey.sources.iter().map(source).collect::<Result<_, _>>()?,

@@ -59,3 +59,19 @@ fn a_wall_of_an_l_is_found_where_it_stands() {
     assert!((offset_m - wall.offset_m).abs() < 0.02, "{offset_m} for {}", wall.offset_m);
     assert_eq!(found.causes.len(), 1, "{:?}", found.causes);
 }
+
+/// A cupboard in a wedge, before which half of the microphones stand: its faces reflect, and it hides what comes from behind it.
+#[test]
+fn an_object_that_the_mesh_lacks_is_found_where_it_stands() {
+    let (shape, planted) = (Polyhedron::Wedge, Planted::Object);
+    let config = PolyhedralConfig { seed: 77_002, shape, planted, ..PolyhedralConfig::default() };
+    let (laboratory, found) = diagnose(config, 3000);
+    let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
+    assert_eq!(named, ["missing_object"], "{:?}", found.notes);
+    let [low, high] = laboratory.missing_object().unwrap();
+    let truth: Vec<f64> = (0..2).map(|k| 0.5 * (low[k] + high[k])).collect();
+    let [object] = &found.model.applied().objects[..] else { panic!("{:?}", found.model) };
+    let off_m = (object.foot_m[0] - truth[0]).hypot(object.foot_m[1] - truth[1]);
+    assert!(off_m < 0.5, "{off_m} m: {object:?}");
+    assert!((object.size_m[2] - (high[2] - low[2])).abs() < 0.3, "{object:?}");
+}

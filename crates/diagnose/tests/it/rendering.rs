@@ -78,13 +78,9 @@ fn room_of_fixture() -> (MeasuredRoom, ImpulseResponse) {
     (room, response.unwrap())
 }
 
-/// A level sheet 0.8 m below the talker and 0.6 m below the microphone: its image is 1.4 m lower.
-#[test]
-fn a_sheet_reflects_where_its_image_says() {
-    let text = "sheet = { absorption = 0.2, corners_m = [[3.4, 1.2, 0.7], [5.0, 1.2, 0.7], [5.0, 3.0, 0.7], [3.4, 3.0, 0.7]] }";
-    let stated = fixture();
-    let room = extended(text).measured_room(&stated).unwrap();
-    assert_eq!(room.scene().materials().len(), stated.scene().materials().len() + 1);
+/// Reflections that come from where a level surface 0.8 m below the talker and 0.6 m below the microphone has its image, 1.4 m lower: with a
+/// change of the model, and without.
+fn reflections_at_0_7_m(room: &MeasuredRoom) -> [usize; 2] {
     let config = TracerConfig { rays: 500, duration_s: 0.1, ..TracerConfig::default() };
     let tracer = PathTracer::new(config).unwrap();
     let away_m = (4.6f64.powi(2) + 1.1f64.powi(2) + 1.4f64.powi(2)).sqrt();
@@ -94,7 +90,57 @@ fn a_sheet_reflects_where_its_image_says() {
         let near = |i: &usize| paths.is_exact(*i) && (f64::from(paths.lengths_m()[*i]) - away_m).abs() < 1e-3;
         (0..paths.len()).filter(near).count()
     };
-    assert_eq!((found(&room), found(&stated)), (1, 0));
+    [found(room), found(&fixture())]
+}
+
+#[test]
+fn a_sheet_reflects_where_its_image_says() {
+    let text = "sheet = { absorption = 0.2, corners_m = [[3.4, 1.2, 0.7], [5.0, 1.2, 0.7], [5.0, 3.0, 0.7], [3.4, 3.0, 0.7]] }";
+    let stated = fixture();
+    let room = extended(text).measured_room(&stated).unwrap();
+    assert_eq!(room.scene().materials().len(), stated.scene().materials().len() + 1);
+    assert_eq!(reflections_at_0_7_m(&room), [1, 0]);
+}
+
+/// A table of the same height, of a material of the room.
+const TABLE: &str = "object = { foot_m = [4.2, 2.1, 0.0], size_m = [1.6, 1.8, 0.7], turn_deg = 0.0, material = \"MATERIAL\" }";
+
+#[test]
+fn an_object_reflects_where_its_image_says() {
+    let stated = fixture();
+    let name = stated.scene().materials()[0].name.clone();
+    let room = extended(&TABLE.replace("MATERIAL", &name)).measured_room(&stated).unwrap();
+    assert_eq!(room.scene().materials(), stated.scene().materials());
+    assert_eq!(room.scene().triangles().len(), stated.scene().triangles().len() + 12);
+    assert_eq!(reflections_at_0_7_m(&room), [1, 0]);
+}
+
+#[test]
+fn an_object_that_cannot_stand_there_is_refused_by_name() {
+    let name = fixture().scene().materials()[0].name.clone();
+    let table = TABLE.replace("MATERIAL", &name);
+    let refused = |text: &str| {
+        let (_folder, path) = in_file(text);
+        ExtendedModel::read(path).and_then(|model| model.room(&fixture())).unwrap_err()
+    };
+    let unknown = refused(TABLE).to_string();
+    assert!(unknown.contains("object.material") && unknown.contains("MATERIAL"), "{unknown}");
+    for (from, to, field) in [
+        ("0.7]", "0.0]", "object.size_m"),
+        ("turn_deg = 0.0", "turn_deg = 400.0", "object.turn_deg"),
+        ("foot_m = [4.2", "foot_m = [inf", "object.foot_m"),
+    ] {
+        let error = refused(&table.replace(from, to)).to_string();
+        assert!(error.contains(field), "{error}");
+    }
+    // Over the microphone.
+    let [x, y, _] = fixture().receivers()[0].position_m;
+    let over = table.replace("[4.2, 2.1, 0.0]", &format!("[{x:?}, {y:?}, 0.0]")).replace("0.7]", "2.0]");
+    let error = refused(&over);
+    assert!(
+        matches!(&error, Error::Displacement(DisplacementError::Outside { id }) if id == "microphone"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -127,6 +127,7 @@ impl Draw<'_> {
             duration_s: 1.15 * tables.slowest_s + 0.06,
             subject: None,
             wall: None,
+            object: None,
         };
         let mut more_scattering = 0.0;
         if !self.plant(&mut truth, &mut more_scattering, named, &mut random)? {
@@ -226,6 +227,7 @@ impl Draw<'_> {
         for _ in 0..TRIES {
             let mut shape = self.shape.clone();
             let mut wall = None;
+            let mut object_m = None;
             if self.config.planted == Planted::Wall {
                 let index = ((unit(random) * shape.walls() as f64) as usize).min(shape.walls() - 1);
                 let sign = if unit(random) < 0.5 { -1.0 } else { 1.0 };
@@ -247,6 +249,7 @@ impl Draw<'_> {
                     continue;
                 }
                 shape.stand(corner, sides);
+                object_m = Some([[corner[0], corner[1], 0.0], [ends[1][0], ends[1][1], sides[2]]]);
             }
             let triangles = crate::brute_force::corners(&shape.scene(materials.clone())?);
             let places = truth.receivers.iter().chain([&truth.source]);
@@ -257,6 +260,7 @@ impl Draw<'_> {
             truth.materials.extend(std::iter::repeat_n(object, more));
             truth.triangles = triangles;
             truth.wall = wall;
+            truth.object = object_m;
             return Ok(true);
         }
         Ok(false)

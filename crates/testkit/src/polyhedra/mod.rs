@@ -135,6 +135,8 @@ struct Truth {
     /// Receiver or material that is not as stated.
     subject: Option<String>,
     wall: Option<MovedWall>,
+    /// Least and greatest coordinates of the object that the mesh lacks.
+    object: Option<[Vec3; 2]>,
 }
 
 /// A wall that stands elsewhere.
@@ -232,6 +234,11 @@ impl PolyhedralRoom {
     /// The wall that stands elsewhere.
     pub fn moved_wall(&self) -> Option<MovedWall> {
         self.truth.wall
+    }
+
+    /// Least and greatest coordinates in metres of the object that the mesh lacks; its sides lie along the axes.
+    pub fn missing_object(&self) -> Option<[[f64; 3]; 2]> {
+        self.truth.object
     }
 
     /// True absorption by octave of each material of [`PolyhedralRoom::scene`].

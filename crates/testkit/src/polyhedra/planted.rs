@@ -64,7 +64,7 @@ impl Planted {
     /// The effect that a diagnosis is to name, where its catalogue has one.
     pub fn effect(self) -> Option<&'static str> {
         match self {
-            Self::Nothing | Self::Object => None,
+            Self::Nothing => None,
             Self::Position => Some("position_error"),
             Self::Surface => Some("surface_absorption"),
             Self::Temperature => Some("sound_speed"),
@@ -73,6 +73,7 @@ impl Planted {
             Self::Wall => Some("surface_displacement"),
             Self::Scattering => Some("scattering"),
             Self::Response => Some("transducer_response"),
+            Self::Object => Some("missing_object"),
         }
     }
 }

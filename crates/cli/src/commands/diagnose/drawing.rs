@@ -32,7 +32,8 @@ pub fn has_a_place(model: &ExtendedModel) -> bool {
     let model = model.applied();
     let axes = model.axis.is_empty() && model.receiver_axis.is_empty();
     let places = model.position_m.is_empty() && model.surfaces.is_empty() && model.sheets.is_empty();
-    !(axes && places && model.dimensions.is_none() && model.coordinate_shift.is_none())
+    let size = model.dimensions.is_none() && model.objects.is_empty();
+    !(axes && places && size && model.coordinate_shift.is_none())
 }
 
 /// One view: the axes of the room that go to the right and up, and where it lies in the drawing.
@@ -138,7 +139,7 @@ struct Lines {
     kept: Vec<[Point; 2]>,
     gone: Vec<[Point; 2]>,
     found: Vec<[Point; 2]>,
-    /// Triangles of materials that the mesh as stated does not have: panels and holes.
+    /// Triangles that the mesh as stated does not have, behind all that it has: panels, holes and objects.
     added: Vec<[Point; 3]>,
 }
 
@@ -154,10 +155,8 @@ impl Lines {
         let (longer, elsewhere): (Vec<_>, Vec<_>) =
             moved.into_iter().partition(|l| gone.iter().any(|stated| is_along(*stated, *l)));
         kept.extend(longer);
-        let own = room.scene().materials().len();
-        let triangles = found.scene.triangles().iter().enumerate();
-        let added = triangles.filter(|(_, t)| t.material as usize >= own);
-        Self { kept, gone, found: elsewhere, added: added.map(|(i, _)| found.scene.corners_m(i)).collect() }
+        let added = room.scene().triangles().len()..found.scene.triangles().len();
+        Self { kept, gone, found: elsewhere, added: added.map(|i| found.scene.corners_m(i)).collect() }
     }
 }
 
@@ -257,7 +256,7 @@ fn keys(lines: &Lines, placed: &[Placed<'_>]) -> Vec<(String, &'static str)> {
         (true, marks, "source, microphone"),
         (moves, line(GONE), "the mesh as stated, where it stands elsewhere"),
         (!lines.found.is_empty() && moves, line(FOUND), "the mesh as found"),
-        (!lines.added.is_empty(), sheet, "a surface that the mesh lacks, or a hole"),
+        (!lines.added.is_empty(), sheet, "what the mesh lacks: a surface, an object; or a hole"),
         (placed.iter().any(Placed::is_moved), line(FOUND), "from where it is stated to where it was found"),
         (placed.iter().any(|p| p.axis.is_some()), line(FOUND), "axis of a directional source or microphone"),
     ]
@@ -272,7 +271,7 @@ mod tests {
     use super::*;
     use crate::demo::Demo;
     use crate::room::read_room;
-    use sabine::diagnose::{Dimensions, ModelCause, ModelChange, RigidMotion, ThinPanel};
+    use sabine::diagnose::{BoxObject, Dimensions, ModelCause, ModelChange, RigidMotion, ThinPanel};
 
     #[test]
     fn places_that_moved_together_are_drawn_where_they_are() {
@@ -288,6 +287,23 @@ mod tests {
         let (sources, receivers) = (room.sources().len(), room.receivers().len());
         let count = |shape: &str| drawn.matches(shape).count();
         assert!(count("<circle") >= 6 * receivers && count("<rect") >= 6 * sources);
+    }
+
+    #[test]
+    fn an_object_that_the_mesh_lacks_is_drawn_where_it_stands() {
+        let mut demo = Demo::default();
+        let room = read_room(&demo.or(None, "room").unwrap(), false, None).unwrap();
+        let mut model = ExtendedModel::default();
+        model.centres_hz = room.bands().iter_hz().collect();
+        let [[x, y, z], _] = room.scene().bounds_m();
+        let material = room.scene().materials()[0].name.clone();
+        let object = BoxObject::new([x + 0.4, y + 0.4, z], [0.4, 0.4, 0.3], 0.0, material);
+        model.causes.push(ModelCause::new("missing_object", vec![ModelChange::Object(object)]));
+        let drawn = svg(&room, &model.room(&room).unwrap());
+        assert!(has_a_place(&model) && drawn.contains("what the mesh lacks"));
+        // Two triangles on each of six sides, in three views.
+        assert_eq!(drawn.matches("<polygon").count(), 36);
+        assert!(!drawn.contains("the mesh as stated"));
     }
 
     #[test]
@@ -323,7 +339,7 @@ mod tests {
         assert!(is_along([[0.0; 3], [1.0, 0.0, 0.0]], [[1.5, 0.0, 0.0], [0.2, 0.0, 0.0]]));
         assert!(!is_along([[0.0; 3], [1.0, 0.0, 0.0]], [[1.5, 0.0, 0.0], [1.2, 0.0, 0.0]]));
         assert!(!is_along([[0.0; 3], [1.0, 0.0, 0.0]], [[0.0; 3], [1.0, 0.01, 0.0]]));
-        for part in ["the mesh as stated", "the mesh as found", "a surface that the mesh lacks", &source.id] {
+        for part in ["the mesh as stated", "the mesh as found", "what the mesh lacks", &source.id] {
             assert!(drawn.contains(part), "{part}");
         }
         assert!(!drawn.contains("NaN") && !drawn.contains("inf"));

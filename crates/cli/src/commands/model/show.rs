@@ -103,6 +103,12 @@ fn changed(change: &ModelChange) -> String {
             let [x, y, z] = panel.corners_m[0];
             format!("the mesh: a panel with a corner at ({x:.2}, {y:.2}, {z:.2}) m joins")
         }
+        ModelChange::Object(object) => {
+            let ([x, y, _], [length, depth, height]) = (object.foot_m, object.size_m);
+            format!(
+                "the mesh: a box of {length:.2} x {depth:.2} x {height:.2} m about ({x:.2}, {y:.2}) m joins"
+            )
+        }
         ModelChange::Diffraction => "paths: sound bends around edges".into(),
         ModelChange::CoherentReflections => "reflections: their pressures add".into(),
         ModelChange::Latency(seconds) => format!("the latency of all responses to {:.3} ms", 1e3 * seconds),

@@ -153,6 +153,11 @@ impl PeakOrigins {
         self.levels_db[reflection]
     }
 
+    /// How often a predicted reflection (its place after the direct sound) is found as a peak.
+    pub fn found(&self, reflection: usize) -> f64 {
+        self.found[reflection]
+    }
+
     /// How many peaks of a height a predicted reflection is, for each dB.
     pub fn predicted(&self, reflection: usize, height_db: f64) -> f64 {
         let own = normal(height_db - self.levels_db[reflection], HEIGHT_SD_DB);

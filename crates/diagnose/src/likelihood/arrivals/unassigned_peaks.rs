@@ -1,18 +1,26 @@
 //! Reflections that the mesh does not have: what effects add, where peaks point, and the fit from there.
 
 use super::places::longer_m;
-use super::{ArrivalData, ArrivalModel, At, REFLECTION_SD_S, WIDTHS_S, at_fit, normal};
-use crate::effect::{Case, FittedCase, Nuisance};
+use super::{
+    ADDED_HEIGHT_SD_DB, ArrivalData, ArrivalModel, At, REFLECTION_SD_S, SEEN_SHARE, WIDTHS_S, at_fit, normal,
+};
+use super::{edges, stops};
+use crate::effect::{Case, FittedCase, Nuisance, ReflectionTerm};
 use crate::error::Error;
 use crate::extend::model_change::ModelChange;
 use crate::likelihood::laplace::{LaplaceFit, maximise};
-use crate::likelihood::multilateration::{UnassignedPeak, UnassignedPeaks};
+use crate::likelihood::multilateration::{PredictedPath, UnassignedPeak, UnassignedPeaks};
 use crate::likelihood::parameters::ModelTerm;
 use crate::simulate::traced_pair::{Arrival, IsolatedReflection};
 use crate::simulate::views::ArrivalView;
 use crate::survey::Survey;
 use crate::survey::planes::apart_m;
 
+/// Of the peaks that hidden reflections would have been so many are missing because of that: others lie beside a louder one.
+const MISSING_SHARE: f64 = 0.5;
+/// What it costs at most that a peak has lost its origin, and what it costs that the direct sound has, in nats.
+const LOST_NATS: f64 = 6.0;
+const LOST_DIRECT_NATS: f64 = 20.0;
 /// Images nearer to each other than this are one, in metres.
 const SAME_M: f64 = 0.3;
 
@@ -24,14 +32,23 @@ pub(super) struct AddedArrival {
     pub level_slopes: Vec<(usize, f64)>,
 }
 
+impl AddedArrival {
+    /// How probable it is as the origin of a peak, for each second and dB.
+    pub(super) fn density(&self, peak_s: f64, height_db: f64, sd_s: f64) -> f64 {
+        SEEN_SHARE
+            * normal(peak_s - self.time_s, sd_s)
+            * normal(height_db - self.level_db, ADDED_HEIGHT_SD_DB)
+    }
+}
+
 impl<'a> ArrivalModel<'a> {
     /// Reflections that effects add to a pair.
     pub(super) fn added(&self, at: &At<'_>, pair: usize) -> Vec<AddedArrival> {
         let values = at.values;
-        let one = |placed: &ModelTerm<'_>| {
+        let one = |(placed, way): (&ModelTerm<'_>, usize)| {
             let (term, survey) = (placed.case.reflection_term()?, self.data.survey);
             let range = placed.range();
-            let added = term.reflection(&values[range.clone()], survey, pair)?;
+            let added = term.reflection(&values[range.clone()], survey, pair, way)?;
             // What comes from where a predicted reflection comes from is that one: a wall must not be found a second time.
             let image = |direction: [f64; 3], length_m: f64| direction.map(|d| d * length_m);
             let own = image(added.arrival, added.length_m);
@@ -61,7 +78,7 @@ impl<'a> ArrivalModel<'a> {
                 let moved = |offset: f64| {
                     let mut own = values[range.clone()].to_vec();
                     own[index - range.start] += offset;
-                    term.reflection(&own, survey, pair)
+                    term.reflection(&own, survey, pair, way)
                 };
                 if let (Some(up), Some(down)) = (moved(step), moved(-step)) {
                     slopes.push((
@@ -73,7 +90,21 @@ impl<'a> ArrivalModel<'a> {
             }
             Some(AddedArrival { time_s, slopes, level_db: added.level_db, level_slopes })
         };
-        self.terms.iter().filter_map(one).collect()
+        let ways = |placed| std::iter::repeat(placed).zip(0..ways_of(placed));
+        self.terms.iter().flat_map(ways).filter_map(one).collect()
+    }
+
+    /// What it is worth in nats that a predicted reflection (its place after the direct sound) is hidden, its peaks apart.
+    pub(super) fn worth_of_hiding(&self, pair: usize, reflection: usize) -> f64 {
+        MISSING_SHARE * self.origins[pair].found(reflection)
+    }
+
+    /// Which of a pair's predicted arrivals an effect hides, the direct sound among them.
+    pub(super) fn hidden(&self, values: &[f64], pair: usize) -> Vec<bool> {
+        let terms: Vec<_> =
+            self.terms.iter().filter_map(|p| Some((p.case.reflection_term()?, p.own(values)))).collect();
+        let is_hidden = |stops: &Vec<[f64; 3]>| terms.iter().any(|(term, own)| term.hides(own, stops));
+        self.stops[pair].iter().map(is_hidden).collect()
     }
 
     /// When reflections that effects add come, in seconds of the file.
@@ -84,6 +115,8 @@ impl<'a> ArrivalModel<'a> {
     /// Peaks with the length of their way and the probability that nothing predicted explains them.
     fn strays(&self, values: &[f64]) -> UnassignedPeaks<'a> {
         let at = self.at(values, false);
+        let stops = stops::of_all(self.data);
+        let mut paths = Vec::new();
         let peaks = (0..self.assignment.len())
             .map(|pair| {
                 let Some((direct, later)) = self.data.arrivals[pair].split_first() else { return Vec::new() };
@@ -94,20 +127,34 @@ impl<'a> ArrivalModel<'a> {
                 let times: Vec<f64> = later.iter().map(|a| self.time_s(&at, pair, a)).collect();
                 let direct_s = self.time_s(&at, pair, direct);
                 let measured = &self.data.measured[self.assignment[pair]];
+                let mut lost_nats = vec![0.0; later.len()];
                 let one = |(peak, height_db): (&f64, &f64)| {
-                    let predicted = times.iter().enumerate().map(|(i, time_s)| {
-                        origins.predicted(i, *height_db) * normal(peak - time_s, REFLECTION_SD_S)
-                    });
+                    let predicted: Vec<f64> = times
+                        .iter()
+                        .enumerate()
+                        .map(|(i, t)| origins.predicted(i, *height_db) * normal(peak - t, REFLECTION_SD_S))
+                        .collect();
                     let stray = origins.stray(peak - measured.direct_s, *height_db);
+                    let all = stray + predicted.iter().sum::<f64>();
+                    for (lost, own) in lost_nats.iter_mut().zip(predicted) {
+                        *lost += (all / (all - own)).ln().min(LOST_NATS);
+                    }
                     UnassignedPeak {
                         length_m: direct.length_m + (peak - direct_s) * self.data.speed_m_s[pair],
-                        stray: stray / (stray + predicted.sum::<f64>()),
+                        stray: stray / all,
                     }
                 };
-                measured.peaks_s.iter().zip(&measured.peaks_db).map(one).collect()
+                let peaks = measured.peaks_s.iter().zip(&measured.peaks_db).map(one).collect();
+                let costs =
+                    lost_nats.iter().enumerate().map(|(i, lost)| lost - self.worth_of_hiding(pair, i));
+                let costs = std::iter::once(LOST_DIRECT_NATS).chain(costs);
+                paths.extend(stops[pair].iter().zip(costs).filter(|(stops, _)| !stops.is_empty()).map(
+                    |(stops, hidden_nats)| PredictedPath { stops: stops.clone(), hidden_nats: -hidden_nats },
+                ));
+                peaks
             })
             .collect();
-        UnassignedPeaks { survey: self.data.survey, peaks }
+        UnassignedPeaks { survey: self.data.survey, peaks, paths }
     }
 
     /// How much later than its way says a path comes under fitted values, in seconds, latency left out. Places and temperatures
@@ -157,6 +204,11 @@ impl<'a> ArrivalModel<'a> {
     }
 }
 
+/// Reflections that a term may add to a response.
+fn ways_of(placed: &ModelTerm<'_>) -> usize {
+    placed.case.reflection_term().map_or(0, ReflectionTerm::ways)
+}
+
 /// Whether a case changes the temperature or the room's size, or moves all places: that is in the times of paths once they are traced again.
 fn is_in_the_ways(case: &Case, own: &[f64], survey: &Survey) -> bool {
     let stated = survey.air.temperature_c();
@@ -203,6 +255,11 @@ pub(super) fn fit(
             let top = maximise(&model, &x, "arrival times")?;
             x = top.values.clone();
             found = Some(top);
+        }
+        // Where a plane reflects to a receiver changes little about its top; whether a small face does, changes at its edges.
+        let has_edges = model.terms[place].case.reflection_term().is_some_and(|term| term.ways() > 1);
+        if let Some(found) = found.as_mut().filter(|f| has_edges && f.log_evidence > known.log_evidence) {
+            edges::take_in(&model, found, model.terms[place].range());
         }
         if let Some(found) = found.filter(|f| best.as_ref().is_none_or(|b| f.log_evidence > b.log_evidence)) {
             best = Some(found);

@@ -4,6 +4,7 @@ use super::Simulation;
 use crate::effect::Nuisance;
 use crate::error::Error;
 use crate::extend::applied_changes::Dimensions;
+use crate::extend::box_object::BoxObject;
 use crate::extend::displaced_surface::DisplacedSurface;
 use crate::extend::model_change::ModelChange;
 use crate::extend::moved_mesh::{DisplacementError, check_places, displaced_among};
@@ -16,6 +17,13 @@ use crate::simulate::traced_room::trace;
 use crate::survey::Survey;
 use sabine_acoustics::{Air, Observer};
 use std::sync::Arc;
+
+/// How the room differs from the mesh as stated.
+struct Shape {
+    dimensions: Option<Dimensions>,
+    displaced: Vec<(usize, DisplacedSurface)>,
+    objects: Vec<BoxObject>,
+}
 
 impl Simulation {
     /// Takes a change into all paths that it moves, and says whether there are any. Energies follow with the next expansion; arrival times
@@ -42,7 +50,8 @@ impl Simulation {
                 (0..self.pairs.len()).try_for_each(|pair| self.set_air(pair, survey))?;
             }
             ModelChange::Dimensions(dimensions) => {
-                self.reshape(Some(dimensions.clone()), self.displaced.clone(), survey)?;
+                let shape = Shape { dimensions: Some(dimensions.clone()), ..self.shape() };
+                self.reshape(shape, survey)?;
             }
             ModelChange::SurfaceDisplacement(surface) => {
                 let mut displaced = self.displaced.clone();
@@ -50,7 +59,11 @@ impl Simulation {
                 let number = survey.surfaces.iter().position(|s| s.centre_m == surface.point_m);
                 let unknown = || DisplacementError::NoSurface { point_m: surface.point_m };
                 displaced.push((number.ok_or_else(unknown)?, surface.clone()));
-                self.reshape(self.dimensions.clone(), displaced, survey)?;
+                self.reshape(Shape { displaced, ..self.shape() }, survey)?;
+            }
+            ModelChange::Object(object) => {
+                let objects = [&self.objects[..], std::slice::from_ref(object)].concat();
+                self.reshape(Shape { objects, ..self.shape() }, survey)?;
             }
             _ => return Ok(false),
         }
@@ -72,27 +85,34 @@ impl Simulation {
         (0..self.sources.len()).try_for_each(|source| self.retrace(Nuisance::SourcePosition(source), survey))
     }
 
-    /// Traces all pairs in the room at another size, with surfaces in other places. Nothing changes if there is no such room.
-    fn reshape(
-        &mut self,
-        dimensions: Option<Dimensions>,
-        numbered: Vec<(usize, DisplacedSurface)>,
-        survey: &Survey,
-    ) -> Result<(), Error> {
-        let all: Vec<DisplacedSurface> = numbered.iter().map(|(_, surface)| surface.clone()).collect();
+    fn shape(&self) -> Shape {
+        Shape {
+            dimensions: self.dimensions.clone(),
+            displaced: self.displaced.clone(),
+            objects: self.objects.clone(),
+        }
+    }
+
+    /// Traces all pairs in the room of another shape. Nothing changes if there is no such room.
+    fn reshape(&mut self, shape: Shape, survey: &Survey) -> Result<(), Error> {
+        let all: Vec<DisplacedSurface> = shape.displaced.iter().map(|(_, surface)| surface.clone()).collect();
         let moved = displaced_among(&self.scene, &self.surfaces, &all)?;
         if !all.is_empty() {
             check_places(&self.scene, &moved, &self.sources, &self.receivers)?;
         }
-        let resized = match &dimensions {
+        let resized = match &shape.dimensions {
             Some(dimensions) => dimensions.applied(&self.scene, &moved)?,
             None => moved,
         };
+        let resized = shape.objects.iter().try_fold(resized, |scene, object| object.added_to(&scene))?;
+        if !shape.objects.is_empty() {
+            check_places(&self.scene, &resized, &self.sources, &self.receivers)?;
+        }
         self.met = Arc::new(MetSurfaces::new(&resized, &self.surfaces)?);
         self.prepared = self.tracer.prepare(&resized, self.traced_until_s)?;
         self.edges = Edges::find(&resized)?;
         self.resized = Some(resized);
-        (self.dimensions, self.displaced) = (dimensions, numbered);
+        (self.dimensions, self.displaced, self.objects) = (shape.dimensions, shape.displaced, shape.objects);
         (0..self.sources.len()).try_for_each(|source| self.retrace(Nuisance::SourcePosition(source), survey))
     }
 
@@ -124,6 +144,7 @@ impl Simulation {
             resized: self.resized.clone(),
             dimensions: self.dimensions.clone(),
             displaced: self.displaced.clone(),
+            objects: self.objects.clone(),
             surfaces: Arc::clone(&self.surfaces),
             met: Arc::clone(&self.met),
             tracer: Arc::clone(tracer),

@@ -10,6 +10,8 @@ use std::time::Instant;
 
 /// A wall is found where it is this near to the truth, in metres.
 const WALL_M: f64 = 0.03;
+/// An object is found if its middle is within this.
+const OBJECT_M: f64 = 0.5;
 
 /// What is to be diagnosed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -202,12 +204,16 @@ impl Task {
                     cause.subject.iter().chain(&cause.other_subjects).any(|s| s.contains(wanted))
                 })
         };
-        let found_it = match laboratory.moved_wall() {
-            Some(wall) => found.model.applied().surfaces.iter().any(|s| {
+        let found_it = match (laboratory.moved_wall(), laboratory.missing_object()) {
+            (Some(wall), _) => found.model.applied().surfaces.iter().any(|s| {
                 let along = |p: [f64; 3]| (0..3).map(|k| wall.normal[k] * p[k]).sum::<f64>();
                 along(s.normal).abs() > 0.999 && (along(s.point_m) - along(wall.point_m)).abs() < WALL_M
             }),
-            None => found.causes.iter().any(rightly),
+            (_, Some(corners)) => found.model.applied().objects.iter().any(|object| {
+                let off = |k: usize| object.foot_m[k] - 0.5 * (corners[0][k] + corners[1][k]);
+                off(0).hypot(off(1)) < OBJECT_M
+            }),
+            _ => found.causes.iter().any(rightly),
         };
         let mut false_names: Vec<String> = found
             .causes
@@ -225,12 +231,8 @@ impl Task {
             _ if in_set => Outcome::Set,
             _ if found_it => Outcome::Extra,
             _ if !false_names.is_empty() => Outcome::Wrong,
-            Verdict::Unexplained if self.planted == Planted::Object => Outcome::Right,
-            _ if self.planted == Planted::Object && found.causes.iter().any(|c| c.effect == "scattering") => {
-                Outcome::Right
-            }
             Verdict::Unexplained => Outcome::Unexplained,
-            _ if due || self.planted == Planted::Object => Outcome::Missed,
+            _ if due => Outcome::Missed,
             _ => Outcome::Right,
         };
         (outcome, false_names)
