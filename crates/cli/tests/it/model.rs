@@ -105,6 +105,10 @@ fn the_page_shows_a_model_that_is_read() {
     let fixture = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/room");
     let room = sabine::scene::MeasuredRoom::read(fixture).unwrap();
     assert!((read.room(&room).unwrap().air.temperature_c() - 26.1).abs() < 1e-9);
+    let desk = page.split("```toml\n").nth(2).unwrap().split("```").next().unwrap();
+    std::fs::write(&path, format!("version = 2\ncentres_hz = [500, 1000]\n{desk}")).unwrap();
+    let furnished = ExtendedModel::read(&path).unwrap().room(&room).unwrap();
+    assert_eq!(furnished.scene.triangles().len(), room.scene().triangles().len() + 12);
     // Every kind of change that the page names is one, and none is left out.
     let kinds = page.split("**Changes** by name: ").nth(1).unwrap().split(". An unknown").next().unwrap();
     std::fs::write(&path, text.replace("temperature_c = 26.1 }", "wishes = 1 }")).unwrap();
