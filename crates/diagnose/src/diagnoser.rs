@@ -4,7 +4,7 @@ mod discovering;
 
 use crate::config::DiagnoseConfig;
 use crate::effect::Effect;
-use crate::effects::{LawEffect, MissingDiffraction, UnknownLaw, catalogue};
+use crate::effects::{LawEffect, MissingDiffraction, UnknownLaw, catalogue, on_request};
 use crate::error::Error;
 use crate::extend::extended_model::ExtendedModel;
 use crate::extend::extension::extended_model;
@@ -165,7 +165,8 @@ impl Diagnoser {
                 continue;
             }
             if !knows(&self.effects, &cause.id) {
-                self.effects.extend(catalogue().into_iter().filter(|effect| effect.id() == cause.id));
+                let all = catalogue().into_iter().chain(on_request());
+                self.effects.extend(all.filter(|effect| effect.id() == cause.id));
             }
             self.given.push(GivenCause { id: cause.id.clone(), subject: cause.subject.clone(), name });
         }
@@ -179,11 +180,29 @@ impl Diagnoser {
         Self { tracer: Arc::new(tracer), ..self }
     }
 
-    /// With those effects of its catalogue that have these identifiers.
+    /// With effects that are weighed on request alone ([`on_request`](crate::on_request)), by their identifiers.
+    ///
+    /// # Errors
+    /// [`Error::UnknownEffect`] for an identifier that none has.
+    pub fn with_also(mut self, ids: &[String]) -> Result<Self, Error> {
+        for id in ids {
+            if self.effects.iter().any(|e| e.id() == id.as_str()) {
+                continue;
+            }
+            let asked = on_request().into_iter().find(|e| e.id() == id.as_str());
+            self.effects.push(asked.ok_or_else(|| Error::UnknownEffect { id: id.clone() })?);
+        }
+        Ok(self)
+    }
+
+    /// With those effects of its catalogue, and of those on request, that have these identifiers.
     ///
     /// # Errors
     /// [`Error::UnknownEffect`] for an identifier that none has.
     pub fn with_only(mut self, ids: &[String]) -> Result<Self, Error> {
+        let is_known = |e: &dyn Effect| self.effects.iter().any(|known| known.id() == e.id());
+        let asked: Vec<_> = on_request().into_iter().filter(|e| !is_known(&**e)).collect();
+        self.effects.extend(asked);
         if let Some(id) = ids.iter().find(|id| self.effects.iter().all(|e| e.id() != id.as_str())) {
             return Err(Error::UnknownEffect { id: id.clone() });
         }

@@ -61,7 +61,7 @@ pub(crate) use unknown_law::{BandLaw, Covariate, Formula, Grammar};
 
 use crate::effect::Effect;
 
-/// All effects that come with this crate.
+/// The effects that every diagnosis weighs.
 pub fn catalogue() -> Vec<Box<dyn Effect>> {
     vec![
         Box::new(TransducerResponse),
@@ -89,8 +89,14 @@ pub fn catalogue() -> Vec<Box<dyn Effect>> {
         Box::new(CoherentReflections),
         Box::new(SurfaceDisplacement),
         Box::new(CoordinateShift),
-        Box::new(MissingObject),
     ]
+}
+
+/// Effects that come with this crate and are weighed only where they are asked for by name ([`Diagnoser::with_also`](crate::Diagnoser::with_also),
+/// [`Diagnoser::with_only`](crate::Diagnoser::with_only)): [`MissingObject`], for what a directional loudspeaker does not send is missing as if an
+/// object hid it.
+pub fn on_request() -> Vec<Box<dyn Effect>> {
+    vec![Box::new(MissingObject)]
 }
 
 /// Logarithm of a sum of energies, one of them given as its logarithm.
@@ -108,7 +114,7 @@ mod tests {
 
     #[test]
     fn every_effect_has_an_identifier_and_a_title_of_its_own() {
-        let infos: Vec<_> = catalogue().iter().map(|e| e.info()).collect();
+        let infos: Vec<_> = catalogue().iter().chain(&on_request()).map(|e| e.info()).collect();
         for (i, a) in infos.iter().enumerate() {
             assert!(a.explanation.ends_with('.') && !a.title.ends_with('.'), "{}", a.id);
             assert!(a.id.chars().all(|c| c.is_ascii_lowercase() || c == '_'), "{}", a.id);
@@ -120,8 +126,24 @@ mod tests {
     }
 
     #[test]
+    fn what_is_weighed_on_request_is_not_weighed_without() {
+        let new = || crate::Diagnoser::new(crate::DiagnoseConfig::default()).expect("a configuration");
+        let weighs = |d: &crate::Diagnoser| format!("{d:?}").contains("missing_object");
+        let ids = |id: &str| vec![id.to_owned()];
+        assert!(!weighs(&new()));
+        let also = new().with_also(&ids("missing_object")).expect("an effect");
+        // Asked for twice, it is weighed once.
+        let again = also.with_also(&ids("missing_object")).expect("an effect");
+        assert_eq!(format!("{again:?}").matches("missing_object").count(), 1);
+        assert!(weighs(&new().with_only(&ids("missing_object")).expect("an effect")));
+        assert!(!weighs(&new().with_only(&ids("time_zero")).expect("an effect")));
+        let refused = new().with_also(&ids("furniture"));
+        assert!(matches!(refused, Err(crate::Error::UnknownEffect { id }) if id == "furniture"));
+    }
+
+    #[test]
     fn what_decides_between_two_effects_does_not_depend_on_their_order() {
-        let infos: Vec<_> = catalogue().iter().map(|e| e.info()).collect();
+        let infos: Vec<_> = catalogue().iter().chain(&on_request()).map(|e| e.info()).collect();
         for a in &infos {
             for b in &infos {
                 let measurement = discriminating_measurement(a, b);

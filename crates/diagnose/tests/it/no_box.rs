@@ -9,8 +9,11 @@ fn diagnose(config: PolyhedralConfig, rays: usize) -> (PolyhedralRoom, Diagnosis
     let laboratory = PolyhedralRoom::new(config).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let room = laboratory.write(&folder.path().join("room")).unwrap();
+    let also: &[String] =
+        if config.planted == Planted::Object { &["missing_object".to_owned()] } else { &[] };
     let config = DiagnoseConfig { rays, seed: config.seed, ..DiagnoseConfig::default() };
-    (laboratory, Diagnoser::new(config).unwrap().diagnose(&room, &[], &()).unwrap())
+    let diagnoser = Diagnoser::new(config).unwrap().with_also(also).unwrap();
+    (laboratory, diagnoser.diagnose(&room, &[], &()).unwrap())
 }
 
 #[test]

@@ -38,6 +38,9 @@ pub struct Arguments {
     /// Causes to try, by their names in the catalogue [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     effects: Vec<String>,
+    /// Causes to try beside these that are tried on request alone: missing_object (furniture that the mesh lacks)
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    also: Vec<String>,
     /// Formulas to weigh as causes beside the catalogue, `[[laws]]` in TOML: a file, or a folder of such files
     #[arg(long, value_name = "FILE|DIR")]
     laws: Option<PathBuf>,
@@ -103,6 +106,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if !arguments.effects.is_empty() {
         diagnoser = diagnoser.with_only(&arguments.effects)?;
     }
+    diagnoser = diagnoser.with_also(&arguments.also)?;
     let file = arguments.laws.as_deref();
     diagnoser = diagnoser.with_laws(laws).map_err(|error| naming_laws(error.into(), file))?;
     diagnoser = match arguments.discover() {

@@ -1,7 +1,7 @@
 //! The catalogue's identifiers in plain words.
 
 use super::findings::Findings;
-use sabine::diagnose::{Cause, FoundParameter, Verdict, catalogue};
+use sabine::diagnose::{Cause, FoundParameter, Verdict, catalogue, on_request};
 use std::borrow::Cow;
 
 /// Below this probability chance is not believed, as by default in the diagnosis.
@@ -9,7 +9,8 @@ const UNLIKELY: f64 = 0.01;
 
 /// The title of an effect; one that is not in the catalogue is called by its identifier.
 pub fn effect(id: &str) -> String {
-    let title = catalogue().iter().map(|e| e.info()).find(|info| info.id == id).map(|info| info.title);
+    let all = catalogue().into_iter().chain(on_request());
+    let title = all.map(|e| e.info()).find(|info| info.id == id).map(|info| info.title);
     title.map_or_else(|| id.replace('_', " "), Cow::into_owned)
 }
 

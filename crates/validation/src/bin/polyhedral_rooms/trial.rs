@@ -166,7 +166,9 @@ impl Task {
         let room = laboratory.write(folder)?;
         let started = Instant::now();
         let config = DiagnoseConfig { rays, seed, ..DiagnoseConfig::default() };
-        let found = Diagnoser::new(config)?.diagnose(&room, &[], &())?;
+        let asked = self.planted == Planted::Object;
+        let also: &[String] = if asked { &["missing_object".to_owned()] } else { &[] };
+        let found = Diagnoser::new(config)?.with_also(also)?.diagnose(&room, &[], &())?;
         let seconds = started.elapsed().as_secs_f64();
         let (outcome, false_names) = self.outcome(&found, &laboratory);
         if outcome != Outcome::Right {
