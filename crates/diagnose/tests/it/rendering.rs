@@ -34,6 +34,12 @@ fn extended(text: &str) -> ExtendedRoom {
     ExtendedModel::read(path).unwrap().room(&fixture()).unwrap()
 }
 
+/// Why there is no room of a model.
+fn refused(text: &str) -> Error {
+    let (_folder, path) = in_file(text);
+    ExtendedModel::read(path).and_then(|model| model.room(&fixture())).unwrap_err()
+}
+
 fn finished(text: &str, samples: Vec<f32>) -> Vec<f32> {
     let response = ImpulseResponse::new(samples, RATE_HZ).unwrap();
     extended(text).finish("talker", "microphone", response, 3).unwrap().into_samples()
@@ -119,10 +125,6 @@ fn an_object_reflects_where_its_image_says() {
 fn an_object_that_cannot_stand_there_is_refused_by_name() {
     let name = fixture().scene().materials()[0].name.clone();
     let table = TABLE.replace("MATERIAL", &name);
-    let refused = |text: &str| {
-        let (_folder, path) = in_file(text);
-        ExtendedModel::read(path).and_then(|model| model.room(&fixture())).unwrap_err()
-    };
     let unknown = refused(TABLE).to_string();
     assert!(unknown.contains("object.material") && unknown.contains("MATERIAL"), "{unknown}");
     for (from, to, field) in [
@@ -481,13 +483,8 @@ fn a_displaced_surface_comes_out_of_its_file_where_it_stands() {
 
 #[test]
 fn a_surface_that_cannot_stand_there_is_refused_by_name() {
-    let refused = |text: &str| {
-        let (_folder, path) = in_file(text);
-        ExtendedModel::read(path).and_then(|model| model.room(&fixture())).unwrap_err()
-    };
     let (text, _) = end_wall(0.1, 0.0);
-    let elsewhere = text.replace("normal = [1.0, 0.0, 0.0]", "normal = [0.0, 0.6, 0.8]");
-    let error = refused(&elsewhere);
+    let error = refused(&text.replace("normal = [1.0, 0.0, 0.0]", "normal = [0.0, 0.6, 0.8]"));
     assert!(matches!(error, Error::Displacement(DisplacementError::NoSurface { .. })), "{error}");
     let (again, _) = end_wall_about(0.1, 0.1, 0.0);
     let error = refused(&format!("{text}{again}"));

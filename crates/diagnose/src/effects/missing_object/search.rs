@@ -62,7 +62,7 @@ struct Face {
 /// Boxes to start from, the most promising first.
 pub(super) fn starts(peaks: &UnassignedPeaks<'_>, floor_m: f64) -> Vec<Values> {
     let room = Room::of(peaks, floor_m);
-    let tops = faces(&room.votes([0.0, 0.0, 1.0], floor_m), TOPS);
+    let tops = faces(&room.votes([0.0, 0.0, 1.0]), TOPS);
     let mut found: Vec<(f64, Values)> = Vec::new();
     let turns = (2.0 * 45.0 / TURN_STEP_DEG) as usize;
     for turn in 0..turns {
@@ -70,7 +70,7 @@ pub(super) fn starts(peaks: &UnassignedPeaks<'_>, floor_m: f64) -> Vec<Values> {
         // Faces of the four upright directions.
         let upright: [Vec<Face>; 4] = std::array::from_fn(|side| {
             let (sin, cos) = (turn_deg + 90.0 * side as f64).to_radians().sin_cos();
-            faces(&room.votes([cos, sin, 0.0], floor_m), FACES)
+            faces(&room.votes([cos, sin, 0.0]), FACES)
         });
         for side in 0..4 {
             for own in &upright[side] {
@@ -213,7 +213,8 @@ impl<'a> Room<'a> {
     }
 
     /// What all peaks say of faces with this normal.
-    fn votes(&self, normal: [f64; 3], floor_m: f64) -> Vec<Vote> {
+    fn votes(&self, normal: [f64; 3]) -> Vec<Vote> {
+        let floor_m = self.floor_m;
         let along = |place: [f64; 3]| (0..3).map(|k| normal[k] * place[k]).sum::<f64>();
         let is_top = normal[2] > 0.5;
         let mut votes = Vec::new();
