@@ -1,5 +1,6 @@
 //! What `docs/validation/peers/propagate_peers.py` compares: one run on one thread, printed as JSON lines; the scenes and
 //! rays that another engine is to repeat are written to the folder given as an argument. With `hits` after it, whole traces are left out.
+//! With `decays` and the folder of a measured room instead, late energies of many seeds for `time_to_accuracy.py`.
 #![allow(clippy::unwrap_used, missing_docs)] // a panic is how a bench fails
 
 mod rooms;
@@ -132,6 +133,82 @@ fn paths() {
     }
 }
 
+/// Octaves from 62.5 Hz to 8 kHz: the fourth is 500 Hz.
+const OCTAVE_500_HZ: usize = 3;
+/// Bins of energy, in seconds.
+const BIN_S: f64 = 0.01;
+/// Traces of each room, each with a seed of its own.
+const SEEDS: u64 = 24;
+/// Rays of each.
+const RAYS: usize = 10_000;
+/// Longest decay.
+const DECAY_S: f64 = 3.0;
+
+/// Late energies at 500 Hz in the box, in a furnished room and, at absorption 0.1, in the mesh of a measured room: `SEEDS` traces of each on one
+/// thread, with the time of each. Meshes and places are written for others to trace.
+fn decays(folder: &Path, measured: Option<&str>) {
+    let box_places = [[2.0, 3.0, 1.5], [7.0, 4.0, 1.6]];
+    let mut rooms = vec![
+        ("box, specular", finely_meshed(1, 0.1, 0.0), box_places),
+        ("box", finely_meshed(1, 0.1, 0.3), box_places),
+        ("furnished", furnished(0.1, 0.3), box_places),
+    ];
+    if let Some(room) = measured.map(|folder| MeasuredRoom::read(folder).unwrap()) {
+        let plain = Material::uniform(Bands::SIMULATION, 0.1, 0.3).unwrap();
+        let scene = room.scene();
+        let materials =
+            scene.materials().iter().map(|m| NamedMaterial { name: m.name.clone(), material: plain.clone() });
+        let scene =
+            Scene::new(scene.vertices().to_vec(), scene.triangles().to_vec(), materials.collect()).unwrap();
+        let places = [room.sources()[0].position_m, room.receivers()[0].position_m];
+        rooms.push(("measured", scene, places));
+    }
+    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    for (name, scene, [source_m, receiver_m]) in &rooms {
+        let (source, receiver) =
+            (Source::omni("S", *source_m).unwrap(), Receiver::omni("R", *receiver_m).unwrap());
+        let materials: Vec<Material> = scene.materials().iter().map(|m| m.material.clone()).collect();
+        let air = Air::default();
+        let trace = |seed: u64| -> (f64, Vec<f64>) {
+            let config = TracerConfig {
+                rays: RAYS,
+                duration_s: DECAY_S,
+                seed,
+                allow_leaks: true,
+                ..Default::default()
+            };
+            let tracer = PathTracer::new(config).unwrap();
+            let start = Instant::now();
+            let paths = tracer.trace(scene, &source, &receiver, &air, &()).unwrap();
+            let energies = paths.energies(&Conditions::new(&materials, &air)).unwrap();
+            let mut bins = vec![0.0; (DECAY_S / BIN_S) as usize];
+            for (length_m, energy) in paths.lengths_m().iter().zip(&energies[OCTAVE_500_HZ]) {
+                let bin = (f64::from(*length_m) / air.speed_of_sound_m_s() / BIN_S) as usize;
+                if let Some(bin) = bins.get_mut(bin) {
+                    *bin += f64::from(*energy);
+                }
+            }
+            (start.elapsed().as_secs_f64(), bins)
+        };
+        one_thread.install(|| trace(SEEDS));
+        let (seconds, bins): (Vec<f64>, Vec<Vec<f64>>) =
+            (0..SEEDS).map(|seed| one_thread.install(|| trace(seed))).unzip();
+        let vertices = scene.vertices().iter().map(|v| format!("v {} {} {}\n", v[0], v[1], v[2]));
+        let faces = scene.triangles().iter().map(|t| t.vertices.map(|v| v + 1));
+        let faces = faces.map(|[a, b, c]| format!("f {a} {b} {c}\n"));
+        std::fs::write(folder.join(format!("{name}.obj")), vertices.chain(faces).collect::<String>())
+            .unwrap();
+        println!(
+            "{{\"what\": \"decays\", \"room\": \"{name}\", \"triangles\": {}, \"scattering\": {}, \"rays\": {RAYS}, \
+             \"places_m\": {:?}, \"speed_m_s\": {}, \"seconds\": {seconds:?}, \"bins\": {bins:?}}}",
+            scene.triangles().len(),
+            scene.materials()[0].material.scattering().values()[OCTAVE_500_HZ],
+            [source_m, receiver_m],
+            air.speed_of_sound_m_s(),
+        );
+    }
+}
+
 fn main() {
     let mut arguments = std::env::args().skip(1).filter(|argument| !argument.starts_with('-'));
     let Some(folder) = arguments.next() else {
@@ -139,8 +216,12 @@ fn main() {
         return;
     };
     std::fs::create_dir_all(&folder).unwrap();
+    let which = arguments.next();
+    if which.as_deref() == Some("decays") {
+        return decays(Path::new(&folder), arguments.next().as_deref());
+    }
     hits(Path::new(&folder));
-    if arguments.next().as_deref() != Some("hits") {
+    if which.as_deref() != Some("hits") {
         paths();
     }
 }

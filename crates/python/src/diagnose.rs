@@ -14,6 +14,7 @@ use sabine::diagnose::{DiagnoseConfig, Diagnoser, catalogue};
 pub struct Settings<'py> {
     rays: usize,
     effects: Option<Vec<String>>,
+    also: Vec<String>,
     hold_out: Vec<String>,
     laws: Option<PyRef<'py, Laws>>,
     discover: String,
@@ -30,6 +31,7 @@ impl Settings<'_> {
         if let Some(effects) = &self.effects {
             diagnoser = diagnoser.with_only(effects)?;
         }
+        diagnoser = diagnoser.with_also(&self.also)?;
         if let Some(laws) = &self.laws {
             let known = diagnoser.with_laws(laws.laws().to_vec());
             diagnoser = known.map_err(|error| refused(format!("laws: {error}")))?;

@@ -2,6 +2,7 @@
 
 import functools
 import json
+import math
 import shutil
 import struct
 import tempfile
@@ -75,11 +76,20 @@ class Diagnose(Case):
         found = sabine.diagnose(FIXTURES / "room", rays=500, effects=["time_zero"], laws=HAZE)
         self.assertEqual({one["effect"] for one in found.candidates}, {"time_zero", "haze"})
 
+    def test_an_effect_is_weighed_on_request(self):
+        threshold = lambda **more: sabine.diagnose(
+            FIXTURES / "room", rays=500, effects=["time_zero"], **more
+        ).data["threshold_nats"]
+        # A name pays for the number of effects that are tried: two for one.
+        self.assertAlmostEqual(threshold(also=["missing_object"]) - threshold(), math.log(2.0))
+
     def test_what_cannot_be_diagnosed_is_refused_in_words(self):
         refused = lambda words, room=FIXTURES / "room", **more: self.assert_refused(words, sabine.diagnose, room, **more)
         refused("no measured responses", diffuse_box(0.2))
         refused("no effect \"gremlins\"", effects=["gremlins"])
         refused("effects: expected a list", effects="time_zero")
+        refused("no effect \"gremlins\"", also=["gremlins"])
+        refused("also: expected a list", also="missing_object")
         refused("rays", rays=1)
         refused("nobody", hold_out=["nobody"])
         refused("discover: \"often\" is none of", discover="often")

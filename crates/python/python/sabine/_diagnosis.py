@@ -90,6 +90,7 @@ def diagnose(
     *,
     rays: int = 10_000,
     effects: Sequence[str] | None = None,
+    also: Sequence[str] = (),
     hold_out: Sequence[str] = (),
     laws: Document | None = None,
     discover: str | None = None,
@@ -106,13 +107,14 @@ def diagnose(
         room: a room folder with measured responses, or what :meth:`Room.read` made of one.
         rays: rays for each pair of source and receiver, 100 to 10 million.
         effects: effects to weigh, by name (:func:`effects`); all by default.
+        also: effects that are weighed on request alone, beside those: ``missing_object``, furniture that the mesh lacks.
         hold_out: names of receivers that are predicted and never fitted; by default each is held out in turn.
         laws: formulas that are weighed as causes beside the catalogue, ``[[laws]]`` in TOML: a file, a folder of such files, or the
             text of one (docs/how-to/own-law.md).
         discover: when a law is looked for beside the catalogue: ``always``, ``if_needed`` (where no cause explains the room, or a
             formula would explain it as well) or ``never``; by default ``if_needed``, with ``effects`` ``never``.
         model: an extended model to start from, a file, the text of one, or an earlier diagnosis: its causes are there from the start, fitted
-            anew, and the search goes on (docs/how-to/extended-model.md).
+            again, and the search goes on (docs/how-to/extended-model.md).
         seed: of rays and simulated measurements. The same seed gives the same diagnosis.
         allow_leaks: goes on although more than one ray in a thousand escapes through holes of the mesh.
 
@@ -126,6 +128,7 @@ def diagnose(
     settings = {
         "rays": _inputs.count(rays, "rays"),
         "effects": None if effects is None else _names(effects, "effects"),
+        "also": _names(also, "also"),
         "hold_out": _names(hold_out, "hold_out"),
         "laws": _inputs.laws(laws),
         "discover": str(discover or ("if_needed" if effects is None else "never")),
