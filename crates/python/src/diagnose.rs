@@ -64,7 +64,9 @@ pub fn diagnose(py: Python<'_>, room: &Room, settings: Settings<'_>) -> Result<(
     let (diagnoser, hold_out) = (settings.diagnoser()?, settings.hold_out);
     interruptible(py, |observer| {
         let diagnosis = diagnoser.diagnose(measured, &hold_out, observer)?;
-        Ok((serde_json::to_string(&diagnosis)?, diagnosis.model.to_toml()?))
+        let mut document = serde_json::to_value(&diagnosis)?;
+        document["threshold_nats"] = diagnoser.threshold_nats().into();
+        Ok((document.to_string(), diagnosis.model.to_toml()?))
     })
 }
 
