@@ -93,8 +93,9 @@ def pyroomacoustics(folder, room):
             )
             hall = pra.ShoeBox(BOX_M, fs=32_000, materials=material, max_order=3, ray_tracing=True, air_absorption=True)
         else:
+            # Normals point outwards here, and inwards in the file.
             walls = [
-                pra.wall_factory(vertices[t].T, [ABSORPTION] * octaves, [scattering] * octaves) for t in triangles
+                pra.wall_factory(vertices[t[::-1]].T, [ABSORPTION] * octaves, [scattering] * octaves) for t in triangles
             ]
             hall = pra.Room(walls, fs=32_000, max_order=0, ray_tracing=True, air_absorption=True)
         hall.set_ray_tracing(
@@ -104,7 +105,8 @@ def pyroomacoustics(folder, room):
         hall.add_microphone(receiver)
         hall.image_source_model()
         hall.ray_tracing()
-        return np.asarray(hall.rt_histograms[0][0][0])[OCTAVE_500_HZ]
+        # Its octaves begin at 125 Hz.
+        return np.asarray(hall.rt_histograms[0][0][0])[list(hall.octave_bands.centers).index(500.0)]
 
     return timed(rays, one)
 
