@@ -22,7 +22,7 @@ pub struct ModelArguments {
 /// What a model says of paths beside the room itself.
 #[derive(Clone, Debug, Default)]
 pub struct PathModel {
-    /// Formulas under which paths carry sound; none that adds sound.
+    /// Formulas under which paths carry sound; none that adds sound or goes with the order of the recordings.
     pub laws: Vec<Law>,
     /// Below this frequency in Hz responses are those of the wave equation.
     pub wave_below_hz: Option<f64>,
@@ -45,10 +45,18 @@ impl ModelArguments {
         let model = ExtendedModel::read(file)?;
         let extended = model.room(&stated)?;
         let all = model.causes.iter().filter_map(|cause| cause.law().cloned());
-        let (added, laws): (Vec<Law>, Vec<Law>) = all.partition(|law| law.target() == LawTarget::Added);
-        for law in added {
-            println!("note: the law {} of {} adds sound and is left out", law.id(), file.display());
-        }
+        let mut laws: Vec<Law> = all.collect();
+        laws.retain(|law| {
+            let why = if law.target() == LawTarget::Added {
+                "adds sound"
+            } else if law.variables().iter().any(|name| name == "recording_order") {
+                "goes with the order of the recordings"
+            } else {
+                return true;
+            };
+            println!("note: the law {} of {} {why} and is left out", law.id(), file.display());
+            false
+        });
         let own = PathModel {
             laws,
             wave_below_hz: extended.wave_below_hz,

@@ -117,7 +117,7 @@ impl Diagnoser {
         for response in room.responses() {
             let (source, receiver) = (&room.sources()[response.source], &room.receivers()[response.receiver]);
             let site = LawSite::new(room.scene(), source, receiver, &room.air());
-            let site = response.recorded_at.map_or(site.clone(), |order| site.with_recording_order(order));
+            let site = site.with_recording_order(response.recorded_at);
             for law in &self.laws {
                 BoundLaws::new(std::slice::from_ref(law), &site).map_err(sabine_acoustics::Error::from)?;
             }

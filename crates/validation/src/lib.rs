@@ -2,7 +2,10 @@
 //! rendered from speech in real rooms, whether memory stays flat. Not published; run them with `cargo run --release -p sabine-validation --bin NAME`.
 
 pub mod absorption;
+pub mod comparison;
+pub mod heard;
 pub mod hiding;
+pub mod models;
 pub mod record;
 pub mod room_tasks;
 

@@ -178,7 +178,7 @@ impl AppliedChanges {
         let receiver_directivities =
             receivers.iter().map(|r| of_receiver(r).transpose()).collect::<Result<_, Fault>>()?;
         let chain = RecordingChain::new(self.clone(), own);
-        let laws = bound_laws(&self.laws, &scene, (&sources, &receivers), &air)?;
+        let laws = bound_laws(&self.laws, &scene, (&sources, &receivers), (&air, room))?;
         let diffraction = self.diffraction;
         let cuboid_paths = if self.coherent_reflections { CUBOID_PATHS } else { 0 };
         Ok(ExtendedRoom {

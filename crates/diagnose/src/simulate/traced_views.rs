@@ -199,11 +199,8 @@ impl<'a> TracedPairView<'a> {
     pub(crate) fn law_site(&self) -> LawSite {
         let (room, response) = (self.room, self.response());
         let (source, receiver) = (room.source(response.source), room.receiver(response.receiver));
-        let site = LawSite::new(room.scene(), source, receiver, &self.pair.air);
-        match response.recorded_at {
-            Some(order) => site.with_recording_order(order),
-            None => site,
-        }
+        LawSite::new(room.scene(), source, receiver, &self.pair.air)
+            .with_recording_order(response.recorded_at)
     }
 
     /// Energies of its paths under laws, `[band][path]`, at the materials of the room.

@@ -127,6 +127,35 @@ fn what_a_hidden_law_goes_with_is_discovered() {
     assert!(own.printed() == law.formula && found.model.room(&room).is_ok());
 }
 
+/// The loudspeaker warms up over the recordings, whose order is stated.
+#[test]
+fn levels_that_go_with_the_order_of_recording_are_a_law() {
+    let bands = Bands::octaves(500.0, 4000.0).unwrap();
+    let config = LabConfig {
+        seed: 24_110,
+        receivers: 12,
+        bands,
+        sample_rate_hz: 16_000,
+        recording_order: true,
+        ..LabConfig::default()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let hidden = Hidden::WarmingLoudspeaker { final_db: 6.0, time_constant: 3.0 };
+    let lab = Laboratory::new(config).unwrap();
+    let room = lab.write(&[hidden], &folder.path().join("room"), None).unwrap();
+    let diagnoser = diagnoser(Vec::new(), 1000).unwrap().discovering_if_needed();
+    let found = diagnoser.diagnose(&room, &[], &()).unwrap();
+    let [law] = found.laws.as_slice() else { panic!("{:?} {:?}", found.causes, found.law_search) };
+    assert!(law.formula.contains("recording_order") && found.verdict == Verdict::Law, "{law:?}");
+    // From the first recording to the last, whatever the form: after 11 recordings of a time constant of 3 it has lost 5.9 dB of 6.
+    let own = found.model.causes[0].law().unwrap();
+    let at =
+        |order: f64| own.value(|name| Some(if name == "recording_order" { order } else { 1000.0 })).unwrap();
+    assert!((at(11.0) - at(0.0) + 5.9).abs() < 1.5, "{own:?}");
+    assert!(law.vault_gain_nats.is_some_and(|gain| gain > 0.0), "{law:?}");
+    assert!(found.model.room(&room).is_ok());
+}
+
 #[test]
 fn where_no_law_is_at_work_none_is_named() {
     // Fewer octaves than where a law is hidden: a search that finds nothing ends as it does in many.

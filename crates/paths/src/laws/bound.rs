@@ -32,10 +32,11 @@ impl LawSite {
         }
     }
 
-    /// The same with a number that rises with the time at which the response was recorded.
+    /// The same with a number that rises with the time at which the response was recorded (`MeasuredRoom::recorded_at`); `None`: nobody
+    /// said, and a law that asks for it is refused.
     #[must_use]
-    pub fn with_recording_order(self, order: f64) -> Self {
-        Self { recording_order: Some(order), ..self }
+    pub fn with_recording_order(self, order: impl Into<Option<f64>>) -> Self {
+        Self { recording_order: order.into(), ..self }
     }
 
     /// A variable of pair and response by its name: `distance_m`, `receiver_x_m`, `temperature_c` ...

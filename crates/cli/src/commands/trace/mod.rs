@@ -169,8 +169,12 @@ fn trace_room(arguments: &Arguments) -> Result<(), Failure> {
         (Some(model), Some(from), Some(to)) => model.conditions(&materials, from, to),
         _ => Conditions::new(&materials, &air),
     };
+    let recorded_at = from.zip(to).and_then(|(from, to)| room.recorded_at(from, to));
     let laws = match &extended {
-        None => Some(BoundLaws::new(&own_laws, &LawSite::new(room.scene(), source, receiver, &air))?),
+        None => {
+            let site = LawSite::new(room.scene(), source, receiver, &air).with_recording_order(recorded_at);
+            Some(BoundLaws::new(&own_laws, &site)?)
+        }
         // The model has them.
         Some(_) => None,
     };

@@ -7,8 +7,8 @@ use crate::simulate::views::BandView;
 use sabine_acoustics::Error as Cause;
 use sabine_paths::laws::{BoundLaws, Law, LawError};
 
-/// Amplitudes at which energies are tabulated, on each side of zero.
-const STEPS: usize = 6;
+/// Amplitudes at which energies are tabulated, on each side of zero, in twelfths of the end: closer where most of them lie.
+const STEPS: [i32; 9] = [1, 2, 3, 4, 5, 6, 8, 10, 12];
 
 /// A law and the amplitudes at which it is tabulated.
 #[derive(Clone, Debug)]
@@ -16,14 +16,14 @@ pub(crate) struct TabulatedLaw {
     pub law: Law,
     /// Which parameter of the law is its amplitude.
     amplitude: usize,
-    /// As far apart on each side of zero.
+    /// The same steps on each side of zero.
     grid: Vec<f64>,
 }
 
 impl TabulatedLaw {
     /// A law, which of its parameters is its amplitude, and the range of that, which holds zero.
     pub fn new(law: Law, amplitude: usize, (low, high): (f64, f64)) -> Self {
-        let side = |end: f64| (1..=STEPS).map(move |i| end * i as f64 / STEPS as f64).filter(|x| *x != 0.0);
+        let side = |end: f64| STEPS.into_iter().map(move |i| end * f64::from(i) / 12.0).filter(|x| *x != 0.0);
         let mut grid: Vec<f64> = side(low).chain([0.0]).chain(side(high)).collect();
         grid.sort_by(f64::total_cmp);
         Self { law, amplitude, grid }
@@ -65,7 +65,7 @@ impl TabulatedLaw {
         pair.energies_under(&bound)
     }
 
-    /// Tables of all bands. The decibels of a law go with its amplitude: each step multiplies the energy of a path by the same factor.
+    /// Tables of all bands. The decibels of a law go with its amplitude: each twelfth multiplies the energy of a path by the same factor.
     fn tables(&self, pair: &TracedPairView<'_>) -> Result<Vec<LawTable>, Error> {
         let without = pair.energies(pair.room().materials())?;
         let zero = self.grid.iter().position(|x| *x == 0.0).unwrap_or(0);
@@ -84,11 +84,13 @@ impl TabulatedLaw {
                     .zip(&stepped[band])
                     .map(|(e, s)| if *e > 0.0 { s / e } else { 0.0 })
                     .collect();
-                let mut step = || {
-                    energies.iter_mut().zip(&factors).for_each(|(e, factor)| *e *= factor);
+                let mut done = 0;
+                let step = |to: i32| {
+                    let more = to - std::mem::replace(&mut done, to);
+                    energies.iter_mut().zip(&factors).for_each(|(e, factor)| *e *= factor.powi(more));
                     pair.ln_changes(band, &energies)
                 };
-                amplitudes.iter().map(|_| step()).collect()
+                STEPS.into_iter().map(step).collect()
             };
             Ok((0..without.len()).map(in_band).collect())
         };

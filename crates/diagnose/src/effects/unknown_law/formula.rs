@@ -86,9 +86,8 @@ impl Grammar {
         let least = self.covariates[formula.covariate].least_db();
         let parameter = |term: &BandTerm| {
             let may_fall = least < 0.0 || term.name == "amplitude_per_octave";
-            let low = if may_fall { -term.most_db } else { 0.0 };
-            Parameter::new(term.name, "dB", 0.0, term.sd_db, (low, term.most_db))
-                .typically(0.3 * term.most_db)
+            let low = if may_fall { -term.most_db.min(super::MOST_ADDED_DB) } else { 0.0 };
+            Parameter::new(term.name, "dB", 0.0, term.sd_db, (low, term.most_db)).typically(0.5 * term.sd_db)
         };
         formula.bands.terms(survey).iter().map(parameter).collect()
     }
@@ -113,8 +112,8 @@ fn starts(parameters: &[Parameter]) -> Vec<Vec<f64>> {
     let mut starts = if parameters.len() > 1 {
         vec![at(1.0, 0.0), at(3.0, 1.0)]
     } else {
-        let most = parameters[0].bounds.1;
-        vec![at(0.1 * most, 0.0), at(0.4 * most, 0.0)]
+        let sd = parameters[0].prior_sd;
+        vec![at(0.2 * sd, 0.0), at(0.7 * sd, 0.0)]
     };
     if parameters[0].bounds.0 < 0.0 {
         starts.push(starts[0].iter().map(|x| -x).collect());

@@ -13,7 +13,9 @@ use crate::effect::{Case, Effect, EffectInfo};
 use crate::survey::Survey;
 
 /// Greatest amplitude that is sought, in dB.
-const MOST_DB: f64 = 10.0;
+const MOST_DB: f64 = 20.0;
+/// The same of what is added to sound, in place of taken.
+const MOST_ADDED_DB: f64 = 10.0;
 /// The same of its change from octave to octave.
 const MOST_PER_OCTAVE_DB: f64 = 4.0;
 

@@ -115,10 +115,7 @@ fn of_pair(
         for form in &covariate.forms {
             let own = match forms.entry(form.name) {
                 Entry::Occupied(known) => known.into_mut(),
-                Entry::Vacant(place) => {
-                    let alone = Covariate { forms: vec![*form], ..covariate.clone() };
-                    place.insert(quantities.taken(&alone, None)?)
-                }
+                Entry::Vacant(place) => place.insert(quantities.taken(&covariate.of_form(*form), None)?),
             };
             if product.is_empty() {
                 product.clone_from(own);

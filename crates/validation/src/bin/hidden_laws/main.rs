@@ -9,6 +9,7 @@ mod as_law;
 mod change;
 mod judge;
 mod kinds;
+mod outside;
 mod tables;
 mod task;
 mod trial;
@@ -53,7 +54,7 @@ struct Arguments {
     /// Rays for each pair
     #[arg(long, default_value_t = DiagnoseConfig::default().rays)]
     rays: usize,
-    /// Receivers, 1 to 40; below six no law is looked for
+    /// Receivers that are fitted, 1 to 36; below six no law is looked for. Four more, nearer to the source and farther from it, are left out
     #[arg(long, default_value_t = 12)]
     receivers: usize,
     /// Print by how much the laws change levels, and diagnose nothing: seconds for each room

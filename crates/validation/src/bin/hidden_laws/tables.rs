@@ -29,6 +29,7 @@ fn print_tables(trials: &[&Trial]) {
     by_kind_and_size(&laws);
     by_visibility(&laws);
     agreement(&laws);
+    outside(&laws);
     shares_of_laws(&laws);
     without_a_law(&nulls);
     let seconds = median(trials.iter().map(|t| t.seconds).collect());
@@ -151,6 +152,34 @@ fn says_something_true(trial: &Trial) -> bool {
     is_named(trial)
         || trial.outcome == Outcome::Unexplained
         || trial.outcome == Outcome::Adequate && trial.misfit_is_right == Some(true)
+}
+
+/// How far off the model found is where nothing was fitted.
+fn outside(laws: &[&Trial]) {
+    if laws.iter().all(|t| t.outside_nats.is_none()) {
+        return;
+    }
+    println!(
+        "\n| outside the fitted range | rooms | curves as stated, dB (median) | curves as found, dB (median) | nearer | nats for each level (median) |"
+    );
+    println!("|---|---|---|---|---|---|");
+    let right = |t: &Trial| t.outcome == Outcome::RightLaw;
+    let catalogue = |t: &Trial| t.outcome == Outcome::Catalogue;
+    let other = |t: &Trial| !matches!(t.outcome, Outcome::RightLaw | Outcome::Catalogue);
+    let classes: [(&str, &dyn Fn(&Trial) -> bool); 3] =
+        [("right law", &right), ("named by the catalogue", &catalogue), ("something else named", &other)];
+    for (name, is) in classes {
+        let own: Vec<&Trial> = laws.iter().copied().filter(|t| is(t) && t.outside_nats.is_some()).collect();
+        let nearer = own.iter().filter(|t| t.outside_found_db < t.outside_stated_db).count();
+        println!(
+            "| {name} | {} | {} | {} | {} | {} |",
+            own.len(),
+            middle(&own, |t| t.outside_stated_db),
+            middle(&own, |t| t.outside_found_db),
+            counted(nearer, own.len()),
+            middle(&own, |t| t.outside_nats)
+        );
+    }
 }
 
 /// Sign, edge and level of right laws.

@@ -4,6 +4,7 @@ use crate::as_law::as_law;
 use crate::change::change_db;
 use crate::judge::judge;
 use crate::kinds::KINDS;
+use crate::outside::{self, OUTSIDE};
 use crate::trial::{Discover, Trial};
 use crate::worlds::{Contents, World, contents, room};
 use sabine::diagnose::{Cause, DiagnoseConfig, Diagnoser, Diagnosis, FitTest};
@@ -30,7 +31,7 @@ pub struct Task {
 impl Task {
     /// By how much its law changes levels in dB, without a diagnosis; none where there is no law.
     pub fn change_db(&self) -> Result<Option<f64>, AnyError> {
-        let lab = Laboratory::new(room(self.kind, self.seed, self.receivers))?;
+        let lab = Laboratory::new(room(self.kind, self.seed, self.receivers + OUTSIDE))?;
         let contents = contents((self.kind, self.world), &lab, self.seed, self.nuisances)?;
         change_by_law(&lab, &contents)
     }
@@ -60,11 +61,13 @@ impl RoomTask for Task {
     fn run(&self, folder: &Path) -> Result<Trial, AnyError> {
         let started = Instant::now();
         let kind = &KINDS[self.kind];
-        let lab = Laboratory::new(room(self.kind, self.seed, self.receivers))?;
+        let lab = Laboratory::new(room(self.kind, self.seed, self.receivers + OUTSIDE))?;
         let contents = contents((self.kind, self.world), &lab, self.seed, self.nuisances)?;
         let truth = lab.truth(&contents.hidden)?;
         std::fs::create_dir_all(folder)?;
-        let measured = lab.write(&contents.hidden, &folder.join("room"), None)?;
+        let all = lab.write(&contents.hidden, &folder.join("room"), None)?;
+        let outside = outside::receivers(&all);
+        let measured = all.with_responses(|response| !outside.contains(&response.receiver));
         let config = DiagnoseConfig { rays: self.rays, seed: self.seed, ..DiagnoseConfig::default() };
         let diagnoser = Diagnoser::new(config)?;
         let diagnoser = match self.discover {
@@ -77,6 +80,9 @@ impl RoomTask for Task {
         let found = diagnoser.diagnose(&measured, &[], &())?;
         let [absorption_before, absorption_after] =
             absorption_errors(&found, &lab, &contents.hidden)?.map(Some);
+        let extended = contents.law && !found.causes.is_empty();
+        let off = || outside::errors(&found, &all, &outside, (self.rays, self.seed));
+        let off = extended.then(off).transpose()?;
         let judged = judge(&found, kind, &contents, &truth)?;
         let change_db = change_by_law(&lab, &contents)?;
         let (size, null) = match self.world {
@@ -96,6 +102,9 @@ impl RoomTask for Task {
             hidden: first.map(|hidden| format!("{hidden:?}")).unwrap_or_default(),
             change_db,
             d_prime,
+            outside_stated_db: off.map(|off| off.stated_db),
+            outside_found_db: off.map(|off| off.found_db),
+            outside_nats: off.map(|off| off.nats),
             absorption_before,
             absorption_after,
             surface: first.and_then(|hidden| kind.surface_of(hidden, &truth)).map(str::to_owned),

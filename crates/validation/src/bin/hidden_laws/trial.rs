@@ -36,6 +36,14 @@ pub struct Trial {
     /// How visible the law is in the decays beforehand, in standard deviations; none for laws of delay.
     #[serde(default)]
     pub d_prime: Option<f64>,
+    /// Root mean square error of decay curves at places nearer to the source or farther from it than all that were fitted, in dB: of the room
+    /// as stated and of the model found; and what that gains over the other, in nats for each level. Where a law is hidden and there is a model.
+    #[serde(default)]
+    pub outside_stated_db: Option<f64>,
+    #[serde(default)]
+    pub outside_found_db: Option<f64>,
+    #[serde(default)]
+    pub outside_nats: Option<f64>,
     /// Mean error of fitted absorption over materials and octaves, under the baseline and beside what is named.
     #[serde(default)]
     pub absorption_before: Option<f64>,
@@ -104,6 +112,9 @@ impl fmt::Display for Trial {
                 " {off:.2} dB off, hidden {own:.2} dB, sign {:?}, edge {:?}",
                 self.sign_right, self.edge_right
             )?;
+        }
+        if let (Some(before), Some(after)) = (self.outside_stated_db, self.outside_found_db) {
+            write!(f, " outside {before:.2} to {after:.2} dB")?;
         }
         if !self.fallen.is_empty() {
             write!(f, " fallen [{}]", self.fallen)?;

@@ -4,8 +4,6 @@
 //! With `--record` every room is written to a CSV file as soon as it is done, and rooms that the file holds are not done again. The table of
 //! several records, of several processes or machines: `--merge`.
 
-mod comparison;
-mod heard;
 mod tables;
 mod task;
 mod trial;

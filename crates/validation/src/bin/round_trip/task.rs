@@ -1,12 +1,13 @@
 //! One room: hidden, diagnosed, carried on, and held against the truth.
 
-use crate::comparison::{Gain, compare};
-use crate::heard::{measured, rendered};
 use crate::trial::{Trial, judged};
 use crate::true_model::TrueModel;
 use sabine::diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, ExtendedModel, ModelCause, ModelChange};
 use sabine::scene::{MeasuredRoom, TimeZero};
 use sabine_testkit::{End, Fault, Hidden, LabConfig, Laboratory};
+use sabine_validation::comparison::{Gain, compare};
+use sabine_validation::heard::{measured, rendered};
+use sabine_validation::models::{as_stated, with_absorption};
 use sabine_validation::room_tasks::RoomTask;
 use sabine_validation::{AnyError, hiding};
 use std::collections::BTreeMap;
@@ -81,8 +82,7 @@ impl RoomTask for Task {
         let model = ExtendedModel::read(&path)?;
         let truth = TrueModel::of(&hidden, &lab, FITTED)?;
         let true_model = self.true_model(&truth, &fitted, (&found, &model))?;
-        let mut stated = with_absorption(&model, absorption_before(&found));
-        stated.causes.clear();
+        let stated = as_stated(&found);
 
         let heard = measured(&room)?;
         let as_modelled = |model: &ExtendedModel| rendered(model, &room, self.rays, self.seed);
@@ -196,19 +196,6 @@ fn best_case(id: &str, found: &Diagnosis) -> ModelCause {
         Some(subject) => cause.about(subject),
         None => cause,
     }
-}
-
-fn with_absorption(model: &ExtendedModel, absorption: BTreeMap<String, Vec<f64>>) -> ExtendedModel {
-    let mut model = model.clone();
-    model.absorption = absorption;
-    // It is that of other numbers.
-    model.uncertainty = None;
-    model
-}
-
-/// Absorption by octave as it was fitted before anything was named.
-fn absorption_before(found: &Diagnosis) -> BTreeMap<String, Vec<f64>> {
-    found.materials.iter().map(|(name, fitted)| (name.clone(), fitted.absorption_before.clone())).collect()
 }
 
 /// Whether positions that are fitted can tell of an effect.

@@ -1,7 +1,7 @@
 //! A line of the record.
 
-use crate::comparison::Gain;
 use crate::true_model::Statement;
+use sabine_validation::comparison::Gain;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 

@@ -1,5 +1,6 @@
 //! Responses as they are compared: energy by octave and time, and when the direct sound arrives.
 
+use crate::AnyError;
 use rayon::prelude::*;
 use sabine::acoustics::{Bands, FilterBank, ImpulseResponse, Material};
 use sabine::diagnose::{ExtendedModel, ExtendedRoom};
@@ -7,7 +8,6 @@ use sabine::paths::Propagator;
 use sabine::propagate::wave::{Crossover, WaveConfig, WaveResponse, WaveSolver};
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use sabine::scene::MeasuredRoom;
-use sabine_validation::AnyError;
 
 /// Width of the bins in seconds, from the first sample of the file on.
 pub const BIN_S: f64 = 1e-3;

@@ -7,7 +7,7 @@
 //! which the room file leaves open, is fitted there, too.
 
 use crate::heard::{BIN_S, Heard};
-use sabine_validation::median;
+use crate::median;
 
 /// Ends of the stretches in seconds from just before the measured arrival.
 const ENDS_S: [f64; 8] = [0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28, 2.56];
@@ -39,7 +39,9 @@ pub struct Prediction {
 /// What is gained by one prediction over another, in nats for each level or arrival, and the standard error of that mean over positions.
 #[derive(Clone, Copy, Debug)]
 pub struct Gain {
+    /// The mean.
     pub nats: f64,
+    /// Its standard error.
     pub standard_error: f64,
 }
 
