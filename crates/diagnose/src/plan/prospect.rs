@@ -169,7 +169,8 @@ impl<'a> Setting<'a> {
             duration_s: longest_s,
             direct_s: 0.0,
             sounds_until_s: longest_s,
-            recorded_at: None,
+            // Not before the last that was measured.
+            recorded_at: self.room.responses().iter().filter_map(|r| r.recorded_at).max_by(f64::total_cmp),
         }
     }
 }

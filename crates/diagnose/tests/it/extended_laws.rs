@@ -4,8 +4,10 @@
 
 use sabine_diagnose::{Error, ExtendedModel, read_laws};
 use sabine_paths::Propagator;
+use sabine_paths::laws::{Law, LawParameter, LawTarget};
 use sabine_propagate::{PathTracer, TracerConfig};
 use sabine_scene::MeasuredRoom;
+use sabine_testkit::{LabConfig, Laboratory};
 use std::path::PathBuf;
 
 const MODEL: &str = r#"version = 2
@@ -115,6 +117,38 @@ fn a_law_of_the_model_weighs_the_paths_of_each_pair() {
         }
     }
     assert!(on_carpet > 1000 && elsewhere > 1000, "{on_carpet} {elsewhere}");
+}
+
+/// What goes with the order of the recordings is rendered as each was recorded; a place that was not measured is heard as first of all.
+#[test]
+fn a_law_of_the_order_of_recordings_renders_each_response_as_it_was_recorded() {
+    let config = LabConfig { seed: 8, receivers: 3, recording_order: true, ..LabConfig::default() };
+    let lab = Laboratory::new(config).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let room = lab.write(&[], &folder.path().join("room"), None).unwrap();
+    let order: Vec<f64> = room.responses().iter().map(|r| r.recorded_at.unwrap()).collect();
+    let room = room.with_responses(|r| r.receiver != 1);
+    let a = ("a", LawParameter::new(3.0, [2.0, 4.0], "dB"));
+    let law = Law::new("warmer", LawTarget::Recorder, None, "-a * recording_order", [a]).unwrap();
+    let without = read("version = 2\ncentres_hz = [125, 250, 500, 1000, 2000, 4000, 8000]\n").unwrap();
+    let model = without.clone().with_law(law);
+    let (under, plain) = (model.room(&room).unwrap(), without.room(&room).unwrap());
+    let materials: Vec<_> = under.scene.materials().iter().map(|named| named.material.clone()).collect();
+    let config = TracerConfig { rays: 50, duration_s: 0.1, image_order: 1, ..Default::default() };
+    let tracer = PathTracer::new(config).unwrap();
+    let first = order[0].min(order[2]);
+    for (receiver, at) in [(0, order[0]), (1, first), (2, order[2])] {
+        let (source, place) = (&under.sources[0], &under.receivers[receiver]);
+        let paths = tracer.trace(&under.scene, source, place, &under.air, &()).unwrap();
+        let energies = |room: &sabine_diagnose::ExtendedRoom| -> f64 {
+            let all = paths.energies(&room.conditions(&materials, 0, receiver)).unwrap();
+            all[3].iter().map(|e| f64::from(*e)).sum()
+        };
+        let db = 10.0 * (energies(&under) / energies(&plain)).log10();
+        assert!((db + 3.0 * at).abs() < 1e-3, "{receiver}: {db} dB at {at}");
+    }
+    let unstated = room.unmeasured_at(room.receivers().to_vec());
+    assert!(model.room(&unstated).unwrap_err().to_string().contains("in which order"));
 }
 
 #[test]
