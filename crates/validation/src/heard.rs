@@ -61,12 +61,18 @@ impl Heard {
 }
 
 /// The responses of a room as they were measured, in its order.
+///
+/// # Errors
+/// A file that cannot be read.
 pub fn measured(room: &MeasuredRoom) -> Result<Vec<Heard>, AnyError> {
     let one = |index: usize| Heard::of(&room.load_response(index)?, room.bands());
     (0..room.responses().len()).into_par_iter().map(one).collect()
 }
 
 /// The same responses as a model renders them.
+///
+/// # Errors
+/// A model that does not fit the room.
 pub fn rendered(
     model: &ExtendedModel,
     room: &MeasuredRoom,
