@@ -163,11 +163,11 @@ fn outside(laws: &[&Trial]) {
         "\n| outside the fitted range | rooms | curves as stated, dB (median) | curves as found, dB (median) | nearer | nats for each level (median) |"
     );
     println!("|---|---|---|---|---|---|");
-    let right = |t: &Trial| t.outcome == Outcome::RightLaw;
-    let catalogue = |t: &Trial| t.outcome == Outcome::Catalogue;
-    let other = |t: &Trial| !matches!(t.outcome, Outcome::RightLaw | Outcome::Catalogue);
-    let classes: [(&str, &dyn Fn(&Trial) -> bool); 3] =
-        [("right law", &right), ("named by the catalogue", &catalogue), ("something else named", &other)];
+    let classes: [(&str, fn(&Trial) -> bool); 3] = [
+        ("right law", |t| t.outcome == Outcome::RightLaw),
+        ("named by the catalogue", |t| t.outcome == Outcome::Catalogue),
+        ("something else named", |t| !is_named(t)),
+    ];
     for (name, is) in classes {
         let own: Vec<&Trial> = laws.iter().copied().filter(|t| is(t) && t.outside_nats.is_some()).collect();
         let nearer = own.iter().filter(|t| t.outside_found_db < t.outside_stated_db).count();
