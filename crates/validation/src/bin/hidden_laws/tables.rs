@@ -163,13 +163,14 @@ fn outside(laws: &[&Trial]) {
         "\n| outside the fitted range | rooms | curves as stated, dB (median) | curves as found, dB (median) | nearer | nats for each level (median) |"
     );
     println!("|---|---|---|---|---|---|");
-    let classes: [(&str, fn(&Trial) -> bool); 3] = [
-        ("right law", |t| t.outcome == Outcome::RightLaw),
-        ("named by the catalogue", |t| t.outcome == Outcome::Catalogue),
-        ("something else named", |t| !is_named(t)),
+    let classes = [
+        ("right law", vec![Outcome::RightLaw]),
+        ("named by the catalogue", vec![Outcome::Catalogue]),
+        ("something else named", vec![Outcome::WrongLaw, Outcome::WrongName]),
     ];
-    for (name, is) in classes {
-        let own: Vec<&Trial> = laws.iter().copied().filter(|t| is(t) && t.outside_nats.is_some()).collect();
+    for (name, outcomes) in classes {
+        let is = |t: &&Trial| outcomes.contains(&t.outcome) && t.outside_nats.is_some();
+        let own: Vec<&Trial> = laws.iter().copied().filter(is).collect();
         let nearer = own.iter().filter(|t| t.outside_found_db < t.outside_stated_db).count();
         println!(
             "| {name} | {} | {} | {} | {} | {} |",
