@@ -54,7 +54,7 @@ struct Arguments {
     /// Rays for each pair
     #[arg(long, default_value_t = DiagnoseConfig::default().rays)]
     rays: usize,
-    /// Receivers that are fitted, 1 to 36; below six no law is looked for. Four more, nearer to the source and farther from it, are left out
+    /// Receivers that are fitted, 1 to 32; below six no law is looked for. Eight more, nearer to the source and farther from it, are left out
     #[arg(long, default_value_t = 12)]
     receivers: usize,
     /// Print by how much the laws change levels, and diagnose nothing: seconds for each room
