@@ -42,21 +42,22 @@ impl ModelArguments {
     /// The model cannot be read or does not fit the room: the error names file or field.
     pub fn apply(&self, stated: MeasuredRoom) -> Result<(MeasuredRoom, PathModel), Failure> {
         let Some(file) = &self.file else { return Ok((stated, PathModel::default())) };
-        let model = ExtendedModel::read(file)?;
+        let mut model = ExtendedModel::read(file)?;
+        // What drifts over the recordings is no matter of the room, and another room may not say in which order they were made.
+        let drifts = |law: &&Law| law.variables().iter().any(|name| name == "recording_order");
+        while let Some((place, law)) = (0..model.causes.len())
+            .find_map(|place| Some((place, model.causes[place].law().filter(drifts)?.id().to_owned())))
+        {
+            let file = file.display();
+            println!("note: the law {law} of {file} goes with the order of the recordings and is left out");
+            model = model.without(place);
+        }
         let extended = model.room(&stated)?;
         let all = model.causes.iter().filter_map(|cause| cause.law().cloned());
-        let mut laws: Vec<Law> = all.collect();
-        laws.retain(|law| {
-            let why = if law.target() == LawTarget::Added {
-                "adds sound"
-            } else if law.variables().iter().any(|name| name == "recording_order") {
-                "goes with the order of the recordings"
-            } else {
-                return true;
-            };
-            println!("note: the law {} of {} {why} and is left out", law.id(), file.display());
-            false
-        });
+        let (added, laws): (Vec<Law>, Vec<Law>) = all.partition(|law| law.target() == LawTarget::Added);
+        for law in added {
+            println!("note: the law {} of {} adds sound and is left out", law.id(), file.display());
+        }
         let own = PathModel {
             laws,
             wave_below_hz: extended.wave_below_hz,

@@ -2,6 +2,7 @@
 
 use crate::sabine;
 use sabine::diagnose::{ExtendedModel, ModelCause, ModelChange, RigidMotion, read_laws};
+use sabine::paths::laws::{Law, LawParameter, LawTarget};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -158,17 +159,26 @@ fn materials_are_fitted_under_the_laws_of_a_model() {
     plain.centres_hz = vec![125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0];
     let law = read_laws(LAW).unwrap().remove(0);
     plain.with_law(law).write(&path).unwrap();
-    let fitted = |name: &str, more: &[&str]| -> Value {
+    let fitted = |name: &str, more: &[&str]| -> (Value, String) {
         let out = folder.path().join(name);
         let t60 =
             ["--t60", "0.6,0.6,0.6,0.55,0.5,0.45,0.4", "--rays", "2000", "--out", out.to_str().unwrap()];
-        succeeds("fit", &[&t60[..], more].concat());
-        serde_json::from_str(&std::fs::read_to_string(out.join("fit.json")).unwrap()).unwrap()
+        let told = succeeds("fit", &[&t60[..], more].concat());
+        (serde_json::from_str(&std::fs::read_to_string(out.join("fit.json")).unwrap()).unwrap(), told)
     };
-    let (without, with) = (fitted("without", &[]), fitted("with", &["--model", path.to_str().unwrap()]));
+    let under = |name: &str| fitted(name, &["--model", path.to_str().unwrap()]);
+    let ((without, _), (with, told)) = (fitted("without", &[]), under("with"));
+    assert!(!told.contains("left out"), "{told}");
     let carpet = |fit: &Value, band: usize| fit["materials"]["carpet"]["absorption"][band].as_f64().unwrap();
     assert!((carpet(&without, 1) - carpet(&with, 1)).abs() < 0.02);
     assert!(carpet(&without, 5) > carpet(&with, 5) + 0.01, "{} {}", carpet(&without, 5), carpet(&with, 5));
+    // What drifts over the recordings is no matter of the room: it says nothing of their order, and that law is left out.
+    let a = ("a", LawParameter::new(3.0, [2.0, 4.0], "dB"));
+    let law = Law::new("warmer", LawTarget::Recorder, None, "-a * recording_order", [a]).unwrap();
+    ExtendedModel::read(&path).unwrap().with_law(law).write(&path).unwrap();
+    let (beside, told) = under("beside");
+    assert!(told.contains("the law warmer of") && told.contains("order of the recordings"), "{told}");
+    assert_eq!(beside["materials"], with["materials"]);
 }
 
 /// Commands that render take the room from the model: here, one in which the carpet swallows nearly all.
