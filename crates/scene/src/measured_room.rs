@@ -11,6 +11,7 @@ mod other_model;
 mod parameter_tables;
 mod position_sd;
 mod prior;
+mod recording_order;
 pub(crate) mod response_check;
 mod tables;
 mod turned;
@@ -441,16 +442,6 @@ impl MeasuredRoom {
     /// Measured responses.
     pub fn responses(&self) -> &[ResponseEntry] {
         &self.responses
-    }
-
-    /// When the response between a source and a receiver (indices) was recorded, as the room file states it; for a pair that was not measured,
-    /// when the first of all was: what drifts over the recordings has not begun. `None` where no response says.
-    pub fn recorded_at(&self, source: usize, receiver: usize) -> Option<f64> {
-        let of_pair = self.responses.iter().filter(|r| (r.source, r.receiver) == (source, receiver));
-        of_pair
-            .filter_map(|r| r.recorded_at)
-            .next()
-            .or_else(|| self.responses.iter().filter_map(|r| r.recorded_at).min_by(f64::total_cmp))
     }
 
     /// The source of this name.
