@@ -45,10 +45,9 @@ impl ModelArguments {
         let mut model = ExtendedModel::read(file)?;
         // What drifts over the recordings is no matter of the room, and another room may not say in which order they were made.
         let drifts = |law: &&Law| law.variables().iter().any(|name| name == "recording_order");
-        while let Some((place, law)) = (0..model.causes.len())
-            .find_map(|place| Some((place, model.causes[place].law().filter(drifts)?.id().to_owned())))
-        {
-            let file = file.display();
+        for place in (0..model.causes.len()).rev() {
+            let Some(law) = model.causes[place].law().filter(drifts) else { continue };
+            let (law, file) = (law.id(), file.display());
             println!("note: the law {law} of {file} goes with the order of the recordings and is left out");
             model = model.without(place);
         }

@@ -3,11 +3,9 @@
 use crate::infer::baseline::Baseline;
 use crate::infer::search::State;
 use crate::statistics::{median, student_tail};
-use crate::survey::Survey;
+use crate::survey::{LEAST_RECORDINGS, Survey};
 use sabine_scene::{Levels, TimeZero};
 
-/// Fewer recordings show no trend.
-const MIN_RECORDINGS: usize = 6;
 /// Levels and times: the probability that a trend asks for is shared by both.
 const TRENDS: f64 = 2.0;
 
@@ -70,7 +68,7 @@ fn told(
 
 /// The least-squares line through points (time, value); none through few or without a spread of times.
 fn trend(points: &[(f64, f64)]) -> Option<Trend> {
-    if points.len() < MIN_RECORDINGS {
+    if points.len() < LEAST_RECORDINGS {
         return None;
     }
     let n = points.len() as f64;

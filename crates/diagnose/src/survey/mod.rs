@@ -8,6 +8,9 @@ use crate::survey::surfaces::Surface;
 use sabine_acoustics::{Air, Bands};
 use sabine_scene::Measurement;
 
+/// Recordings below which nothing is said of what goes with their order.
+pub(crate) const LEAST_RECORDINGS: usize = 6;
+
 /// One response of the survey.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]

@@ -1,6 +1,6 @@
 //! What a law may go with.
 
-use crate::survey::Survey;
+use crate::survey::{LEAST_RECORDINGS, Survey};
 use sabine_paths::laws::{Law, LawError, LawParameter, LawTarget};
 use sabine_scene::Levels;
 
@@ -88,8 +88,6 @@ pub(crate) const OF_ORDER: [Form; 2] = [
         meaning: ", 0 in the first recording and nearly 1 from the middle on",
     },
 ];
-/// Recordings below which nothing is said of their order.
-const LEAST_RECORDINGS: usize = 6;
 /// Shares of the probability beforehand: reflections, single quantities of paths, products of two, recordings.
 const SHARES: [f64; 4] = [0.4, 0.3, 0.1, 0.2];
 
