@@ -12,6 +12,7 @@ mod directivity;
 mod laws;
 mod merging;
 mod moving;
+mod no_box;
 mod octave_filter;
 mod placement;
 mod real_rooms;

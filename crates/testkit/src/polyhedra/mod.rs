@@ -1,7 +1,8 @@
 //! A second laboratory, as different from the first as can be: rooms that are no box.
 //!
 //! Physics: image sources to the third order in any mesh, found by mirroring and tracing back; beyond them, and for all that scatters,
-//! particles (Lambert) that are counted in spheres about the receivers, their energy filled with Gaussian noise. One scattering
+//! particles (Lambert) that are counted in spheres about the receivers, their energy filled with Gaussian noise. As many particles fly as
+//! it takes ([`PolyhedralConfig::most_particles`]), and those that carry much are copied. One scattering
 //! coefficient for each material, the same in all octaves, and stated. Air by ISO 9613-1 (Bass et al.). It shares no code with the tracer,
 //! with what fits or diagnoses, nor any physics but the air with [`Laboratory`](crate::Laboratory).
 //!
@@ -74,8 +75,12 @@ pub struct PolyhedralConfig {
     pub nuisances: bool,
     /// Number of receivers, 1 to 40.
     pub receivers: usize,
-    /// Particles, 1,000 to 10,000,000.
+    /// Particles of one round, 1,000 to 10,000,000.
     pub particles: usize,
+    /// Rounds fly, each with other particles, until the energy that all receivers hear together is known to a twentieth (standard error) in every
+    /// band and span of 50 ms down to -45 dB, or so many particles have flown, 1,000 to 100,000,000. Receivers hear the same
+    /// particles: what these miss is missing in all responses alike, and looks like an effect.
+    pub most_particles: usize,
 }
 
 impl Default for PolyhedralConfig {
@@ -87,6 +92,7 @@ impl Default for PolyhedralConfig {
             nuisances: false,
             receivers: 12,
             particles: 300_000,
+            most_particles: 3_000_000,
         }
     }
 }
@@ -162,6 +168,8 @@ impl PolyhedralRoom {
         OutOfRange::check("seed", config.seed as f64, 0.0, i64::MAX as f64, "below 2^63")?;
         OutOfRange::check("receivers", config.receivers as f64, 1.0, 40.0, "between 1 and 40")?;
         OutOfRange::check("particles", config.particles as f64, 1e3, 1e7, "between 1,000 and 10,000,000")?;
+        let most = config.most_particles as f64;
+        OutOfRange::check("most_particles", most, 1e3, 1e8, "between 1,000 and 100,000,000")?;
         let bands = Bands::octaves(OCTAVES_HZ.0, OCTAVES_HZ.1)?;
         let fine = if config.nuisances { Bands::third_octaves(THIRDS_HZ.0, THIRDS_HZ.1)? } else { bands };
         let none = || OutOfRange {
@@ -224,6 +232,21 @@ impl PolyhedralRoom {
     /// The mesh and materials as stated.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// The air as stated.
+    pub fn air(&self) -> Air {
+        self.air
+    }
+
+    /// The source as stated.
+    pub fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// The receivers as stated.
+    pub fn receivers(&self) -> &[Receiver] {
+        &self.receivers
     }
 
     /// The receiver or the material that is not as stated.
@@ -320,6 +343,7 @@ impl PolyhedralRoom {
         Flight {
             seed: self.config.seed,
             particles: self.config.particles,
+            most_particles: self.config.most_particles,
             triangles: &truth.triangles,
             surfaces,
             source: truth.source,
