@@ -36,7 +36,7 @@ fn they_decay_as_particles_do() {
             })
             .collect();
         let scene = room.scene().with_materials(truth).unwrap();
-        let config = PhononConfig { particles: 3200, detector_radius_m: 0.4, duration_s: 0.35, seed: 2 };
+        let config = PhononConfig { particles: 25_600, detector_radius_m: 0.4, duration_s: 0.35, seed: 2 };
         let particles = Phonons::new(&scene, config).unwrap();
         let source: &Source = &measured.sources()[0];
         let air = measured.air();
@@ -54,9 +54,10 @@ fn they_decay_as_particles_do() {
                     (own.sum(), counted.iter().map(|r| r.band(band)[window]).sum::<f64>());
                 let variance: f64 =
                     counted.iter().map(|r| r.band_standard_error(band)[window].powi(2)).sum::<f64>();
-                // Twelve times as many particles fly in the room: a twelfth of the variance. What comes within the 2 ms that a sphere takes
+                // In the room at least half as many again fly: less than two thirds of the variance. With an eighth of these phonons, late
+                // energy that rare ones carry was missed, and its standard error with it. What comes within the 2 ms that a sphere takes
                 // may fall into the next window.
-                let allowed = 4.5 * (variance * (1.0 + 1.0 / 12.0)).sqrt() + 0.03 * other;
+                let allowed = 4.5 * (variance * (1.0 + 25.6 / 40.0)).sqrt() + 0.03 * other;
                 assert!(
                     (own - other).abs() < allowed,
                     "{shape:?}, {band}, {window}: {own} {other} {allowed}"
