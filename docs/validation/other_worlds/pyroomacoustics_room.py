@@ -34,7 +34,8 @@ MATERIALS = {
     "ceiling": "board",
 }
 SHAPES = {"brick": [0, 0, 0, 0, 0, 0], "plaster": [3, 1, 0, -1, -1, 0], "carpet": [-4, -2, 0, 2, 3, 4], "board": [2, 1, 0, 0, 1, 1]}
-EFFECTS = ["null", "position", "surface", "temperature", "latency", "gain", "wall"]
+EFFECTS = ["null", "position", "surface", "temperature", "latency", "gain", "wall", "warming"]
+WARMING_DB = 6.0  # by which a loudspeaker that has warmed up is quieter, in the end
 BEFORE_M = 0.35  # a displaced wall stays this far from all places
 
 
@@ -160,6 +161,17 @@ def planted(effect, random, prism, absorption, places, climate):
     return prism, absorption, places, climate, recorder, hidden
 
 
+def order_of_recordings(seed, receivers):
+    """When each receiver was recorded, from 1 on: random numbers of its own, so that the room of a seed stays the same."""
+    return 1 + np.random.default_rng([seed, 1]).permutation(receivers)
+
+
+def warming_db(order):
+    """Level of each recording, the first being 0: power compression, the voice coil warming exponentially (Button, JAES 40, 1992)."""
+    warmed = 1 - np.exp(-(order - 1) / (0.4 * len(order)))
+    return -20 * np.log10(1 + (10 ** (WARMING_DB / 20) - 1) * warmed)
+
+
 def eyring_s(prism, absorption):
     """Longest reverberation time of the octaves, without air."""
     total = sum(area for _, _, area in prism.faces())
@@ -235,7 +247,7 @@ def mesh(prism):
     return "\n".join(lines) + "\n"
 
 
-def room_file(absorption, places, climate, scattering):
+def room_file(absorption, places, climate, scattering, order):
     """What a careful user would write."""
     numbers = lambda values: "[" + ", ".join(f"{value:.4f}" for value in values) + "]"
     lines = ['[room]\nmesh = "room.obj"\n', "[air]"]
@@ -249,7 +261,8 @@ def room_file(absorption, places, climate, scattering):
     for i, place in enumerate(places[1:], 1):
         lines += [f'[[receivers]]\nid = "r{i}"\nposition_m = {numbers(place)}\n']
     for i in range(1, len(places)):
-        lines += [f'[[responses]]\nsource = "s1"\nreceiver = "r{i}"\nfile = "ir/s1_r{i}.wav"\n']
+        lines += [f'[[responses]]\nsource = "s1"\nreceiver = "r{i}"\nfile = "ir/s1_r{i}.wav"']
+        lines += [f"recorded_at = {order[i - 1]}\n"] if order is not None else [""]
     return "\n".join(lines)
 
 
@@ -260,6 +273,7 @@ def main():
     parser.add_argument("--effect", choices=EFFECTS, default="null")
     parser.add_argument("--shape", choices=["box", "l"], default="box", help="l needs --method rays")
     parser.add_argument("--receivers", type=int, default=8)
+    parser.add_argument("--order", action="store_true", help="the file says in which order was recorded, as it does with --effect warming")
     parser.add_argument("--uneven", type=float, default=1.0, help="how much absorption differs from octave to octave; 0 for the same in all")
     parser.add_argument("--rays", type=int, default=100_000, help="of pyroomacoustics")
     parser.add_argument(
@@ -279,10 +293,16 @@ def main():
     prism, absorption, places, climate = draw(random, arguments.receivers, arguments.shape == "l", arguments.uneven)
     true = planted(arguments.effect, random, prism, absorption, places, climate)
     true_prism, true_absorption, true_places, true_climate, recorder, hidden = true
+    order = None
+    if arguments.order or arguments.effect == "warming":
+        order = order_of_recordings(arguments.seed, arguments.receivers)
+    if arguments.effect == "warming":
+        recorder["gain_db"] = recorder["gain_db"] + warming_db(order)
+        hidden = {"warming_db": WARMING_DB, "recorded_at": order.tolist()}
     # Nobody knows tables and places exactly: the file is off, the truth is what was drawn.
     stated = {name: np.clip(table + random.normal(0, TABLE_SD, 6), 0.01, 0.95) for name, table in absorption.items()}
     stated_places = [place + random.normal(0, PLACE_SD_M, 3) for place in places]
-    responses, order, speed = simulate(
+    responses, image_order, speed = simulate(
         arguments.method,
         true_prism,
         true_absorption,
@@ -298,14 +318,14 @@ def main():
     for i, response in enumerate(responses, 1):
         soundfile.write(arguments.out / "ir" / f"s1_r{i}.wav", response.astype(np.float32), RATE_HZ, subtype="FLOAT")
     (arguments.out / "room.obj").write_text(mesh(prism))
-    (arguments.out / "room.toml").write_text(room_file(stated, stated_places, climate, arguments.scattering))
+    (arguments.out / "room.toml").write_text(room_file(stated, stated_places, climate, arguments.scattering, order))
     truth = {
         "program": f"pyroomacoustics {pra.__version__}",
         "method": arguments.method,
         "effect": arguments.effect,
         "hidden": hidden,
         "seed": arguments.seed,
-        "image_order": order,
+        "image_order": image_order,
         "speed_of_sound_m_s": speed,
         "rays": arguments.rays if arguments.method == "rays" else 0,
         "floor_m": true_prism.polygon.tolist(),
