@@ -1,6 +1,5 @@
 //! Rooms that are no box against the particles of the second laboratory, which share no code with the tracer.
 
-use sabine_acoustics::{Material, PerBand};
 use sabine_paths::{Conditions, Propagator};
 use sabine_propagate::{PathTracer, TracerConfig};
 use sabine_testkit::{PolyhedralConfig, PolyhedralRoom, Polyhedron};
@@ -14,17 +13,7 @@ fn late_sound_is_that_of_particles() {
     for shape in [Polyhedron::SlopedCeiling, Polyhedron::Furnished] {
         let config = PolyhedralConfig { seed: 5551, shape, ..PolyhedralConfig::default() };
         let laboratory = PolyhedralRoom::new(config).unwrap();
-        let materials: Vec<Material> = laboratory
-            .scene()
-            .materials()
-            .iter()
-            .zip(laboratory.true_absorption())
-            .map(|(named, table)| {
-                let bands = named.material.bands();
-                let scattering = named.material.scattering().clone();
-                Material::new(PerBand::new(bands, table.clone()).unwrap(), scattering).unwrap()
-            })
-            .collect();
+        let materials = laboratory.true_materials().unwrap();
         let bands = materials[0].bands();
         let spans = |bins: &[f64]| -> Vec<f64> {
             let each = (SPAN_S / PolyhedralRoom::BIN_S) as usize;

@@ -79,7 +79,7 @@ pub struct PolyhedralConfig {
     pub particles: usize,
     /// Rounds fly, each with other particles, until the energy that all receivers hear together is known to a twentieth (standard error) in every
     /// band and span of 50 ms down to -45 dB, or so many particles have flown, 1,000 to 100,000,000. Receivers hear the same
-    /// particles: what these miss is missing in all responses alike, and looks like an effect.
+    /// particles: what these miss is missing in all responses, and looks like an effect.
     pub most_particles: usize,
 }
 
@@ -267,6 +267,18 @@ impl PolyhedralRoom {
     /// True absorption by octave of each material of [`PolyhedralRoom::scene`].
     pub fn true_absorption(&self) -> &[Vec<f64>] {
         &self.truth.absorption
+    }
+
+    /// Materials with their true absorption, in the order of those of [`PolyhedralRoom::scene`].
+    ///
+    /// # Errors
+    /// As [`Material::new`].
+    pub fn true_materials(&self) -> Result<Vec<Material>, Error> {
+        let one = |(named, table): (&NamedMaterial, &Vec<f64>)| {
+            let absorption = PerBand::new(self.bands, table.clone())?;
+            Material::new(absorption, named.material.scattering().clone())
+        };
+        self.scene.materials().iter().zip(&self.truth.absorption).map(one).collect()
     }
 
     /// Writes the room as a new folder.

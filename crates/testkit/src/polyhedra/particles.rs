@@ -15,7 +15,7 @@ const BATCHES: usize = 64;
 pub(super) const RADIUS_M: f64 = 0.5;
 /// Width of a bin of energy in seconds.
 pub(super) const BIN_S: f64 = 5e-4;
-/// Particles are chosen anew after so long, in seconds, ...
+/// Particles are resampled after so long, in seconds, ...
 const STEP_S: f64 = 0.02;
 /// ... if the sum of the squares of their shares of the energy is so many times that of equal shares.
 const UNEVEN: f64 = 1.5;
@@ -33,7 +33,7 @@ pub(super) struct Flight<'a> {
     pub seed: u64,
     /// In one round.
     pub particles: usize,
-    /// Rounds end with so many, settled or not.
+    /// Rounds end with so many, converged or not.
     pub most_particles: usize,
     pub triangles: &'a [[Vec3; 3]],
     /// Of each triangle.
@@ -57,7 +57,7 @@ impl Flight<'_> {
         let mut together: Vec<Vec<f64>> = Vec::new();
         let most = self.most_particles.div_ceil(self.particles).max(1);
         let mut rounds = 0;
-        while rounds < most && !(rounds > 0 && self.is_settled(&together)) {
+        while rounds < most && !(rounds > 0 && self.is_converged(&together)) {
             let batches = rounds * BATCHES..(rounds + 1) * BATCHES;
             for batch in batches.into_par_iter().map(|batch| self.fly(batch)).collect::<Vec<_>>() {
                 sum.iter_mut().zip(&batch).for_each(|(s, b)| *s += b);
@@ -84,7 +84,7 @@ impl Flight<'_> {
     }
 
     /// Whether the energy that all receivers hear together is known to [`KNOWN_TO`] wherever it is compared.
-    fn is_settled(&self, together: &[Vec<f64>]) -> bool {
+    fn is_converged(&self, together: &[Vec<f64>]) -> bool {
         let count = together.len() as f64;
         let spans = together[0].len() / self.exponents_per_m.len();
         let means: Vec<f64> =
@@ -135,7 +135,7 @@ impl Flight<'_> {
                 let ways_m = ends_s.map(|s| s * self.speed_m_s);
                 self.advance((particle, carried), ways_m, &faces, &mut random, &mut energy);
             }
-            swarm.choose_anew(bands, &mut random);
+            swarm.resample(bands, &mut random);
         }
         energy
     }
@@ -230,7 +230,7 @@ impl Swarm {
     /// the few that no absorber has met: all receivers hear the same particles, and would be off together. What a particle carries is
     /// shared among its copies, and made up for where it was unlikely to be drawn: every energy stays right on average (resampling, as in Liu
     /// and Chen, JASA (Statistics) 90, 1995). Octaves have an equal say. Only where the shares have become uneven.
-    fn choose_anew(&mut self, bands: usize, random: &mut Pcg64Mcg) {
+    fn resample(&mut self, bands: usize, random: &mut Pcg64Mcg) {
         let count = self.particles.len() as f64;
         let mut sums = vec![0.0; bands];
         for carried in self.carried.chunks(bands) {
