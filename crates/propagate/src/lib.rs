@@ -109,6 +109,7 @@ mod edge_wedges;
 mod energy_envelope;
 mod error;
 mod event_mixture;
+mod guide;
 mod head_responses;
 mod hierarchy;
 mod hierarchy_builder;

@@ -48,6 +48,10 @@ pub struct TracerConfig {
     /// (a weight window), so that the late decay does not hang on the few that no absorber has met. Paths hold for any absorption
     /// either way; which rays are many is decided by the scene's own.
     pub weight_window: bool,
+    /// Draws up to a quarter of all directions, at both ends and where rays scatter, by how long sound stays in them with the scene's
+    /// materials: to and fro between hard walls while the rest of the room falls silent (path guiding). Only with
+    /// [`TracerConfig::weight_window`]; paths hold for any absorption all the same.
+    pub path_guiding: bool,
     /// Adds the ways around one edge where the direct line is blocked ([`DiffractingEdges`](crate::DiffractingEdges)), so that a
     /// screen casts a shadow and not a black hole.
     pub diffraction: bool,
@@ -70,6 +74,7 @@ impl Default for TracerConfig {
             cuboid_paths: 0,
             receiver_radius_m: 0.5,
             weight_window: true,
+            path_guiding: true,
             diffraction: false,
             merge_coplanar: true,
             allow_leaks: false,
@@ -106,8 +111,8 @@ impl TracerConfig {
 /// The ways that apply to one path share it by the balance heuristic. At each surface a ray is reflected specularly **or**
 /// by Lambert's law, at random with the scattering coefficient. A ray draws for one set of scattering coefficients; the
 /// balance heuristic makes its paths serve all octaves without bias. With [`TracerConfig::weight_window`], rays are split where
-/// they carry much with the scene's absorption and play Russian roulette where they carry little; paths hold for any
-/// absorption all the same.
+/// they carry much with the scene's absorption and play Russian roulette where they carry little; with
+/// [`TracerConfig::path_guiding`] more of them go where sound stays for long. Paths hold for any absorption all the same.
 ///
 /// With [`TracerConfig::bidirectional`] off, all rays start at the source and neither join nor meet.
 ///

@@ -3,6 +3,7 @@
 use crate::cuboid::{Cuboid, ImageSource};
 use crate::edge_diffraction::DiffractingEdges;
 use crate::event_mixture::EventProbabilities;
+use crate::guide::Guide;
 use crate::mesh_scene::MeshScene;
 use crate::patches::Patches;
 use crate::weight_window::{KeptEnergy, MAX_BANDS, PilotScene, WeightWindow, ln_kept};
@@ -71,6 +72,21 @@ impl PreparedScene {
         let (mesh, ln_kept, bands) = (&self.mesh, &self.ln_kept, self.bands);
         let scene = PilotScene { mesh, ln_kept, bands, scattering: &scattering };
         WeightWindow::pilot(scene, from, max_length_m, rays, seed)
+    }
+
+    /// Directions from surfaces in which sound stays for long, where it is scattered as in a class of octaves.
+    pub(crate) fn guide(
+        &self,
+        hero: usize,
+        loss_per_m: &[f64; MAX_BANDS],
+        from: [f64; 3],
+        max_length_m: f64,
+        seed: u64,
+    ) -> Option<Guide> {
+        let scattering = |material| self.probabilities.scattering(material, hero);
+        let (mesh, ln_kept, bands) = (&self.mesh, &self.ln_kept, self.bands);
+        let scene = PilotScene { mesh, ln_kept, bands, scattering: &scattering };
+        Guide::learn(scene, loss_per_m, from, max_length_m, seed)
     }
 
     /// The material (index) of each of the six faces, where the mesh is a cuboid: six whole faces at right angles, each of one material, and

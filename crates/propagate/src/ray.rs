@@ -1,6 +1,7 @@
 //! A ray, and where it has been.
 
 use crate::event_mixture::{EventMixture, EventProbabilities};
+use crate::guide::Guide;
 use crate::patches::Patch;
 use crate::random::lambert;
 use crate::techniques::Ways;
@@ -107,6 +108,8 @@ pub(crate) struct Progress {
     pub ln_energy: [f64; MAX_BANDS],
     /// Logarithm of the number of rays that it stands for.
     pub log_rays: f64,
+    /// What the direction in which it was last sent has added to that.
+    pub log_guided: f64,
 }
 
 impl Walk {
@@ -152,6 +155,7 @@ impl Ray {
             mirrored: false,
             ln_energy: [0.0; MAX_BANDS],
             log_rays: 0.0,
+            log_guided: 0.0,
         };
         Self { end, batch, walk, at, ended: false }
     }
@@ -202,8 +206,14 @@ impl Ray {
 
 impl Progress {
     /// Is scattered on by a surface, by Lambert's law.
-    pub fn set_out(&mut self, normal: Vec3, random: &mut impl Rng) {
-        self.heading = lambert(random, normal);
+    pub fn set_out(&mut self, normal: Vec3, guide: Option<&Guide>, random: &mut impl Rng) {
+        let (heading, log_rays) = match guide {
+            Some(guide) => guide.scattered(normal, random),
+            None => (lambert(random, normal), 0.0),
+        };
+        self.heading = heading;
+        self.log_rays += log_rays - self.log_guided;
+        self.log_guided = log_rays;
         (self.stretch_m, self.cosine_out) = (0.0, dot(self.heading, normal));
     }
 }

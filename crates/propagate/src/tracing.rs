@@ -1,6 +1,7 @@
 //! The rays of one trace, from the source and from the receiver.
 
 use crate::TracerConfig;
+use crate::guide::Guide;
 use crate::prepared_scene::PreparedScene;
 use crate::random::{direction, generator};
 use crate::ray::{Met, RECEIVER, Ray, SOURCE, Walk};
@@ -30,6 +31,8 @@ pub(crate) struct Tracing<'a> {
     exact_order: usize,
     /// What rays from each end carry on average.
     windows: Option<[WeightWindow; 2]>,
+    /// Where more rays are sent than by chance, for each class of octaves.
+    guides: Vec<Option<Guide>>,
     config: &'a TracerConfig,
 }
 
@@ -49,10 +52,17 @@ impl<'a> Tracing<'a> {
         let parts = batches * pairs.div_ceil(batches * MOST_PAIRS);
         let window =
             |end: usize| scene.weight_window(ends_m[end], max_length_m, pairs, config.seed ^ end as u64);
+        let windows = config.weight_window.then(|| [window(SOURCE), window(RECEIVER)]);
+        let guide = |hero: usize| {
+            let window = &windows.as_ref().filter(|_| config.path_guiding)?[SOURCE];
+            scene.guide(hero, &window.late_loss_per_m(), ends_m[SOURCE], max_length_m, config.seed)
+        };
+        let guides = (0..scene.probabilities.classes()).map(guide).collect();
         Self {
             scene,
             max_length_m,
-            windows: config.weight_window.then(|| [window(SOURCE), window(RECEIVER)]),
+            guides,
+            windows,
             ends: [sphere(SOURCE), sphere(RECEIVER)],
             pairs: parts * pairs.div_ceil(parts).next_multiple_of(scene.probabilities.classes()),
             parts,
@@ -87,11 +97,9 @@ impl<'a> Tracing<'a> {
         let mut walks: [Vec<Walk>; 2] = [Vec::new(), Vec::new()];
         let mut until: Vec<[usize; 2]> = vec![[0; 2]];
         for pair in part * pairs..(part + 1) * pairs {
-            // Both rays of a pair draw for the same class, and all classes get their turns within a part.
-            let hero = pair % self.scene.probabilities.classes();
             for (end, walks) in walks.iter_mut().enumerate().take(self.ends_in_use()) {
                 let mut random = generator(self.config.seed, (2 * pair + end) as u64);
-                self.walk((end, hero, batch), &mut random, walks, &mut paths);
+                self.walk((end, pair, batch), &mut random, walks, &mut paths);
             }
             until.push([walks[SOURCE].len(), walks[RECEIVER].len()]);
         }
@@ -142,14 +150,23 @@ impl<'a> Tracing<'a> {
     /// Follows one ray from an end of the path, on all ways into which it is split, and adds what it finds at the opposite end.
     fn walk(
         &self,
-        (end, hero, batch): (usize, usize, u8),
+        (end, number, batch): (usize, usize, u8),
         random: &mut impl Rng,
         walks: &mut Vec<Walk>,
         paths: &mut PathSet,
     ) {
         let first = walks.len();
-        let start = (&self.ends[end], direction(random));
-        let mut waiting = vec![Ray::new(end, hero, batch, start, self.scene.probabilities.classes())];
+        // Both rays of a pair draw for the same class, and all classes get their turns within a part.
+        let classes = self.scene.probabilities.classes();
+        let (turn, hero) = (number / classes, number % classes);
+        let (heading, log_rays) = match &self.guides[hero] {
+            Some(guide) => guide.emitted((end == SOURCE).then_some(turn), random),
+            None => (direction(random), 0.0),
+        };
+        let start = (&self.ends[end], heading);
+        let mut ray = Ray::new(end, hero, batch, start, classes);
+        (ray.at.log_rays, ray.at.log_guided) = (log_rays, log_rays);
+        let mut waiting = vec![ray];
         while let Some(mut ray) = waiting.pop() {
             while !ray.ended
                 && let Some(met) = self.leg(&mut ray, random, paths)
@@ -257,14 +274,15 @@ impl<'a> Tracing<'a> {
         random: &mut impl Rng,
         paths: &mut PathSet,
     ) {
-        match WeightWindow::fate(self.importance(ray)) {
+        let promised = (-ray.at.log_guided).exp();
+        match WeightWindow::fate(self.importance(ray) * promised) {
             // Parts of a ray that was mirrored would go the same way.
             Fate::Parts(parts) if !ray.at.mirrored => {
                 let parts = parts.min(most).max(1);
                 ray.at.log_rays -= (parts as f64).ln();
                 for _ in 1..parts {
                     let mut part = ray.split_off(paths);
-                    part.at.set_out(met.normal, random);
+                    part.at.set_out(met.normal, self.guides[ray.walk.hero].as_ref(), random);
                     waiting.push(part);
                 }
             }
@@ -302,7 +320,7 @@ impl<'a> Tracing<'a> {
         at.ways = met.ways;
         at.ways.scattered_on(area_m2);
         at.ever_scattered = true;
-        at.set_out(met.normal, random);
+        at.log_guided = 0.0;
         let there = &self.ends[1 - ray.end];
         let line = sub(there.centre, at.origin);
         let distance_m = norm(line);
@@ -319,5 +337,6 @@ impl<'a> Tracing<'a> {
             let log_weight = self.log_share() + log_spread - at.mixture.log_density();
             ray.push(length_m, log_weight, scale(line, -1.0 / distance_m), paths);
         }
+        ray.at.set_out(met.normal, self.guides[ray.walk.hero].as_ref(), random);
     }
 }

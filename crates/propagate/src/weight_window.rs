@@ -115,6 +115,16 @@ impl WeightWindow {
         (0..self.bands).map(of).sum::<f64>() / self.bands as f64
     }
 
+    /// Nepers of energy by octave that rays lose on each metre, in the later half of the way.
+    pub fn late_loss_per_m(&self) -> [f64; MAX_BANDS] {
+        let last = self.ln_mean.len() - 1;
+        let from = last / 2;
+        std::array::from_fn(|band| {
+            (self.ln_mean[from][band] - self.ln_mean[last][band])
+                / ((last - from).max(1) as f64 * self.step_m)
+        })
+    }
+
     /// Whether a ray of this importance is to be split.
     pub fn is_above(importance: f64) -> bool {
         importance > *WINDOW.end()

@@ -3,46 +3,55 @@
 use sabine_paths::{Conditions, Propagator};
 use sabine_propagate::{PathTracer, TracerConfig};
 use sabine_testkit::{PolyhedralConfig, PolyhedralRoom, Polyhedron};
+use std::time::Instant;
 
 const SPAN_S: f64 = 0.05;
 /// Largest difference in dB of what all receivers hear together, down to so many dB below all that arrives.
 const ALLOWED_DB: [(f64, f64); 2] = [(-30.0, 0.15), (-40.0, 0.25)];
+
+/// What all receivers hear together, `[band][span]`.
+type Heard = Vec<Vec<f64>>;
+
+/// By the particles of the laboratory.
+fn counted(laboratory: &PolyhedralRoom) -> Heard {
+    let each = (SPAN_S / PolyhedralRoom::BIN_S) as usize;
+    let energies = laboratory.energies();
+    let spans =
+        |bins: &[f64]| -> Vec<f64> { bins.chunks_exact(each).map(|span| span.iter().sum()).collect() };
+    let mut heard = vec![vec![0.0; energies[0][0].len() / each]; energies[0].len()];
+    for of_receiver in &energies {
+        for (sums, bins) in heard.iter_mut().zip(of_receiver) {
+            sums.iter_mut().zip(spans(bins)).for_each(|(sum, e)| *sum += e);
+        }
+    }
+    heard
+}
+
+/// By rays, at true absorption; each receiver has rays of its own.
+fn traced(laboratory: &PolyhedralRoom, spans: usize, config: &TracerConfig) -> Heard {
+    let materials = laboratory.true_materials().unwrap();
+    let (source, air) = (laboratory.source(), laboratory.air());
+    let mut heard = vec![vec![0.0; spans]; materials[0].bands().len()];
+    for (index, receiver) in laboratory.receivers().iter().enumerate() {
+        let (seed, duration_s) = (config.seed + index as u64, spans as f64 * SPAN_S);
+        let tracer = PathTracer::new(TracerConfig { seed, duration_s, ..config.clone() }).unwrap();
+        let paths = tracer.trace(laboratory.scene(), source, receiver, &air, &()).unwrap();
+        let response = paths.energy_response(&Conditions::new(&materials, &air), SPAN_S).unwrap();
+        for (band, sums) in heard.iter_mut().enumerate() {
+            sums.iter_mut().zip(response.band(band)).for_each(|(sum, e)| *sum += e);
+        }
+    }
+    heard
+}
 
 #[test]
 fn late_sound_is_that_of_particles() {
     for shape in [Polyhedron::SlopedCeiling, Polyhedron::Furnished] {
         let config = PolyhedralConfig { seed: 5551, shape, ..PolyhedralConfig::default() };
         let laboratory = PolyhedralRoom::new(config).unwrap();
-        let materials = laboratory.true_materials().unwrap();
-        let bands = materials[0].bands();
-        let spans = |bins: &[f64]| -> Vec<f64> {
-            let each = (SPAN_S / PolyhedralRoom::BIN_S) as usize;
-            bins.chunks_exact(each).map(|span| span.iter().sum()).collect()
-        };
-        let energies = laboratory.energies();
-        let count = spans(&energies[0][0]).len();
-        let mut counted = vec![vec![0.0; count]; bands.len()];
-        for of_receiver in &energies {
-            for (sums, bins) in counted.iter_mut().zip(of_receiver) {
-                sums.iter_mut().zip(spans(bins)).for_each(|(sum, e)| *sum += e);
-            }
-        }
-        let mut traced = vec![vec![0.0; count]; bands.len()];
-        let (source, air) = (laboratory.source(), laboratory.air());
-        for (index, receiver) in laboratory.receivers().iter().enumerate() {
-            let config = TracerConfig {
-                rays: 40_000,
-                seed: index as u64,
-                duration_s: count as f64 * SPAN_S,
-                ..TracerConfig::default()
-            };
-            let tracer = PathTracer::new(config).unwrap();
-            let paths = tracer.trace(laboratory.scene(), source, receiver, &air, &()).unwrap();
-            let response = paths.energy_response(&Conditions::new(&materials, &air), SPAN_S).unwrap();
-            for (band, sums) in traced.iter_mut().enumerate() {
-                sums.iter_mut().zip(response.band(band)).for_each(|(sum, e)| *sum += e);
-            }
-        }
+        let counted = counted(&laboratory);
+        let config = TracerConfig { rays: 40_000, ..TracerConfig::default() };
+        let traced = traced(&laboratory, counted[0].len(), &config);
         for (band, (counted, traced)) in counted.iter().zip(&traced).enumerate() {
             let whole: f64 = counted.iter().sum();
             for (span, (particles, rays)) in counted.iter().zip(traced).enumerate() {
@@ -56,6 +65,60 @@ fn late_sound_is_that_of_particles() {
                     );
                 }
             }
+        }
+    }
+}
+
+/// Prints how far late sound lies off that of particles, with guided directions and without, in rooms of a seed of their own.
+#[test]
+#[ignore = "figures for docs/validation/propagate.md"]
+fn late_sound_with_guided_directions() {
+    let first = std::env::var("SABINE_SEED").map_or(1, |seed| seed.parse().unwrap());
+    println!(
+        "| room | below all that arrives (dB) | off without (dB) | off with (dB) | time, with over without |"
+    );
+    let shapes = [Polyhedron::L, Polyhedron::SlopedCeiling, Polyhedron::Wedge, Polyhedron::Furnished];
+    for (shape, seed) in shapes.into_iter().flat_map(|shape| [(shape, first), (shape, first + 1)]) {
+        let config = PolyhedralConfig { seed, shape, ..PolyhedralConfig::default() };
+        let laboratory = PolyhedralRoom::new(config).unwrap();
+        let counted = counted(&laboratory);
+        let run = |path_guiding: bool| {
+            let started = Instant::now();
+            let all: Vec<Heard> = (0..8)
+                .map(|seed| {
+                    let config = TracerConfig {
+                        rays: 3_000,
+                        seed: 1000 * seed,
+                        path_guiding,
+                        ..TracerConfig::default()
+                    };
+                    traced(&laboratory, counted[0].len(), &config)
+                })
+                .collect();
+            (all, started.elapsed().as_secs_f64())
+        };
+        let ((without, without_s), (with, with_s)) = (run(false), run(true));
+        for (from_db, to_db) in [(0.0, -10.0), (-10.0, -20.0), (-20.0, -30.0), (-30.0, -40.0)] {
+            let off_db = |traced: &[Heard]| {
+                let (mut sum, mut count) = (0.0, 0.0);
+                for (band, counted) in counted.iter().enumerate() {
+                    let whole: f64 = counted.iter().sum();
+                    for (span, particles) in counted.iter().enumerate() {
+                        let level_db = 10.0 * (particles / whole).log10();
+                        if level_db <= from_db && level_db > to_db {
+                            let off = |heard: &Heard| 10.0 * (heard[band][span] / particles).log10();
+                            sum += traced.iter().map(|heard| off(heard).powi(2)).sum::<f64>();
+                            count += traced.len() as f64;
+                        }
+                    }
+                }
+                f64::sqrt(sum / count)
+            };
+            let (without_db, with_db, times) = (off_db(&without), off_db(&with), with_s / without_s);
+            println!(
+                "| {shape:?} {seed} | {:.0} to {:.0} | {without_db:.2} | {with_db:.2} | {times:.2} |",
+                -from_db, -to_db
+            );
         }
     }
 }
