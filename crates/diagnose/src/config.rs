@@ -86,8 +86,6 @@ impl DiagnoseConfig {
             image_order: self.image_order,
             cuboid_paths: CUBOID_PATHS,
             allow_leaks: self.allow_leaks,
-            // Rates of right and wrong names are those of rays that nothing guides.
-            path_guiding: false,
             ..TracerConfig::default()
         }
     }

@@ -6,10 +6,12 @@
 //! directions is drawn by what they promise, and a ray stands for more or fewer by the ratio of the densities: every sum stays right on
 //! average, with any absorption (importance sampling; for light, path guiding: Vorba et al., ACM Transactions on Graphics 33, 2014).
 
+use crate::event_mixture::EventProbabilities;
+use crate::mesh_scene::MeshScene;
 use crate::random::{direction, generator, lambert};
 use crate::vector::{Vec3, dot, mirror, norm, scale};
 use crate::walk::{before_hit, next_hit};
-use crate::weight_window::{MAX_BANDS, PilotScene};
+use crate::weight_window::{KeptEnergy, MAX_BANDS};
 use rand::Rng;
 use std::f64::consts::PI;
 
@@ -31,6 +33,17 @@ const MUCH: f64 = 30.0;
 /// Turns a seed into that of the guide.
 const GUIDE: u64 = 0x6775_6964_6500;
 
+/// A scene as the guide sees it.
+#[derive(Clone, Copy)]
+pub(crate) struct GuidedScene<'a> {
+    pub mesh: &'a MeshScene,
+    /// By material.
+    pub ln_kept: &'a KeptEnergy,
+    /// Octaves, or the first [`MAX_BANDS`] of more.
+    pub bands: usize,
+    pub probabilities: &'a EventProbabilities,
+}
+
 /// Which directions keep their energy for long, in the mean over the surfaces.
 #[derive(Debug)]
 pub(crate) struct Guide {
@@ -45,18 +58,19 @@ pub(crate) struct Guide {
 }
 
 impl Guide {
-    /// Follows a mirrored ray in each direction, from `from` and from surfaces that a ray from there comes to. `loss_per_m` is what the room
-    /// as a whole loses, in nepers of energy by octave. None where hardly any direction stands out.
+    /// A guide for each class of octaves. Follows a mirrored ray in each direction, from `from` and from surfaces that a ray from there comes
+    /// to. `loss_per_m` is what the room as a whole loses, in nepers of energy by octave. None where hardly any direction stands out.
     pub fn learn(
-        scene: PilotScene<'_>,
+        scene: GuidedScene<'_>,
         loss_per_m: &[f64; MAX_BANDS],
         from: Vec3,
         max_length_m: f64,
         seed: u64,
-    ) -> Option<Self> {
+    ) -> Vec<Option<Self>> {
         let mut random = generator(seed ^ GUIDE, 0);
         let (mut origin, mut normal) = (from, None);
-        let mut promises = Vec::with_capacity(CELLS);
+        let classes = scene.probabilities.classes();
+        let mut promises = vec![vec![0.0; CELLS]; classes];
         for cell in 0..CELLS {
             let mut heading = in_cell(cell, &mut random);
             let turned = match normal {
@@ -66,7 +80,8 @@ impl Guide {
             if turned {
                 heading = scale(heading, -1.0);
             }
-            promises.push(promise(scene, loss_per_m, (origin, heading), max_length_m, &mut random));
+            let brought = brought(scene, loss_per_m, (origin, heading), max_length_m, &mut random);
+            promises.iter_mut().zip(brought).for_each(|(promises, brought)| promises[cell] = brought);
             // On to the next surface.
             let mut onward = match normal {
                 Some(normal) => lambert(&mut random, normal),
@@ -77,7 +92,8 @@ impl Guide {
                 normal = Some(scene.mesh.surfaces.triangles[hit.triangle as usize].normal_against(onward));
             }
         }
-        Self::of_promises(&promises, random.random())
+        let offset = random.random();
+        promises.iter().map(|promises| Self::of_promises(promises, offset)).collect()
     }
 
     /// Draws each cell as it exceeds what is usual.
@@ -109,7 +125,7 @@ impl Guide {
             Some(drawn) if dot(drawn, normal) < 0.0 => scale(drawn, -1.0),
             Some(drawn) => drawn,
         };
-        // Half of the directions of a cell point away from any surface: both ways lie on one side.
+        // Of a direction and its opposite one is on this side, and has the chance of both.
         (heading, self.log_rays(dot(heading, normal) / PI, self.density(heading)))
     }
 
@@ -151,15 +167,17 @@ impl Guide {
 }
 
 /// Energy that a ray brings to the surfaces that scatter it next, in units of what the room as a whole keeps until then: over all mirrors,
-/// mean over the octaves.
-fn promise(
-    scene: PilotScene<'_>,
+/// mean over the octaves, for each class of octaves by its scattering.
+fn brought(
+    scene: GuidedScene<'_>,
     loss_per_m: &[f64; MAX_BANDS],
     (mut origin, mut heading): (Vec3, Vec3),
     max_length_m: f64,
     random: &mut impl Rng,
-) -> f64 {
-    let (mut carried, mut travelled_m, mut brought) = ([1.0f64; MAX_BANDS], 0.0, 0.0);
+) -> Vec<f64> {
+    let classes = scene.probabilities.classes();
+    let (mut carried, mut travelled_m) = ([1.0f64; MAX_BANDS], 0.0);
+    let (mut mirrored, mut brought) = (vec![1.0f64; classes], vec![0.0; classes]);
     while travelled_m < max_length_m {
         let Some(hit) = next_hit(scene.mesh, origin, &mut heading, random) else { break };
         travelled_m += hit.distance;
@@ -168,13 +186,15 @@ fn promise(
         for ((carried, ln_kept), loss_per_m) in carried.iter_mut().zip(ln_kept).zip(loss_per_m) {
             *carried = (*carried * (ln_kept + loss_per_m * hit.distance).exp()).min(MUCH);
         }
-        let scattering = (scene.scattering)(surface.material);
         let left = carried[..scene.bands].iter().sum::<f64>() / scene.bands as f64;
-        brought += scattering * left;
-        if left < LITTLE {
+        for (class, (mirrored, brought)) in mirrored.iter_mut().zip(&mut brought).enumerate() {
+            let scattering = scene.probabilities.scattering(surface.material, class);
+            *brought += scattering * left * *mirrored;
+            *mirrored *= 1.0 - scattering;
+        }
+        if left * mirrored.iter().copied().fold(0.0, f64::max) < LITTLE {
             break;
         }
-        carried.iter_mut().for_each(|carried| *carried *= 1.0 - scattering);
         origin = before_hit(origin, heading, hit.distance);
         heading = mirror(heading, surface.normal);
     }
@@ -206,9 +226,8 @@ fn cell_of(heading: Vec3) -> (usize, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh_scene::MeshScene;
     use crate::vector::unit;
-    use crate::weight_window::{KeptEnergy, ln_kept};
+    use crate::weight_window::ln_kept;
     use sabine_acoustics::{Bands, Material};
     use sabine_scene::Scene;
 
@@ -219,12 +238,13 @@ mod tests {
         let scene = Scene::shoebox([6.0, 5.0, 3.0], faces).unwrap();
         let kept: KeptEnergy = ln_kept(scene.materials().iter().map(|m| &m.material));
         let mesh = MeshScene::new(&scene).unwrap();
-        let pilot = PilotScene { mesh: &mesh, ln_kept: &kept, bands: 1, scattering: &|_| scattering };
+        let probabilities = EventProbabilities::new(scene.materials().iter().map(|m| &m.material));
+        let guided = GuidedScene { mesh: &mesh, ln_kept: &kept, bands: 1, probabilities: &probabilities };
         // Half of what Eyring's formula gives, as where late sound lives long.
         let (area_m2, volume_m3) = (126.0, 90.0);
         let mean = (66.0 * walls + 60.0 * floor_and_ceiling) / area_m2;
         let loss_per_m = -0.5 * area_m2 * f64::ln(1.0 - mean) / (4.0 * volume_m3);
-        Guide::learn(pilot, &[loss_per_m; MAX_BANDS], [2.0, 1.5, 1.2], 150.0, 3)
+        Guide::learn(guided, &[loss_per_m; MAX_BANDS], [2.0, 1.5, 1.2], 150.0, 3).remove(0)
     }
 
     #[test]

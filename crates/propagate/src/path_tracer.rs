@@ -50,7 +50,8 @@ pub struct TracerConfig {
     pub weight_window: bool,
     /// Draws up to a quarter of all directions, at both ends and where rays scatter, by how long sound stays in them with the scene's
     /// materials: to and fro between hard walls while the rest of the room falls silent (path guiding). Only with
-    /// [`TracerConfig::weight_window`]; paths hold for any absorption all the same.
+    /// [`TracerConfig::weight_window`]; paths hold for any absorption all the same. Off unless switched on: it pays where a few surfaces are
+    /// hard, the rest soft and little is scattered, and takes time elsewhere.
     pub path_guiding: bool,
     /// Adds the ways around one edge where the direct line is blocked ([`DiffractingEdges`](crate::DiffractingEdges)), so that a
     /// screen casts a shadow and not a black hole.
@@ -74,7 +75,7 @@ impl Default for TracerConfig {
             cuboid_paths: 0,
             receiver_radius_m: 0.5,
             weight_window: true,
-            path_guiding: true,
+            path_guiding: false,
             diffraction: false,
             merge_coplanar: true,
             allow_leaks: false,

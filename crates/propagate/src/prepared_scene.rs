@@ -3,7 +3,7 @@
 use crate::cuboid::{Cuboid, ImageSource};
 use crate::edge_diffraction::DiffractingEdges;
 use crate::event_mixture::EventProbabilities;
-use crate::guide::Guide;
+use crate::guide::{Guide, GuidedScene};
 use crate::mesh_scene::MeshScene;
 use crate::patches::Patches;
 use crate::weight_window::{KeptEnergy, MAX_BANDS, PilotScene, WeightWindow, ln_kept};
@@ -74,19 +74,17 @@ impl PreparedScene {
         WeightWindow::pilot(scene, from, max_length_m, rays, seed)
     }
 
-    /// Directions from surfaces in which sound stays for long, where it is scattered as in a class of octaves.
-    pub(crate) fn guide(
+    /// Directions in which sound stays for long, for each class of octaves.
+    pub(crate) fn guides(
         &self,
-        hero: usize,
-        loss_per_m: &[f64; MAX_BANDS],
+        window: &WeightWindow,
         from: [f64; 3],
         max_length_m: f64,
         seed: u64,
-    ) -> Option<Guide> {
-        let scattering = |material| self.probabilities.scattering(material, hero);
+    ) -> Vec<Option<Guide>> {
         let (mesh, ln_kept, bands) = (&self.mesh, &self.ln_kept, self.bands);
-        let scene = PilotScene { mesh, ln_kept, bands, scattering: &scattering };
-        Guide::learn(scene, loss_per_m, from, max_length_m, seed)
+        let scene = GuidedScene { mesh, ln_kept, bands, probabilities: &self.probabilities };
+        Guide::learn(scene, &window.late_loss_per_m(), from, max_length_m, seed)
     }
 
     /// The material (index) of each of the six faces, where the mesh is a cuboid: six whole faces at right angles, each of one material, and

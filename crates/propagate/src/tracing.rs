@@ -53,11 +53,12 @@ impl<'a> Tracing<'a> {
         let window =
             |end: usize| scene.weight_window(ends_m[end], max_length_m, pairs, config.seed ^ end as u64);
         let windows = config.weight_window.then(|| [window(SOURCE), window(RECEIVER)]);
-        let guide = |hero: usize| {
-            let window = &windows.as_ref().filter(|_| config.path_guiding)?[SOURCE];
-            scene.guide(hero, &window.late_loss_per_m(), ends_m[SOURCE], max_length_m, config.seed)
+        let guides = match &windows {
+            Some(windows) if config.path_guiding => {
+                scene.guides(&windows[SOURCE], ends_m[SOURCE], max_length_m, config.seed)
+            }
+            _ => (0..scene.probabilities.classes()).map(|_| None).collect(),
         };
-        let guides = (0..scene.probabilities.classes()).map(guide).collect();
         Self {
             scene,
             max_length_m,

@@ -27,8 +27,7 @@ fn uneven_box() -> Scene {
 }
 
 fn traced(scene: &Scene, weight_window: bool, rays: usize, seed: u64) -> PathSet {
-    let path_guiding = false;
-    traced_with(scene, TracerConfig { rays, seed, weight_window, path_guiding, ..Default::default() })
+    traced_with(scene, TracerConfig { rays, seed, weight_window, ..Default::default() })
 }
 
 fn traced_with(scene: &Scene, config: TracerConfig) -> PathSet {
@@ -109,7 +108,10 @@ fn energies_are_those_of_rays_that_nothing_guides() {
         })
         .collect();
     let plain = traced(&scene, true, 200_000, 21);
-    let guided = traced_with(&scene, TracerConfig { rays: 100_000, seed: 22, ..Default::default() });
+    let guided = traced_with(
+        &scene,
+        TracerConfig { rays: 100_000, seed: 22, path_guiding: true, ..Default::default() },
+    );
     for (name, materials) in [("own", &own), ("other", &other)] {
         for band in 0..2 {
             for range in RANGES {
@@ -145,10 +147,22 @@ fn late_energy_between_hard_walls_hangs_on_more_rays() {
     println!("late variance divided by {gain:.1}, early multiplied by {loss:.2}");
 }
 
-/// Prints what the weight window does to time and precision: variance times time without it over that with it.
 #[test]
 #[ignore = "figures for docs/validation/propagate.md"]
 fn precision_in_the_same_time() {
+    let with = TracerConfig { rays: 20_000, duration_s: 2.0, seed: 3, ..Default::default() };
+    print_precision(&TracerConfig { weight_window: false, ..with.clone() }, &with);
+}
+
+#[test]
+#[ignore = "figures for docs/validation/propagate.md"]
+fn precision_with_guided_directions_in_the_same_time() {
+    let without = TracerConfig { rays: 20_000, duration_s: 2.0, seed: 3, ..Default::default() };
+    print_precision(&without, &TracerConfig { path_guiding: true, ..without.clone() });
+}
+
+/// Prints what a setting does to time and precision: variance times time without it over that with it.
+fn print_precision(without: &TracerConfig, with: &TracerConfig) {
     let rooms = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/rooms"));
     let even =
         Scene::shoebox([7.0, 5.0, 3.2], std::array::from_fn(|_| material([0.1; 2], [0.3; 2]))).unwrap();
@@ -166,16 +180,8 @@ fn precision_in_the_same_time() {
         let materials = materials_of(&scene);
         let bands = materials[0].bands();
         let band = bands.iter_hz().position(|hz| hz == 1000.0).unwrap();
-        let run = |weight_window: bool| {
-            let config = TracerConfig {
-                rays: 20_000,
-                duration_s: 2.0,
-                seed: 3,
-                weight_window,
-                path_guiding: false,
-                ..Default::default()
-            };
-            let tracer = PathTracer::new(config).unwrap();
+        let run = |config: &TracerConfig| {
+            let tracer = PathTracer::new(config.clone()).unwrap();
             let prepared = tracer.prepare(&scene).unwrap();
             let trace = || {
                 let (from, to) = (source(from), receiver(to));
@@ -191,7 +197,7 @@ fn precision_in_the_same_time() {
             seconds.sort_by(f64::total_cmp);
             (trace(), seconds[2])
         };
-        let ((alone, alone_s), (windowed, windowed_s)) = (run(false), run(true));
+        let ((alone, alone_s), (windowed, windowed_s)) = (run(without), run(with));
         let all = energy(&windowed, &materials, band, 0..1990).value;
         for range in [50..100, 200..300, 400..600, 800..1000, 1200..1500] {
             let [a, b] = [&alone, &windowed].map(|paths| energy(paths, &materials, band, range.clone()));
