@@ -275,6 +275,7 @@ impl<'a> Tracing<'a> {
         random: &mut impl Rng,
         paths: &mut PathSet,
     ) {
+        // A ray that was sent for what its direction promises carries less until the promise is kept.
         let promised = (-ray.at.log_guided).exp();
         match WeightWindow::fate(self.importance(ray) * promised) {
             // Parts of a ray that was mirrored would go the same way.

@@ -74,9 +74,7 @@ fn late_sound_is_that_of_particles() {
 #[ignore = "figures for docs/validation/propagate.md"]
 fn late_sound_with_guided_directions() {
     let first: u64 = std::env::var("SABINE_SEED").map_or(1, |seed| seed.parse().unwrap());
-    println!(
-        "| room | below all that arrives (dB) | off without (dB) | off with (dB) | time, with over without |"
-    );
+    println!("| room | below all that arrives (dB) | off without (dB) | off with (dB) | times as long |");
     let shapes = [Polyhedron::L, Polyhedron::SlopedCeiling, Polyhedron::Wedge, Polyhedron::Furnished];
     for (seed, shape) in (first..).zip(shapes) {
         let config = PolyhedralConfig { seed, shape, ..PolyhedralConfig::default() };
@@ -117,7 +115,8 @@ fn late_sound_with_guided_directions() {
             let (without_db, with_db, times) = (off_db(&without), off_db(&with), with_s / without_s);
             println!(
                 "| {shape:?} {seed} | {:.0} to {:.0} | {without_db:.2} | {with_db:.2} | {times:.2} |",
-                -from_db, -to_db
+                from_db.abs(),
+                to_db.abs()
             );
         }
     }
