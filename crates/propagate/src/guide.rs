@@ -44,7 +44,7 @@ pub(crate) struct GuidedScene<'a> {
     pub probabilities: &'a EventProbabilities,
 }
 
-/// Which directions keep their energy for long, in the mean over the surfaces.
+/// Which directions keep their energy for long, averaged over the surfaces.
 #[derive(Debug)]
 pub(crate) struct Guide {
     /// Share of directions that are drawn from the cells.
@@ -129,9 +129,9 @@ impl Guide {
         (heading, self.log_rays(dot(heading, normal) / PI, self.density(heading)))
     }
 
-    /// A direction into the whole space, and the logarithm of the number of rays in all directions alike that it stands for. `turn` counts
-    /// rays of which an even share is drawn from the cells; without it chance decides, as it must for rays that are joined to such ones: both
-    /// ends of a pair would be drawn alike.
+    /// A direction into the whole space, and the logarithm of the number of uniformly distributed rays that it stands for. `turn` counts
+    /// rays of which an even share is drawn from the cells; without it chance decides, as it must for rays that are joined to such ones: else
+    /// both rays of a pair would be guided together.
     pub fn emitted(&self, turn: Option<usize>, random: &mut impl Rng) -> (Vec3, f64) {
         let guided = match turn {
             Some(turn) => {
@@ -308,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn a_room_in_which_all_directions_are_alike_has_no_guide() {
+    fn a_room_without_favoured_directions_has_no_guide() {
         assert!(learnt(0.2, 0.2, 0.6).is_none());
         assert!(learnt(0.3, 0.3, 1.0).is_none());
         // Nothing is ever scattered, so that nothing could be sent.

@@ -138,7 +138,7 @@ fn late_energy_between_hard_walls_hangs_on_more_rays() {
         let mean = all.iter().sum::<f64>() / 40.0;
         all.iter().map(|ln| (ln - mean).powi(2)).sum::<f64>() / 39.0
     };
-    // Variances from 40 seeds are known to a fifth. The decay is 20 to 40 dB down, then 0 to 10.
+    // In milliseconds. Variances from 40 seeds are known to a fifth.
     let (late, early) = (200..400, 15..60);
     let gain = scatter(false, &late) / scatter(true, &late);
     assert!(gain > 3.0, "{gain}");
