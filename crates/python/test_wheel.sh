@@ -2,8 +2,15 @@
 # Builds the wheel, installs it into a new virtual environment and runs the tests there. Skips with a message where there is no Python, or
 # where maturin and numpy cannot be installed.
 #
-#   crates/python/test_wheel.sh [FOLDER]    with a folder: builds with optimisation for users, and leaves the wheel there
+#   crates/python/test_wheel.sh             the wheel, as the nightly run does it
+#   crates/python/test_wheel.sh FOLDER      builds it with optimisation for users, and leaves it there
+#   crates/python/test_wheel.sh --module    the module without a wheel, from what the tests of the workspace have compiled, as the gate does it
 set -euo pipefail
+only_module=
+if [ "${1:-}" = --module ]; then
+    only_module=yes
+    shift
+fi
 folder=${1:+$(realpath -m "$1")}
 cd "$(dirname "$0")"
 export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/../../target}"
@@ -23,6 +30,25 @@ python=$scratch/env/bin/python
 install() {
     "$python" -m pip install --quiet --disable-pip-version-check "$@"
 }
+tests=$PWD/tests
+run_tests() {
+    # From elsewhere: what is tested is what was installed.
+    cd "$scratch"
+    "$python" -I -W error -m unittest discover --start-directory "$tests"
+}
+
+if [ -n "$only_module" ]; then
+    install 'numpy>=1.22' || skip "numpy cannot be installed"
+    # With an example, dependencies have the features that they have for tests: nothing but the module is compiled.
+    cargo build --quiet --locked --workspace --lib --example log_mel
+    module=$(ls -t "$CARGO_TARGET_DIR"/debug/{lib_sabine.so,lib_sabine.dylib} 2>/dev/null | head -n 1)
+    [ -n "$module" ] || skip "no module for this system"
+    site=$("$python" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')
+    cp -r python/sabine "$site/"
+    cp "$module" "$site/sabine/_sabine.abi3.so"
+    run_tests
+    exit
+fi
 install 'maturin>=1.7,<2' 'numpy>=1.22' || skip "maturin and numpy cannot be installed"
 
 # The profile of the tests is optimised, and quick to build after them.
@@ -40,7 +66,4 @@ echo "$(basename "$wheel"): $bytes bytes"
 [ "$bytes" -lt "$most_bytes" ] || { echo "the wheel is larger than $most_bytes bytes"; exit 1; }
 
 install --no-index --no-deps "$wheel"
-tests=$PWD/tests
-# From elsewhere: what is tested is what was installed.
-cd "$scratch"
-"$python" -I -W error -m unittest discover --start-directory "$tests"
+run_tests

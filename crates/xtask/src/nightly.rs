@@ -70,6 +70,7 @@ fn jobs(packages: &[Package], fuzz_targets: &[Target]) -> Vec<Job> {
         Job::new("every test in release, those that take long too", "bash", &["-c", EVERY_TEST]),
         Job::cargo("main example in release", &["run", "--release", "--example", "match_room"]),
         Job::new("install, and run in an empty folder", "bash", &["-c", INSTALL]),
+        Job::new("python wheel", "bash", &["crates/python/test_wheel.sh"]),
     ];
     jobs.extend(packages.iter().flat_map(feature_jobs));
     jobs.extend(least_rust_jobs(packages));

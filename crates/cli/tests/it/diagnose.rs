@@ -144,7 +144,8 @@ fn a_hidden_loudspeaker_response_is_named_and_rendered() {
     lab.write(&[Hidden::TransducerResponse { gains_db: gains_db.clone() }], &room, None).unwrap();
     let out = folder.path().join("out");
     let (room, out_name) = (room.to_str().unwrap(), out.to_str().unwrap());
-    let told = succeeds("diagnose", &["--room", room, "--out", out_name, "--hold-out", "r2,r5"]);
+    let options = ["--hold-out", "r2,r5", "--rays", "1500"];
+    let told = succeeds("diagnose", &[&["--room", room, "--out", out_name], &options[..]].concat());
     let json = checked(&out);
     let cause = &json["causes"][0];
     assert_eq!(cause["effect"], "transducer_response", "{told}");

@@ -74,8 +74,10 @@ fn reverberation_times_are_met_where_they_can_be_and_else_it_says_why() {
     let folder = tempfile::tempdir().unwrap();
     for objective in ["edc", "paper", "li2018"] {
         let out = folder.path().join(objective);
+        // Times are asked of the first alone.
+        let rays = if objective == "edc" { "500" } else { "50" };
         // Air alone ends the decay at 8 kHz sooner than 2.2 s.
-        let arguments = ["--t60=0.5,0.5,0.4,0.4,0.4,0.4,2.2", "--rays", "500", "--objective", objective];
+        let arguments = ["--t60=0.5,0.5,0.4,0.4,0.4,0.4,2.2", "--rays", rays, "--objective", objective];
         let output = run(&[&arguments[..], &["--out", out.to_str().unwrap()]].concat());
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let result: Value = serde_json::from_slice(&std::fs::read(out.join("fit.json")).unwrap()).unwrap();

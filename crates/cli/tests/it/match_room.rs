@@ -151,7 +151,7 @@ fn the_same_seed_gives_the_same_sound_on_any_number_of_threads() {
         let out = folder.path().join(format!("{threads}-{seed}"));
         let output = sabine("match")
             .env("RAYON_NUM_THREADS", threads)
-            .args(["--seed", seed, "--out", out.to_str().unwrap()])
+            .args(["--seed", seed, "--rays", "2000", "--out", out.to_str().unwrap()])
             .output()
             .unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -3,7 +3,7 @@
 //! The rooms and their physics are those of `sabine_testkit`, which shares no code with the tracer or the diagnosis.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
-use crate::rivals::diagnoser_among;
+use crate::rivals::{at_night, diagnoser_among};
 use sabine_acoustics::{Bands, FilterBank, ImpulseResponse};
 use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, ExtendedModel, Verdict};
 use sabine_paths::{Conditions, Propagator};
@@ -29,13 +29,15 @@ pub(crate) fn diagnose_among(lab: &Laboratory, hidden: &[Hidden], effects: &[&st
     diagnose_by(&diagnoser_among(few_rays(), effects), lab, hidden)
 }
 
-fn diagnose_by(diagnoser: &Diagnoser, lab: &Laboratory, hidden: &[Hidden]) -> Diagnosis {
+pub(crate) fn diagnose_by(diagnoser: &Diagnoser, lab: &Laboratory, hidden: &[Hidden]) -> Diagnosis {
     let folder = tempfile::tempdir().unwrap();
     let room = lab.write(hidden, &folder.path().join("room"), None).unwrap();
     diagnoser.diagnose(&room, &[], &()).unwrap()
 }
 
-/// What moves arrival times.
+/// What moves arrival times, and can pass for each other.
+const NEAR_TIMES: [&str; 4] = ["time_zero", "sound_speed", "position_error", "room_dimensions"];
+/// All that moves arrival times.
 pub(crate) const ON_TIMES: [&str; 8] = [
     "time_zero",
     "sound_speed",
@@ -57,7 +59,7 @@ const ON_DECAYS: [&str; 7] = [
     "transducer_response",
 ];
 /// What changes levels by direction or channel.
-const ON_LEVELS: [&str; 6] = [
+pub(crate) const ON_LEVELS: [&str; 6] = [
     "source_directivity",
     "receiver_directivity",
     "channel_response",
@@ -84,7 +86,8 @@ fn holds(cause: &sabine_diagnose::Cause, parameter: &str, truth: f64) {
 
 #[test]
 fn a_room_without_effects_is_adequate() {
-    for seed in [501, 502] {
+    let seeds: &[u64] = if at_night() { &[501, 502] } else { &[501] };
+    for &seed in seeds {
         let found = diagnose(&lab(seed), &[]);
         assert_eq!(
             found.verdict,
@@ -103,14 +106,14 @@ fn a_room_without_effects_is_adequate() {
 
 #[test]
 fn a_latency_is_found() {
-    let found = diagnose_among(&lab(511), &[Hidden::TimeZero { latency_s: 4e-3 }], &ON_TIMES);
+    let found = diagnose_among(&lab(511), &[Hidden::TimeZero { latency_s: 4e-3 }], &NEAR_TIMES);
     holds(&only_cause(&found, "time_zero"), "latency", 4.0);
 }
 
 #[test]
 fn another_temperature_is_found() {
     let lab = lab(512);
-    let found = diagnose_among(&lab, &[Hidden::SoundSpeed { temperature_offset_k: 8.0 }], &ON_TIMES);
+    let found = diagnose_among(&lab, &[Hidden::SoundSpeed { temperature_offset_k: 8.0 }], &NEAR_TIMES);
     let cause = only_cause(&found, "sound_speed");
     let p = &cause.parameters[0];
     // The laboratory jitters places by 5 mm: the interval may miss by little.
@@ -122,7 +125,7 @@ fn a_source_that_stands_elsewhere_is_found() {
     let lab = lab(513);
     let hidden = Hidden::random("position_error", 1.0, &lab, 513).unwrap();
     let Hidden::PositionError { index, end, offset_m } = hidden else { panic!("{hidden:?}") };
-    let found = diagnose_among(&lab, &[Hidden::PositionError { end, index, offset_m }], &ON_TIMES);
+    let found = diagnose_among(&lab, &[Hidden::PositionError { end, index, offset_m }], &NEAR_TIMES);
     let cause = only_cause(&found, "position_error");
     for (p, truth) in cause.parameters.iter().zip(offset_m) {
         assert!((p.value - truth).abs() < 0.03, "{p:?} {truth}");
@@ -131,7 +134,8 @@ fn a_source_that_stands_elsewhere_is_found() {
 
 #[test]
 fn a_room_of_other_size_is_found() {
-    let found = diagnose_among(&lab(514), &[Hidden::RoomDimensions { scale: [1.03, 1.0, 0.975] }], &ON_TIMES);
+    let found =
+        diagnose_among(&lab(514), &[Hidden::RoomDimensions { scale: [1.03, 1.0, 0.975] }], &NEAR_TIMES);
     let cause = only_cause(&found, "room_dimensions");
     for (name, truth) in [("scale_x", 3.0), ("scale_z", -2.5)] {
         let p = cause.parameters.iter().find(|p| p.name == name).unwrap();
@@ -195,7 +199,8 @@ fn a_cut_end_is_found() {
 
 #[test]
 fn a_clock_and_a_temperature_cannot_be_told_apart() {
-    let found = diagnose(&lab(516), &[Hidden::TimeZero { latency_s: 4e-3 }]);
+    let rivals = ["time_zero", "sound_speed", "sampling_clock", "position_error"];
+    let found = diagnose_among(&lab(516), &[Hidden::TimeZero { latency_s: 4e-3 }], &rivals);
     let twins = found.isolability.iter().find(|i| i.effects == ["sound_speed", "sampling_clock"]).unwrap();
     assert!(twins.cosine > 0.99 && !twins.separable && twins.would_decide.contains("loopback"));
     let strangers = found.isolability.iter().find(|i| i.effects == ["time_zero", "sound_speed"]);
@@ -208,7 +213,8 @@ fn dry_air_is_found() {
     let lab = Laboratory::new(LabConfig { seed: 45, ..LabConfig::default() }).unwrap();
     let hidden = Hidden::random("air_absorption", 1.0, &lab, 45).unwrap();
     let Hidden::AirAbsorption { relative_humidity_percent } = hidden else { panic!("{hidden:?}") };
-    let cause = only_cause(&diagnose_among(&lab, &[hidden], &ON_DECAYS), "air_absorption");
+    let rivals = ["air_absorption", "transducer_response", "surface_absorption"];
+    let cause = only_cause(&diagnose_among(&lab, &[hidden], &rivals), "air_absorption");
     holds(&cause, "relative_humidity", relative_humidity_percent);
 }
 
@@ -248,7 +254,7 @@ fn a_material_that_is_another_is_found() {
     let lab = lab(524);
     let hidden = Hidden::random("surface_absorption", 1.0, &lab, 524).unwrap();
     let Hidden::SurfaceAbsorption { material, .. } = hidden else { panic!("{hidden:?}") };
-    let cause = only_cause(&diagnose(&lab, &[hidden]), "surface_absorption");
+    let cause = only_cause(&diagnose_among(&lab, &[hidden], &ON_DECAYS), "surface_absorption");
     assert_eq!(cause.subject.as_deref(), Some(lab.scene().materials()[material].name.as_str()));
 }
 
@@ -256,7 +262,7 @@ fn a_material_that_is_another_is_found() {
 fn noise_is_found() {
     let lab = lab(525);
     let hidden = Hidden::random("background_noise", 1.0, &lab, 525).unwrap();
-    only_cause(&diagnose(&lab, &[hidden]), "background_noise");
+    only_cause(&diagnose_among(&lab, &[hidden], &ON_DECAYS), "background_noise");
 }
 
 #[test]
@@ -286,7 +292,8 @@ fn a_loudspeaker_that_is_not_flat_is_found() {
 #[test]
 fn faults_of_single_channels_are_found() {
     let lab = lab(528);
-    for (kind, subject) in [("polarity", "polarity"), ("gain", "gain"), ("swap", "exchanged")] {
+    let kinds = [("swap", "exchanged"), ("polarity", "polarity"), ("gain", "gain")];
+    for (kind, subject) in kinds.into_iter().take(if at_night() { 3 } else { 1 }) {
         let hidden = Hidden::random(&format!("channel_fault.{kind}"), 1.0, &lab, 528).unwrap();
         let found = diagnose_among(&lab, &[hidden], &ON_LEVELS);
         let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();

@@ -11,8 +11,18 @@ use sabine_testkit::{Hidden, LabConfig, Laboratory};
 /// for 5.5: it would hang on the rays.
 const HIDDEN_DB: f64 = 10.0;
 
-fn room(hidden: &[Hidden]) -> (tempfile::TempDir, MeasuredRoom) {
-    let lab = Laboratory::new(LabConfig { seed: 24_110, receivers: 8, ..LabConfig::default() }).unwrap();
+fn config() -> LabConfig {
+    LabConfig { seed: 24_110, receivers: 8, ..LabConfig::default() }
+}
+
+/// Where nothing is hidden that octaves must tell.
+fn in_few_octaves() -> LabConfig {
+    let bands = Bands::octaves(500.0, 4000.0).unwrap();
+    LabConfig { bands, sample_rate_hz: 16_000, ..config() }
+}
+
+fn room(config: LabConfig, hidden: &[Hidden]) -> (tempfile::TempDir, MeasuredRoom) {
+    let lab = Laboratory::new(config).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let room = lab.write(hidden, &folder.path().join("room"), None).unwrap();
     (folder, room)
@@ -61,9 +71,10 @@ fn diagnose(room: &MeasuredRoom, laws: Vec<Law>) -> Result<Diagnosis, Error> {
 }
 
 #[test]
+#[ignore = "nightly: minutes, and the_law_of_absorption_by_angle_finds_the_material is not ignored"]
 fn a_hidden_law_is_named_with_its_size_and_rendered() {
     let hidden = Hidden::GrazingAbsorption { material: 0, db: HIDDEN_DB, from_hz: 1000.0 };
-    let (_folder, room) = room(&[hidden]);
+    let (_folder, room) = room(config(), &[hidden]);
     let id = format!("grazing_{}", room.scene().materials()[0].name);
     let found = diagnose(&room, laws(&room)).unwrap();
     let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
@@ -87,7 +98,7 @@ fn a_hidden_law_is_named_with_its_size_and_rendered() {
 #[test]
 fn a_room_with_a_hidden_law_is_not_called_adequate() {
     let hidden = Hidden::GrazingAbsorption { material: 0, db: HIDDEN_DB, from_hz: 1000.0 };
-    let (_folder, room) = room(&[hidden]);
+    let (_folder, room) = room(config(), &[hidden]);
     let found = diagnose(&room, Vec::new()).unwrap();
     assert_eq!(found.verdict, Verdict::Unexplained, "{:?} {:?}", found.causes, found.lack_of_fit);
     let test = found.lack_of_fit.tests.iter().find(|test| test.name.contains("go with a quantity")).unwrap();
@@ -101,9 +112,10 @@ fn a_room_with_a_hidden_law_is_not_called_adequate() {
 
 /// Nobody wrote the law: the quantity that it goes with is found, and how much of it there is. With 1,000 rays the law falls.
 #[test]
+#[ignore = "nightly: minutes, and levels_that_go_with_the_order_of_recording_are_a_law is not ignored"]
 fn what_a_hidden_law_goes_with_is_discovered() {
     let hidden = Hidden::GrazingAbsorption { material: 0, db: HIDDEN_DB, from_hz: 1000.0 };
-    let (_folder, room) = room(&[hidden]);
+    let (_folder, room) = room(config(), &[hidden]);
     // No cause stands, and so the search begins by itself.
     let diagnoser = diagnoser(Vec::new(), 3000).unwrap().discovering_if_needed();
     let found = diagnoser.diagnose(&room, &[], &()).unwrap();
@@ -130,15 +142,7 @@ fn what_a_hidden_law_goes_with_is_discovered() {
 /// The loudspeaker warms up over the recordings, whose order is stated.
 #[test]
 fn levels_that_go_with_the_order_of_recording_are_a_law() {
-    let bands = Bands::octaves(500.0, 4000.0).unwrap();
-    let config = LabConfig {
-        seed: 24_110,
-        receivers: 12,
-        bands,
-        sample_rate_hz: 16_000,
-        recording_order: true,
-        ..LabConfig::default()
-    };
+    let config = LabConfig { receivers: 12, recording_order: true, ..in_few_octaves() };
     let folder = tempfile::tempdir().unwrap();
     let hidden = Hidden::WarmingLoudspeaker { final_db: 6.0, time_constant: 3.0 };
     let lab = Laboratory::new(config).unwrap();
@@ -158,12 +162,7 @@ fn levels_that_go_with_the_order_of_recording_are_a_law() {
 
 #[test]
 fn where_no_law_is_at_work_none_is_named() {
-    // Fewer octaves than where a law is hidden: a search that finds nothing ends as it does in many.
-    let bands = Bands::octaves(500.0, 4000.0).unwrap();
-    let config =
-        LabConfig { seed: 24_110, receivers: 8, bands, sample_rate_hz: 16_000, ..LabConfig::default() };
-    let folder = tempfile::tempdir().unwrap();
-    let room = Laboratory::new(config).unwrap().write(&[], &folder.path().join("room"), None).unwrap();
+    let (_folder, room) = room(in_few_octaves(), &[]);
     let found = diagnoser(laws(&room), 1000).unwrap().discovering().diagnose(&room, &[], &()).unwrap();
     assert_eq!(found.verdict, Verdict::Adequate, "{:?}", found.causes);
     assert!(found.causes.is_empty() && found.model.causes.is_empty() && found.laws.is_empty());
@@ -204,8 +203,10 @@ fn would_be_seen(room: &MeasuredRoom, search: &LawSearch) {
 
 #[test]
 fn laws_that_cannot_be_weighed_say_why() {
-    let (_folder, room) = room(&[]);
-    let said = |law: Law| diagnose(&room, vec![law]).unwrap_err().to_string();
+    // What cannot be weighed shows in any room: this one is small.
+    let (_folder, room) = room(LabConfig { receivers: 2, ..config() }, &[]);
+    let diagnose = |laws: Vec<Law>| diagnoser(laws, 200)?.diagnose(&room, &[], &());
+    let said = |law: Law| diagnose(vec![law]).unwrap_err().to_string();
     let late = Law::new(
         "late",
         LawTarget::Delay,
@@ -238,5 +239,5 @@ fn laws_that_cannot_be_weighed_say_why() {
         said(second_decay([0.0, 2.0])),
         "law `second`: with l = -40, t = 0 it has no value at 125 Hz: narrow the interval"
     );
-    assert!(diagnose(&room, vec![second_decay([0.5, 2.0])]).is_ok());
+    assert!(diagnose(vec![second_decay([0.5, 2.0])]).is_ok());
 }

@@ -1,7 +1,8 @@
 //! Walls that react locally, hidden in a laboratory room, are told from walls that absorb alike at all angles.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
-use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, Verdict};
+use crate::rivals::diagnoser_among;
+use sabine_diagnose::{DiagnoseConfig, Diagnosis, Verdict};
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
 
 fn diagnose(seed: u64, hidden: &[Hidden]) -> Diagnosis {
@@ -9,7 +10,8 @@ fn diagnose(seed: u64, hidden: &[Hidden]) -> Diagnosis {
     let folder = tempfile::tempdir().unwrap();
     let room = lab.write(hidden, &folder.path().join("room"), None).unwrap();
     let config = DiagnoseConfig { rays: 1000, ..DiagnoseConfig::default() };
-    Diagnoser::new(config).unwrap().diagnose(&room, &[], &()).unwrap()
+    let rivals = ["angle_dependent_absorption", "scattering", "surface_absorption"];
+    diagnoser_among(config, &rivals).diagnose(&room, &[], &()).unwrap()
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Surfaces that the mesh lacks, hidden in laboratory rooms: found from single early reflections, and not where there are none.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
+use crate::rivals::diagnoser_among;
 use sabine_acoustics::Bands;
 use sabine_diagnose::{Cause, DiagnoseConfig, Diagnoser, Diagnosis, Verdict};
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
@@ -9,9 +10,20 @@ fn lab(seed: u64, receivers: usize) -> Laboratory {
     Laboratory::new(LabConfig { seed, receivers, ..LabConfig::default() }).unwrap()
 }
 
+/// What absorbs, or reflects, as a surface does that the mesh lacks.
+const RIVALS: [&str; 7] = [
+    "extra_reflector",
+    "open_patch",
+    "surface_absorption",
+    "surface_displacement",
+    "position_error",
+    "time_zero",
+    "scattering",
+];
+
 fn diagnose(lab: &Laboratory, hidden: &[Hidden]) -> Diagnosis {
     let config = DiagnoseConfig { rays: 1000, ..DiagnoseConfig::default() };
-    diagnose_by(&Diagnoser::new(config).unwrap(), lab, hidden)
+    diagnose_by(&diagnoser_among(config, &RIVALS), lab, hidden)
 }
 
 fn diagnose_by(diagnoser: &Diagnoser, lab: &Laboratory, hidden: &[Hidden]) -> Diagnosis {

@@ -2,8 +2,9 @@
 //! unit of the mesh, and where the room lies in its coordinates.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
+use crate::rivals::diagnoser_among;
 use sabine_acoustics::{Bands, ImpulseResponse};
-use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, Verdict};
+use sabine_diagnose::{DiagnoseConfig, Diagnosis, Verdict};
 use sabine_scene::{Levels, MeasuredRoom, NamedMaterial, NewResponse, NewRoom, Scene, TimeZero};
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
 use std::path::Path;
@@ -23,10 +24,21 @@ fn lab(seed: u64) -> Laboratory {
     Laboratory::new(config).unwrap()
 }
 
+/// Of arrival times, of levels and of decays.
+const RIVALS: [&str; 7] = [
+    "position_error",
+    "time_zero",
+    "room_dimensions",
+    "source_directivity",
+    "channel_fault",
+    "surface_absorption",
+    "scattering",
+];
+
 fn diagnose(room: &MeasuredRoom) -> Diagnosis {
     let config =
         DiagnoseConfig { rays: 300, simulations: 10, wave_solutions: false, ..DiagnoseConfig::default() };
-    Diagnoser::new(config).unwrap().diagnose(room, &[], &()).unwrap()
+    diagnoser_among(config, &RIVALS).diagnose(room, &[], &()).unwrap()
 }
 
 /// The verdict, and the named causes with their subjects, in alphabetical order.
@@ -174,6 +186,7 @@ fn answer_renamed((verdict, causes): &Answer) -> Answer {
 }
 
 #[test]
+#[ignore = "nightly: seven diagnoses, and so many of a room with a cause are not ignored"]
 fn an_unaltered_room_stays_one() {
     let found = unchanged_by_what_means_nothing(&lab(561), &[]);
     assert_eq!(found.verdict, Verdict::Adequate, "{:?}", found.causes);

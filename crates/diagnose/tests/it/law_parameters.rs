@@ -1,6 +1,7 @@
 //! Laws of several parameters, of delay and of added sound, as causes: hidden by physics that knows nothing of formulas.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
+use crate::rivals::at_night;
 use sabine_diagnose::{Cause, DiagnoseConfig, Diagnoser, Diagnosis, Error};
 use sabine_paths::laws::{Law, LawParameter, LawTarget};
 use sabine_scene::MeasuredRoom;
@@ -48,6 +49,7 @@ fn only(found: &Diagnosis) -> &Cause {
 }
 
 #[test]
+#[ignore = "nightly: minutes, and shipped laws of several parameters are not ignored"]
 fn depth_and_frequency_of_a_hidden_seat_dip_are_found_together() {
     let dip = |_: &Laboratory| Hidden::SeatDip { material: 0, db: DIP_DB, f0_hz: DIP_HZ, q: DIP_Q };
     let (_folder, room, _) = room(24_110, dip);
@@ -96,7 +98,7 @@ fn classes_of_paths_give_what_all_paths_give() {
         [grazing([2.0, 2.0]), grazing([1.999, 2.001])],
         [by_azimuth("x", along, None), by_azimuth("x", &format!("{along}^k"), Some(narrow))],
     ];
-    for [all_paths, classes] in pairs {
+    for [all_paths, classes] in pairs.into_iter().take(if at_night() { 2 } else { 1 }) {
         let of = |law: Law| {
             let found = diagnose(&room, vec![law], &[], 1000).unwrap();
             let score = found.candidates.iter().find(|c| c.effect == "x").unwrap();

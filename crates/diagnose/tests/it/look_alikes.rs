@@ -2,6 +2,8 @@
 //! causes at once, which it can.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
+use crate::hidden_effects::diagnose_by;
+use crate::rivals::diagnoser_among;
 use sabine_acoustics::Bands;
 use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, Verdict};
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
@@ -11,9 +13,17 @@ fn lab(seed: u64, receivers: usize) -> Laboratory {
 }
 
 fn diagnose(lab: &Laboratory, hidden: &[Hidden], config: DiagnoseConfig) -> Diagnosis {
-    let folder = tempfile::tempdir().unwrap();
-    let room = lab.write(hidden, &folder.path().join("room"), None).unwrap();
-    Diagnoser::new(config).unwrap().diagnose(&room, &[], &()).unwrap()
+    diagnose_by(&Diagnoser::new(config).unwrap(), lab, hidden)
+}
+
+/// Weighs these effects, and all at night.
+fn diagnose_among(
+    lab: &Laboratory,
+    hidden: &[Hidden],
+    config: DiagnoseConfig,
+    effects: &[&str],
+) -> Diagnosis {
+    diagnose_by(&diagnoser_among(config, effects), lab, hidden)
 }
 
 fn few_rays() -> DiagnoseConfig {
@@ -56,7 +66,9 @@ fn a_foreign_sound_gets_no_name() {
 fn two_causes_are_both_found() {
     let lab = lab(921, 8);
     let hidden = ["time_zero", "background_noise"].map(|id| Hidden::random(id, 1.0, &lab, 921).unwrap());
-    let found = diagnose(&lab, &hidden, few_rays());
+    let rivals =
+        ["time_zero", "background_noise", "sound_speed", "position_error", "truncation", "coupled_volume"];
+    let found = diagnose_among(&lab, &hidden, few_rays(), &rivals);
     assert_eq!(found.verdict, Verdict::Explained, "{:?}", found.lack_of_fit);
     assert_eq!(named(&found), ["background_noise", "time_zero"]);
     for cause in &found.causes {
@@ -64,8 +76,9 @@ fn two_causes_are_both_found() {
     }
 }
 
-/// A clock that runs fast and air that is colder stretch all arrival times alike.
+/// A clock that runs fast and air that is colder stretch all arrival times by the same factor.
 #[test]
+#[ignore = "nightly: minutes, and the next test has the same set beside a loudspeaker"]
 fn a_clock_and_a_temperature_come_as_a_set() {
     let lab = lab(931, 24);
     // Places are as good as the laboratory's are: 5 mm.
@@ -110,7 +123,8 @@ fn a_loudspeaker_is_named_beside_a_set_of_a_clock_and_a_temperature() {
 fn some_scattering_is_told_from_walls_that_react_locally() {
     let lab = lab(5000, 12);
     let hidden = Hidden::random("scattering", 0.5, &lab, 5000).unwrap();
-    let found = diagnose(&lab, &[hidden], DiagnoseConfig::default());
+    let rivals = ["scattering", "angle_dependent_absorption", "surface_absorption", "air_absorption"];
+    let found = diagnose_among(&lab, &[hidden], DiagnoseConfig::default(), &rivals);
     assert_eq!(found.verdict, Verdict::Explained, "{:?}", found.lack_of_fit);
     assert_eq!(named(&found), ["scattering"]);
 }

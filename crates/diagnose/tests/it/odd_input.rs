@@ -1,6 +1,8 @@
 //! Rooms that are not as they should be: few responses, other rates and lengths, copies, responses of another room, everything wrong.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
+use crate::hidden_effects::ON_LEVELS;
+use crate::rivals::diagnoser_among;
 use sabine_acoustics::{Bands, Channel, SampleFormat, read_audio, write_wav};
 use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, Error, Verdict};
 use sabine_scene::MeasuredRoom;
@@ -11,13 +13,22 @@ fn lab(seed: u64, receivers: usize) -> Laboratory {
     Laboratory::new(LabConfig { seed, receivers, ..LabConfig::default() }).unwrap()
 }
 
+fn config() -> DiagnoseConfig {
+    DiagnoseConfig { rays: 1500, ..DiagnoseConfig::default() }
+}
+
 fn diagnoser() -> Diagnoser {
-    Diagnoser::new(DiagnoseConfig { rays: 1500, ..DiagnoseConfig::default() }).unwrap()
+    Diagnoser::new(config()).unwrap()
 }
 
 fn diagnose(room: &MeasuredRoom, hold_out: &[&str]) -> Result<Diagnosis, Error> {
     let hold_out: Vec<String> = hold_out.iter().map(ToString::to_string).collect();
     diagnoser().diagnose(room, &hold_out, &())
+}
+
+/// Weighs these effects, and all at night.
+fn diagnose_among(room: &MeasuredRoom, effects: &[&str]) -> Diagnosis {
+    diagnoser_among(config(), effects).diagnose(room, &[], &()).unwrap()
 }
 
 fn notes_hold(found: &Diagnosis, words: &str) {
@@ -140,7 +151,7 @@ fn third_octaves_show_what_octaves_smear() {
     let hidden = Hidden::TransducerResponse { gains_db: truth_db.to_vec() };
     let room = lab.write(&[hidden], &folder.path().join("room"), None).unwrap();
     assert_eq!(room.bands(), bands);
-    let found = diagnose(&room, &[]).unwrap();
+    let found = diagnose_among(&room, &ON_LEVELS);
     let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
     assert_eq!(named, ["transducer_response"], "{:?}", found.lack_of_fit);
     let hollow = found.causes[0].parameters.iter().find(|p| p.name == "gain_1250_hz").unwrap();
@@ -158,7 +169,7 @@ fn a_parameter_at_the_end_of_its_range_is_told() {
     let lab = Laboratory::new(LabConfig { seed: 545, receivers: 8, bands, ..LabConfig::default() }).unwrap();
     let hidden = Hidden::SourceDirectivity { omni_share: vec![1.0, 1.0, 0.5, 0.0], axis: None };
     let room = lab.write(&[hidden], &folder.path().join("room"), None).unwrap();
-    let found = diagnose(&room, &[]).unwrap();
+    let found = diagnose_among(&room, &ON_LEVELS);
     assert_eq!(found.causes[0].effect, "source_directivity", "{:?}", found.causes);
     notes_hold(
         &found,

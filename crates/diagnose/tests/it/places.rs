@@ -1,7 +1,9 @@
 //! Places that are known worse than a tape measure knows them, and say so.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
-use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, Verdict};
+use crate::hidden_effects::ON_TIMES;
+use crate::rivals::diagnoser_among;
+use sabine_diagnose::{DiagnoseConfig, Diagnosis, Verdict};
 use sabine_scene::MeasuredRoom;
 use sabine_testkit::{LabConfig, Laboratory};
 use std::path::Path;
@@ -41,7 +43,7 @@ fn misplaced(room: &Path, off_m: f64, stated_m: Option<f64>) -> MeasuredRoom {
 
 fn diagnose(room: &MeasuredRoom) -> Diagnosis {
     let config = DiagnoseConfig { rays: 1000, ..DiagnoseConfig::default() };
-    Diagnoser::new(config).unwrap().diagnose(room, &[], &()).unwrap()
+    diagnoser_among(config, &ON_TIMES).diagnose(room, &[], &()).unwrap()
 }
 
 #[test]

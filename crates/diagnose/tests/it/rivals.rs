@@ -1,15 +1,20 @@
-//! Which effects a test weighs. In the gate it is those that could pass for the hidden one; at night, and where a test is about telling
-//! nothing or several things apart, the whole catalogue.
+//! Which effects a test weighs. In the gate it is those that could pass for the hidden one; at night, and in the gate where no name or
+//! no change of the answer is asked for, the whole catalogue.
 
 use sabine_diagnose::{DiagnoseConfig, Diagnoser};
 
 /// Set by `cargo xtask nightly`: every test weighs the whole catalogue.
 const WHOLE_CATALOGUE: &str = "SABINE_WHOLE_CATALOGUE";
 
+/// Whether all is tested that there is no time for in the gate.
+pub(crate) fn at_night() -> bool {
+    std::env::var_os(WHOLE_CATALOGUE).is_some()
+}
+
 /// Weighs these effects, or the whole catalogue at night.
 pub(crate) fn diagnoser_among(config: DiagnoseConfig, effects: &[&str]) -> Diagnoser {
     let whole = Diagnoser::new(config).expect("settings of a test are in their ranges");
-    if std::env::var_os(WHOLE_CATALOGUE).is_some() {
+    if at_night() {
         return whole;
     }
     let effects: Vec<String> = effects.iter().map(ToString::to_string).collect();
