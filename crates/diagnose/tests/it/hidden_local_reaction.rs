@@ -2,11 +2,14 @@
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
 use crate::rivals::diagnoser_among;
+use sabine_acoustics::Bands;
 use sabine_diagnose::{DiagnoseConfig, Diagnosis, Verdict};
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
 
 fn diagnose(seed: u64, hidden: &[Hidden]) -> Diagnosis {
-    let lab = Laboratory::new(LabConfig { seed, receivers: 8, ..LabConfig::default() }).unwrap();
+    let bands = Bands::octaves(500.0, 4000.0).unwrap();
+    let config = LabConfig { seed, receivers: 8, bands, sample_rate_hz: 16_000, ..LabConfig::default() };
+    let lab = Laboratory::new(config).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let room = lab.write(hidden, &folder.path().join("room"), None).unwrap();
     let config = DiagnoseConfig { rays: 1000, ..DiagnoseConfig::default() };

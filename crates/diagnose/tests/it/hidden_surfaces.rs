@@ -76,7 +76,9 @@ fn a_hole_in_a_wall_is_found_and_located() {
     let lab = lab(750, 12);
     let hidden = Hidden::random("open_patch", 1.0, &lab, 750).unwrap();
     let Hidden::OpenPatch { face, centre_m, size_m } = hidden else { panic!("{hidden:?}") };
-    let found = diagnose(&lab, std::slice::from_ref(&hidden));
+    let config = DiagnoseConfig { rays: 1000, ..DiagnoseConfig::default() };
+    let rivals = ["open_patch", "surface_absorption", "scattering"];
+    let found = diagnose_by(&diagnoser_among(config, &rivals), &lab, std::slice::from_ref(&hidden));
     let cause = only_cause(&found, "open_patch");
     let names = ["centre_x", "centre_y", "centre_z"];
     for (k, name) in names.into_iter().enumerate() {

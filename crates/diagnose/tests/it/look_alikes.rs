@@ -120,6 +120,7 @@ fn a_loudspeaker_is_named_beside_a_set_of_a_clock_and_a_temperature() {
 /// Both straighten decays. What scatters is found by chance, more or less: with 3,000 rays this room was named the other way, and with 10,000
 /// of one seed of seven (5000): there the gain at positions left out has an interval that reaches below zero.
 #[test]
+#[ignore = "nightly: minutes, and rough walls and walls that react locally are each found in the gate"]
 fn some_scattering_is_told_from_walls_that_react_locally() {
     let lab = lab(5000, 12);
     let hidden = Hidden::random("scattering", 0.5, &lab, 5000).unwrap();

@@ -46,24 +46,32 @@ fn traced(laboratory: &PolyhedralRoom, spans: usize, config: &TracerConfig) -> H
 
 #[test]
 fn late_sound_is_that_of_particles() {
-    for shape in [Polyhedron::SlopedCeiling, Polyhedron::Furnished] {
-        let config = PolyhedralConfig { seed: 5551, shape, ..PolyhedralConfig::default() };
-        let laboratory = PolyhedralRoom::new(config).unwrap();
-        let counted = counted(&laboratory);
-        let config = TracerConfig { rays: 40_000, ..TracerConfig::default() };
-        let traced = traced(&laboratory, counted[0].len(), &config);
-        for (band, (counted, traced)) in counted.iter().zip(&traced).enumerate() {
-            let whole: f64 = counted.iter().sum();
-            for (span, (particles, rays)) in counted.iter().zip(traced).enumerate() {
-                let level_db = 10.0 * (particles / whole).log10();
-                let off_db = 10.0 * (rays / particles).log10();
-                println!("{shape:?}, band {band}, {span}: {level_db:.1} dB, rays {off_db:+.3} dB");
-                for (down_to_db, allowed_db) in ALLOWED_DB {
-                    assert!(
-                        level_db < down_to_db || off_db.abs() < allowed_db,
-                        "{shape:?} {band} {span}: {off_db} dB"
-                    );
-                }
+    is_that_of_particles(Polyhedron::SlopedCeiling);
+}
+
+#[test]
+#[ignore = "nightly: half a minute, and another shape is not ignored"]
+fn late_sound_in_a_furnished_room_is_that_of_particles() {
+    is_that_of_particles(Polyhedron::Furnished);
+}
+
+fn is_that_of_particles(shape: Polyhedron) {
+    let config = PolyhedralConfig { seed: 5551, shape, ..PolyhedralConfig::default() };
+    let laboratory = PolyhedralRoom::new(config).unwrap();
+    let counted = counted(&laboratory);
+    let config = TracerConfig { rays: 40_000, ..TracerConfig::default() };
+    let traced = traced(&laboratory, counted[0].len(), &config);
+    for (band, (counted, traced)) in counted.iter().zip(&traced).enumerate() {
+        let whole: f64 = counted.iter().sum();
+        for (span, (particles, rays)) in counted.iter().zip(traced).enumerate() {
+            let level_db = 10.0 * (particles / whole).log10();
+            let off_db = 10.0 * (rays / particles).log10();
+            println!("{shape:?}, band {band}, {span}: {level_db:.1} dB, rays {off_db:+.3} dB");
+            for (down_to_db, allowed_db) in ALLOWED_DB {
+                assert!(
+                    level_db < down_to_db || off_db.abs() < allowed_db,
+                    "{shape:?} {band} {span}: {off_db} dB"
+                );
             }
         }
     }

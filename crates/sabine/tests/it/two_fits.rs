@@ -132,6 +132,7 @@ fn both_fits_agree_on_a_laboratory_room() {
 }
 
 #[test]
+#[ignore = "nightly: half a minute, and two other rooms are not ignored"]
 fn both_fits_agree_on_another_but_for_a_value_at_8_khz() {
     // A seed looked at once. The true value at 8 kHz lies between the two, two standard deviations from one and 1.4 from the other.
     let distances = laboratory(7019);

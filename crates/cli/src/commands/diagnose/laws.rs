@@ -87,6 +87,15 @@ fn rows(law: &FoundLaw) -> Vec<Vec<String>> {
     rows
 }
 
+/// What is on the axis.
+fn goes_with(law: &FoundLaw) -> &'static str {
+    if law.formula.contains("recording_order") {
+        "Place in the order of the recordings, from 0"
+    } else {
+        "What the law goes with (mean over the paths of a bin)"
+    }
+}
+
 /// What is left without the law, and the law through it; the vault in another colour.
 fn chart(law: &FoundLaw) -> Option<Chart> {
     let of = |vault: bool| law.points.iter().filter(move |p| p.vault == vault);
@@ -116,11 +125,33 @@ fn chart(law: &FoundLaw) -> Option<Chart> {
     }
     let margin = 0.03 * (last - first);
     Some(Chart {
-        x_label: "What the law goes with (mean over the paths of a bin)".into(),
+        x_label: goes_with(law).into(),
         y_label: "Measured less simulated (dB)".into(),
         x: Scale::Linear(first - margin, last + margin),
         y: None,
         series,
         small: false,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)] // a panic is how a test fails
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn the_axis_says_what_a_law_goes_with() {
+        let label = |formula: &str| {
+            let point = |covariate: f64| json!({"covariate": covariate, "left_db": 1.0, "half_width_db": 0.5, "law_db": 1.0, "vault": false});
+            let law: FoundLaw = serde_json::from_value(json!({
+                "id": "law", "target": "path", "formula": formula, "words": "", "parameters": [],
+                "evidence_nats": 20.0, "prior_nats": 7.0, "family_p": 0.01, "points": [point(0.0), point(1.0)],
+            }))
+            .unwrap();
+            chart(&law).unwrap().x_label
+        };
+        assert!(label("a * log2(1 + recording_order)").contains("order of the recordings"));
+        assert!(label("a * length_m").contains("mean over the paths"));
+    }
 }
