@@ -42,6 +42,7 @@ fn rooms_as_stated_are_adequate() {
 
 /// The table of one material is far off in a room where nearly any other could absorb as much: an opening explains as much at most.
 #[test]
+#[ignore = "nightly: a minute and more, and a wrong table in a box is not ignored"]
 fn a_table_that_is_wrong_is_named_though_all_tables_can_make_up_for_it() {
     let config = PolyhedralConfig {
         seed: 222,
