@@ -41,8 +41,9 @@ if [ -n "$only_module" ]; then
     install 'numpy>=1.22' || skip "numpy cannot be installed"
     # With an example, dependencies have the features that they have for tests: nothing but the module is compiled.
     cargo build --quiet --locked --workspace --lib --example log_mel
-    module=$(ls -t "$CARGO_TARGET_DIR"/debug/{lib_sabine.so,lib_sabine.dylib} 2>/dev/null | head -n 1)
-    [ -n "$module" ] || skip "no module for this system"
+    module=$CARGO_TARGET_DIR/debug/lib_sabine.so
+    [ "$(uname)" != Darwin ] || module=${module%.so}.dylib
+    [ -f "$module" ] || skip "no module for this system"
     site=$("$python" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')
     cp -r python/sabine "$site/"
     cp "$module" "$site/sabine/_sabine.abi3.so"
