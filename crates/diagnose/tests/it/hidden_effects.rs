@@ -208,7 +208,6 @@ fn a_clock_and_a_temperature_cannot_be_told_apart() {
 }
 
 #[test]
-#[ignore = "nightly: a minute and more; the atlas has it, too"]
 fn dry_air_is_found() {
     // Twelve positions: with eight, the humidity of other rooms was not found.
     let lab = Laboratory::new(LabConfig { seed: 45, ..LabConfig::default() }).unwrap();

@@ -72,7 +72,6 @@ fn a_panel_that_the_mesh_lacks_is_found_and_located() {
 }
 
 #[test]
-#[ignore = "nightly: a minute and more, and a panel is found in the gate"]
 fn a_hole_in_a_wall_is_found_and_located() {
     let lab = lab(750, 12);
     let hidden = Hidden::random("open_patch", 1.0, &lab, 750).unwrap();

@@ -1,5 +1,4 @@
-//! Which effects a test weighs. In the gate it is those that could pass for the hidden one; at night, and in the gate where no name or
-//! no change of the answer is asked for, the whole catalogue.
+//! Which effects a test weighs: in the gate those that could pass for the hidden one, at night the whole catalogue.
 
 use sabine_diagnose::{DiagnoseConfig, Diagnoser};
 

@@ -90,7 +90,7 @@ fn rows(law: &FoundLaw) -> Vec<Vec<String>> {
 /// What is on the axis.
 fn goes_with(law: &FoundLaw) -> &'static str {
     if law.formula.contains("recording_order") {
-        "Place in the order of the recordings, from 0"
+        "Number in the order of the recordings, from 0"
     } else {
         "What the law goes with (mean over the paths of a bin)"
     }
