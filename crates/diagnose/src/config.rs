@@ -85,6 +85,7 @@ impl DiagnoseConfig {
             seed: self.seed,
             image_order: self.image_order,
             cuboid_paths: CUBOID_PATHS,
+            path_guiding: true,
             allow_leaks: self.allow_leaks,
             ..TracerConfig::default()
         }

@@ -30,7 +30,7 @@ impl Tracing<'_> {
             let mut next = 0;
             while let Some(&nearest) = points_back.get(next) {
                 // The share falls with the number of reflections, so the nearest one's bounds those of all that follow.
-                let bound = self.usage(out.arrivals[i].depth + back.arrivals[nearest].depth).lines;
+                let bound = self.line_share(out.arrivals[i].depth + back.arrivals[nearest].depth);
                 next += passed_over(bound, random);
                 let Some(&j) = points_back.get(next) else { break };
                 next += 1;
@@ -38,8 +38,8 @@ impl Tracing<'_> {
                 if a.travelled_m + b.travelled_m >= self.max_length_m {
                     break;
                 }
-                let used = self.usage(a.depth + b.depth);
-                if used.lines < bound && random.random::<f64>() * bound >= used.lines {
+                let taken = self.line_share(a.depth + b.depth);
+                if taken < bound && random.random::<f64>() * bound >= taken {
                     continue;
                 }
                 let line = sub(b.point, a.point);
@@ -53,13 +53,15 @@ impl Tracing<'_> {
                 {
                     continue;
                 }
+                let probabilities = &self.scene.probabilities;
+                let density =
+                    a.mixture_on(probabilities).joint_density(&b.mixture_on(probabilities), probabilities);
+                let used = self.usage(a.depth + b.depth, density);
                 let product = cosines[0] * cosines[1];
                 let share = a.ways_on().share_of_joint(&b.ways_on(), distance_m, product, used);
                 // 16 pi g for each pair of rays, of which the share of a ray holds 4 pi.
                 let spread = share / used.lines * 4.0 * product / (PI * distance_m * distance_m);
-                let mixture = a.mixture_on(&self.scene.probabilities);
-                let log_density = mixture.joint_log_density(&b.mixture_on(&self.scene.probabilities));
-                let log_weight = log_share + spread.ln() - log_density + a.log_rays + b.log_rays;
+                let log_weight = log_share + spread.ln() - density.log + a.log_rays + b.log_rays;
                 let (out_depth, back_depth) = (a.depth, b.depth);
                 let (chain, tail) = (out.chain(out_depth, paths), back.chain(back_depth, paths));
                 let (departure, arrival) = (out.heading, back.heading);
@@ -114,13 +116,14 @@ impl Tracing<'_> {
                     if !visible(&self.scene.mesh, eye(a.point, a.normal), eye(b.point, b.normal)) {
                         continue;
                     }
-                    let used = self.usage(reflections);
+                    let probabilities = &self.scene.probabilities;
+                    let density = a.mixture_on(probabilities).joint_density(&b.mixture, probabilities);
+                    let used = self.usage(reflections, density);
                     let share = a.ways_on().share_of_meeting(&b.ways, area_m2, used);
                     // 16 pi for each pair of rays and over the area; a ray meets all its rivals.
                     let spread = share * 4.0 / (used.meetings * area_m2);
-                    let log_density = a.mixture_on(&self.scene.probabilities).joint_log_density(&b.mixture);
                     let log_rays = a.log_rays + b.incoming.unwrap_or(f64::NEG_INFINITY);
-                    let log_weight = log_share + spread.ln() - log_density + log_rays;
+                    let log_weight = log_share + spread.ln() - density.log + log_rays;
                     let (out_depth, back_depth) = (a.depth, b.depth - 1);
                     let (chain, tail) = (walk.chain(out_depth, paths), other.chain(back_depth, paths));
                     let (departure, arrival) = (walk.heading, other.heading);

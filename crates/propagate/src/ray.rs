@@ -135,19 +135,13 @@ impl Walk {
 
 impl Ray {
     /// A ray that leaves the middle of an end's sphere.
-    pub fn new(
-        end: usize,
-        hero: usize,
-        batch: u8,
-        (sphere, heading): (&Sphere, Vec3),
-        classes: usize,
-    ) -> Self {
+    pub fn new(end: usize, hero: usize, batch: u8, (sphere, heading): (&Sphere, Vec3)) -> Self {
         let walk = Walk { heading, arrivals: Vec::new(), hero, before: 0, chains: vec![PathSet::DIRECT] };
         let at = Progress {
             origin: sphere.centre,
             heading,
             travelled_m: 0.0,
-            mixture: EventMixture::new(classes),
+            mixture: EventMixture::NONE,
             ways: Ways::new(sphere.radius_m),
             ever_scattered: false,
             stretch_m: 0.0,

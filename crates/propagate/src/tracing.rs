@@ -1,6 +1,7 @@
 //! The rays of one trace, from the source and from the receiver.
 
 use crate::TracerConfig;
+use crate::event_mixture::EventDensity;
 use crate::guide::Guide;
 use crate::prepared_scene::PreparedScene;
 use crate::random::{direction, generator};
@@ -65,7 +66,7 @@ impl<'a> Tracing<'a> {
             guides,
             windows,
             ends: [sphere(SOURCE), sphere(RECEIVER)],
-            pairs: parts * pairs.div_ceil(parts).next_multiple_of(scene.probabilities.classes()),
+            pairs: parts * pairs.div_ceil(parts).next_multiple_of(scene.probabilities.round()),
             parts,
             exact_order: match scene.cuboid {
                 Some(_) if config.cuboid_paths > 0 => usize::MAX,
@@ -122,24 +123,29 @@ impl<'a> Tracing<'a> {
 
     /// How many lines and meetings are used for paths of so many reflections: about as many of each as a ray draws lines
     /// to the opposite end. The more reflections, the more of them find the same kind of path.
-    pub fn usage(&self, reflections: usize) -> Use {
+    pub fn usage(&self, reflections: usize, density: EventDensity) -> Use {
         if !self.config.bidirectional {
             return Use { lines: 0.0, meetings: 0.0 };
         }
-        let splits = reflections.saturating_sub(1) as f64;
-        let lines = (1.0 / (splits * self.scene.mean_scattering)).min(1.0);
-        Use { lines, meetings: self.rivals() * self.meeting_share(reflections) }
+        let rivals = self.rivals(density.same_class);
+        Use { lines: self.line_share(reflections), meetings: rivals * self.meeting_share(reflections) }
     }
 
-    /// Rays from one end that a ray from the other end may meet: those of its part that draw for the same class.
-    fn rivals(&self) -> f64 {
-        (self.pairs / self.parts) as f64 / self.scene.probabilities.classes() as f64
+    /// Rays from one end that a ray from the other end may meet: those of its part that draw for the same class, which is this share of all.
+    fn rivals(&self, same_class: f64) -> f64 {
+        (self.pairs / self.parts) as f64 * same_class
+    }
+
+    /// Share of the lines between two rays that are used.
+    pub fn line_share(&self, reflections: usize) -> f64 {
+        let splits = reflections.saturating_sub(1) as f64;
+        (1.0 / (splits * self.scene.mean_scattering)).min(1.0)
     }
 
     /// Share of the meetings that are used.
     pub fn meeting_share(&self, reflections: usize) -> f64 {
-        let expected =
-            reflections as f64 * self.rivals() * self.scene.patches.full_m2() / self.scene.surface_m2;
+        let rivals = self.rivals(self.scene.probabilities.same_class());
+        let expected = reflections as f64 * rivals * self.scene.patches.full_m2() / self.scene.surface_m2;
         (1.0 / expected).min(1.0)
     }
 
@@ -157,15 +163,14 @@ impl<'a> Tracing<'a> {
         paths: &mut PathSet,
     ) {
         let first = walks.len();
-        // Both rays of a pair draw for the same class, and all classes get their turns within a part.
-        let classes = self.scene.probabilities.classes();
-        let (turn, hero) = (number / classes, number % classes);
+        // Both rays of a pair draw for the same class, and each class gets its share of the turns within a part.
+        let (hero, turn) = self.scene.probabilities.turn(number);
         let (heading, log_rays) = match &self.guides[hero] {
             Some(guide) => guide.emitted((end == SOURCE).then_some(turn), random),
             None => (direction(random), 0.0),
         };
         let start = (&self.ends[end], heading);
-        let mut ray = Ray::new(end, hero, batch, start, classes);
+        let mut ray = Ray::new(end, hero, batch, start);
         (ray.at.log_rays, ray.at.log_guided) = (log_rays, log_rays);
         let mut waiting = vec![ray];
         while let Some(mut ray) = waiting.pop() {
@@ -192,11 +197,12 @@ impl<'a> Tracing<'a> {
             && let Some((middle_m, chord_m)) = there.chord(at.origin, at.heading, leg_m)
             && at.travelled_m + middle_m <= self.max_length_m
         {
+            let density = at.mixture.density(&self.scene.probabilities);
             let share = match self.config.bidirectional {
-                true => at.ways.share_of_sphere(there.radius_m, self.usage(depth)),
+                true => at.ways.share_of_sphere(there.radius_m, self.usage(depth, density)),
                 false => 1.0,
             };
-            let log_density = at.mixture.log_density() + there.volume_m3().ln();
+            let log_density = density.log + there.volume_m3().ln();
             let log_weight = self.log_share() + (share * chord_m).ln() - log_density;
             let (length_m, back) = (at.travelled_m + middle_m, scale(at.heading, -1.0));
             ray.push(length_m, log_weight, back, paths);
@@ -330,13 +336,14 @@ impl<'a> Tracing<'a> {
         let length_m = at.travelled_m + distance_m;
         if cosine > 0.0 && length_m <= self.max_length_m && visible(&self.scene.mesh, at.origin, there.centre)
         {
+            let density = at.mixture.density(&self.scene.probabilities);
             let share = match self.config.bidirectional {
-                true => at.ways.share_of_line(distance_m, cosine, self.usage(ray.walk.depth())),
+                true => at.ways.share_of_line(distance_m, cosine, self.usage(ray.walk.depth(), density)),
                 false => 1.0,
             };
             // Lambert: cos / pi of the power per steradian, thinned by the square of the distance.
             let log_spread = (share * cosine / (PI * distance_m * distance_m)).ln();
-            let log_weight = self.log_share() + log_spread - at.mixture.log_density();
+            let log_weight = self.log_share() + log_spread - density.log;
             ray.push(length_m, log_weight, scale(line, -1.0 / distance_m), paths);
         }
         ray.at.set_out(met.normal, self.guides[ray.walk.hero].as_ref(), random);

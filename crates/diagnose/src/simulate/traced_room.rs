@@ -12,8 +12,9 @@ use sabine_acoustics::{Material, Observer, PerBand, report};
 use sabine_scene::{MeasuredRoom, Receiver, Scene, Source};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Extra scattering of the bands of the traced scene, in turn: its paths then serve any scattering.
-const TRACED_SCATTERING: [f64; 4] = [0.0, 0.12, 0.4, 0.85];
+/// Extra scattering of the bands of the traced scene, in turn: its paths then serve any scattering. Rays are drawn for a scattering as often as
+/// bands have it: most for the stated one.
+const TRACED_SCATTERING: [f64; 7] = [0.0, 0.12, 0.0, 0.4, 0.0, 0.85, 0.0];
 /// Share of the stated absorption at which images are chosen.
 const CAUTION: f64 = 0.7;
 /// Longest time that is traced after the direct sound, in seconds.
