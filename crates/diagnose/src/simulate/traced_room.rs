@@ -13,8 +13,10 @@ use sabine_scene::{MeasuredRoom, Receiver, Scene, Source};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Extra scattering of the bands of the traced scene, in turn: its paths then serve any scattering. Rays are drawn for a scattering as often as
-/// bands have it: most for the stated one.
+/// bands have it: half of them and more for the stated one.
 const TRACED_SCATTERING: [f64; 7] = [0.0, 0.12, 0.0, 0.4, 0.0, 0.85, 0.0];
+/// The same in too few bands for that: each scattering once before one comes again.
+const IN_FEW_BANDS: [f64; 4] = [0.0, 0.12, 0.4, 0.85];
 /// Share of the stated absorption at which images are chosen.
 const CAUTION: f64 = 0.7;
 /// Longest time that is traced after the direct sound, in seconds.
@@ -44,6 +46,11 @@ pub(crate) fn traced_s(survey: &Survey, measured: &[Measured], range_db: f64) ->
     longest.min(MAX_TRACED_S)
 }
 
+/// Extra scattering of so many bands, in turn.
+fn traced_scattering(bands: usize) -> &'static [f64] {
+    if bands < TRACED_SCATTERING.len() - 1 { &IN_FEW_BANDS } else { &TRACED_SCATTERING }
+}
+
 /// The scene with scattering spread over the bands.
 pub(crate) fn traced_scene(
     room: &MeasuredRoom,
@@ -51,11 +58,12 @@ pub(crate) fn traced_scene(
     materials: &[Material],
 ) -> Result<Scene, Error> {
     let bands = survey.bands;
+    let extra = traced_scattering(bands.len());
     let spread: Vec<Material> = materials
         .iter()
         .map(|m| {
             let columns: Vec<Material> =
-                TRACED_SCATTERING.iter().map(|&extra| scattering_more(m, extra)).collect::<Result<_, _>>()?;
+                extra.iter().map(|&extra| scattering_more(m, extra)).collect::<Result<_, _>>()?;
             let scattering = PerBand::from_fn(bands, |b| columns[b % columns.len()].scattering().values()[b]);
             // Absorption only says which images of a cuboid matter: less than stated, for it may be fitted so.
             let absorption = PerBand::from_fn(bands, |b| CAUTION * m.absorption().values()[b]);
@@ -93,4 +101,19 @@ pub(crate) fn trace(
             Ok(TracedPair::new(paths, diffracted, response.air, materials)?)
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_scattering_is_traced_wherever_there_are_bands_enough() {
+        for bands in 4..=10 {
+            let extra: Vec<f64> = traced_scattering(bands).iter().copied().cycle().take(bands).collect();
+            assert!(IN_FEW_BANDS.iter().all(|wanted| extra.contains(wanted)), "{bands}: {extra:?}");
+            let stated = extra.iter().filter(|&&extra| extra == 0.0).count();
+            assert!(bands < 6 || 2 * stated >= bands, "{bands}: {extra:?}");
+        }
+    }
 }
