@@ -13,7 +13,7 @@ use crate::infer::baseline::Baseline;
 use crate::infer::candidates::{self, CatalogueCase};
 use crate::infer::confirmation::{Confirmation, Doubt, confirm};
 use crate::infer::naming::{give, select};
-use crate::infer::ray_dependence::{could_be_chance, more_with_half};
+use crate::infer::ray_dependence::{could_be_chance, owed_to_rays};
 use crate::infer::search::Search;
 use crate::infer::selection::Selection;
 use crate::infer::visibility::d_prime;
@@ -460,8 +460,8 @@ impl Weighed {
     ) -> Result<Confirmation, Error> {
         let started = Instant::now();
         let chosen = &self.found.chosen;
-        self.found.more_with_half =
-            more_with_half(&mut self.baseline, &self.cases, chosen, &self.used, (tracer, observer))?;
+        self.found.owed_to_rays =
+            owed_to_rays(&mut self.baseline, &self.cases, chosen, &self.used, (tracer, observer))?;
         *self.baseline.seconds.entry("search").or_default() += started.elapsed().as_secs_f64();
         let mut found = std::mem::take(&mut self.found);
         let confirmed = confirm(&self.search(effects), &mut found, held, observer);

@@ -111,7 +111,7 @@ pub(crate) fn ratio_interval(groups: &[(f64, f64)]) -> [f64; 2] {
 }
 
 /// Value that Student's t of so many degrees exceeds with a probability of 5 %, by bisection.
-fn student_quantile(degrees: usize) -> f64 {
+pub(crate) fn student_quantile(degrees: usize) -> f64 {
     let (mut low, mut high) = (0.0, 10.0);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);

@@ -7,7 +7,7 @@ use crate::infer::candidates::Candidate;
 use crate::infer::cross_validation::{Folds, Predicted, predict};
 use crate::infer::lack_of_fit::{self, Lack};
 use crate::infer::law_search::best::{BestFormula, Formulas};
-use crate::infer::ray_dependence::unsettled;
+use crate::infer::ray_dependence::{owed_nats, unsettled};
 use crate::infer::search::{RIVAL_NATS, Search, State};
 use crate::infer::selection::Selection;
 use crate::likelihood::decay::WarmStart;
@@ -34,7 +34,7 @@ const MAX_DISPERSION: f64 = 100.0;
 pub(crate) enum Doubt {
     /// Only octaves below the Schroeder frequency speak for it.
     Modes,
-    /// Rays that were not drawn do.
+    /// Other rays do not confirm it.
     Rays,
     /// It does not help at positions left out.
     Elsewhere,
@@ -120,7 +120,8 @@ pub(crate) fn confirm(
     let lack_after = loop {
         let doubt = doubtful(search, &state, found, &predicted)?;
         let lack = if doubt.is_none() { lack_of(search, &state, &formulas)? } else { None };
-        let outweighed = lack.as_ref().map(|lack| outweighed(search, &state, lack)).transpose()?.flatten();
+        let outweighed =
+            lack.as_ref().map(|lack| outweighed(search, &state, found, lack)).transpose()?.flatten();
         let doubt = doubt.or(outweighed.map(|worst| (worst, Doubt::Misfit)));
         let Some((worst, doubt)) = doubt else { break lack };
         dropped.push((worst, doubt));
@@ -203,7 +204,7 @@ fn doubtful(
     if let Some(worst) = resting_on_modes(search, state)? {
         return Ok(Some((worst, Doubt::Modes)));
     }
-    if let Some(worst) = unsettled(search, state, &found.more_with_half)? {
+    if let Some(worst) = unsettled(search, state, &found.owed_to_rays)? {
         return Ok(Some((worst, Doubt::Rays)));
     }
     let rests_on_tables = state
@@ -215,8 +216,13 @@ fn doubtful(
 }
 
 /// The weakest cause of decays alone, if less speaks for it than against the fit with it: where a model fails otherwise, whatever makes it fail a
-/// little less has evidence.
-fn outweighed(search: &Search<'_>, state: &State, lack: &Lack) -> Result<Option<usize>, Error> {
+/// little less has evidence. What other rays would not confirm does not speak for it.
+fn outweighed(
+    search: &Search<'_>,
+    state: &State,
+    found: &Selection,
+    lack: &Lack,
+) -> Result<Option<usize>, Error> {
     if lack.decays_p_value >= NO_CHANCE {
         return Ok(None);
     }
@@ -227,6 +233,7 @@ fn outweighed(search: &Search<'_>, state: &State, lack: &Lack) -> Result<Option<
         }
         let rest: Vec<usize> = state.chosen.iter().copied().filter(|&c| c != candidate).collect();
         let nats = state.log_evidence() - search.state(&rest, Some(state))?.log_evidence();
+        let nats = nats - owed_nats(&found.owed_to_rays, candidate);
         if nats < weakest.0 {
             weakest = (nats, Some(candidate));
         }
@@ -330,7 +337,7 @@ mod tests {
     use crate::hand_made::Tables;
     use crate::infer::candidates::cases;
     use crate::infer::cross_validation::DecayChange;
-    use crate::report::diagnosis::HeldOutGain;
+    use crate::report::diagnosis::{HeldOutGain, RayDependence};
     use sabine_scene::{Levels, TimeZero};
 
     #[test]
@@ -395,7 +402,8 @@ mod tests {
             formula: None,
             tests: Vec::new(),
         };
-        let falls = |state: &State, p: f64| outweighed(&search, state, &left(p)).expect("fits");
+        let mut found = Selection::default();
+        let falls = |state: &State, p: f64| outweighed(&search, state, &found, &left(p)).expect("fits");
         let balance = (-nats / OUTWEIGHS).exp();
         assert!(balance < NO_CHANCE, "{nats}");
         assert_eq!(falls(&state, 0.5 * balance), Some(0));
@@ -404,6 +412,10 @@ mod tests {
         assert_eq!(falls(&state, 2.0 * NO_CHANCE), None);
         let late = search.state(&[1], None).expect("a fit");
         assert_eq!(falls(&late, 1e-30), None);
+        // What other rays do not confirm does not speak for it.
+        found.owed_to_rays = vec![(0, RayDependence::new(nats, vec![0.25 * nats; 2]))];
+        let fallen = outweighed(&search, &state, &found, &left(2.0 * balance)).expect("fits");
+        assert_eq!(fallen, Some(0));
     }
 
     /// Of no bearing where few modes make the decay.

@@ -1,17 +1,19 @@
-//! What the evidence for a cause owes to the number of rays.
+//! What the evidence for a cause owes to the rays that were drawn.
 //!
-//! A predicted decay is noisy by the rays that were drawn, and a cause that makes it smoother comes nearer to the measurement for that
-//! alone. This gain falls as one over the number of rays: what half of the rays say more for a cause, all of them still say too much, and
-//! evidence extrapolated to any number of rays is less by the difference (Richardson's extrapolation). A name that could be chance at all
-//! ([`could_be_chance`]) is looked for again with several times as many rays before that.
+//! A predicted decay is noisy by the rays that were drawn. A cause that makes it smoother comes nearer to the measurement for that alone, and
+//! one that makes up for what these rays missed does so by as much as they missed. Rays that are drawn again tell: half as many, twice over.
+//! A name that could be chance at all ([`could_be_chance`]) is looked for again with several times as many rays before that.
 
 use crate::effect::{Case, Observable};
 use crate::error::Error;
 use crate::infer::baseline::Baseline;
 use crate::infer::candidates::CatalogueCase;
 use crate::infer::search::{Search, State};
+use crate::report::diagnosis::RayDependence;
 use crate::simulate::scene_tracer::SceneTracer;
+use crate::statistics::student_quantile;
 use sabine_acoustics::Observer;
+use std::sync::Arc;
 use web_time::Instant;
 
 /// A cause of decays with more evidence than this is not asked for with more rays, in nats. A choice, to save time: chance was seen to lend 24
@@ -35,23 +37,53 @@ pub(crate) fn could_be_chance(search: &Search<'_>, chosen: &[usize]) -> Result<b
     Ok(false)
 }
 
-/// Evidence of decays that half of the rays give a chosen cause beyond what all of them give, in nats.
-pub(crate) type MoreWithHalf = (usize, f64);
+/// A room is traced so often with half of the rays, each time with others.
+const DRAWS: u64 = 2;
 
-/// Compares the evidence of chosen causes that bear on decays under all rays with that under half as many others. Nothing where no cause
-/// bears on decays, or where the tracer draws no rays.
-pub(crate) fn more_with_half(
+/// A chosen cause (a candidate), and what its evidence owes to rays.
+pub(crate) type OwedToRays = (usize, RayDependence);
+
+impl RayDependence {
+    /// From the evidence of decays under all rays and under several draws of half as many.
+    ///
+    /// What all rays say beyond what any number would say is the greater of two estimates. One is of the mean: gains by smoothness fall as one
+    /// over the number of rays, so that what half of them say more, all of them still say too much (Richardson's extrapolation). The other is of
+    /// the scatter: the distance of a prediction without the cause from the measurement, along what the cause changes, is the root of twice the
+    /// evidence in units of its standard deviation; the error of the rays adds to it, with a variance that halves where they are doubled. The
+    /// draws tell this variance, and evidence counts as far as its lower 95 % limit by Student's t reaches.
+    pub(crate) fn new(decay_nats: f64, decay_nats_with_half: Vec<f64>) -> Self {
+        let draws = decay_nats_with_half.len() as f64;
+        let distance = |nats: f64| (2.0 * nats.max(0.0)).sqrt();
+        let half = || decay_nats_with_half.iter().map(|&nats| distance(nats));
+        // In units of one over the variance of half of the rays.
+        let weights = 2.0 + draws;
+        let whole = distance(decay_nats);
+        let mean = (2.0 * whole + half().sum::<f64>()) / weights;
+        let squares = 2.0 * (whole - mean).powi(2) + half().map(|d| (d - mean).powi(2)).sum::<f64>();
+        let error = (squares / draws / weights).sqrt();
+        let least = (mean - student_quantile(decay_nats_with_half.len()) * error).max(0.0);
+        let by_scatter = decay_nats - 0.5 * least * least;
+        let by_mean = decay_nats_with_half.iter().sum::<f64>() / draws - decay_nats;
+        Self { decay_nats, decay_nats_with_half, owed_nats: by_scatter.max(by_mean).max(0.0) }
+    }
+}
+
+/// What the evidence of chosen causes that bear on decays owes to the rays. Nothing where no cause bears on decays, or where the tracer draws
+/// no rays.
+pub(crate) fn owed_to_rays(
     baseline: &mut Baseline,
     cases: &[CatalogueCase],
     chosen: &[usize],
     used: &[bool],
     (tracer, observer): (&dyn SceneTracer, &dyn Observer),
-) -> Result<Vec<MoreWithHalf>, Error> {
+) -> Result<Vec<OwedToRays>, Error> {
     let bear: Vec<usize> =
         chosen.iter().copied().filter(|&c| cases[c].case.observable().concerns(Observable::Decay)).collect();
-    let Some(tracer) = tracer.with_half_the_rays().filter(|_| !bear.is_empty()) else {
+    let tracers: Vec<Arc<dyn SceneTracer>> =
+        (0..DRAWS).filter_map(|draw| tracer.with_half_the_rays(draw)).collect();
+    if tracers.is_empty() || bear.is_empty() {
         return Ok(Vec::new());
-    };
+    }
     let started = Instant::now();
     let evidence = |baseline: &Baseline| -> Result<Vec<f64>, Error> {
         let of = |without: Option<usize>| -> Result<f64, Error> {
@@ -63,34 +95,40 @@ pub(crate) fn more_with_half(
         bear.iter().map(|&c| Ok(all - of(Some(c))?)).collect()
     };
     let with_all = evidence(baseline)?;
-    let half = baseline.simulation.traced_by(&tracer, &baseline.observations.survey, observer)?;
-    let whole = std::mem::replace(&mut baseline.simulation, half);
-    let with_half = baseline.expand(cases, &bear).and_then(|()| evidence(baseline));
-    baseline.simulation = whole;
-    baseline.stale.clear();
+    let mut with_half = vec![Vec::new(); bear.len()];
+    for tracer in &tracers {
+        let half = baseline.simulation.traced_by(tracer, &baseline.observations.survey, observer)?;
+        let whole = std::mem::replace(&mut baseline.simulation, half);
+        let drawn = baseline.expand(cases, &bear).and_then(|()| evidence(baseline));
+        baseline.simulation = whole;
+        baseline.stale.clear();
+        with_half.iter_mut().zip(drawn?).for_each(|(all, nats)| all.push(nats));
+    }
     baseline.seconds.insert("half the rays", started.elapsed().as_secs_f64());
-    Ok(bear
-        .into_iter()
-        .zip(with_half?.into_iter().zip(with_all))
-        .map(|(c, (half, all))| (c, half - all))
-        .collect())
+    let owed = with_all.into_iter().zip(with_half).map(|(all, half)| RayDependence::new(all, half));
+    Ok(bear.into_iter().zip(owed).collect())
 }
 
-/// The chosen cause that stands least, if what speaks for it would not do with any number of rays.
+/// Evidence for a cause that other rays would not confirm, in nats.
+pub(crate) fn owed_nats(owed_to_rays: &[OwedToRays], candidate: usize) -> f64 {
+    owed_to_rays.iter().find(|(c, _)| *c == candidate).map_or(0.0, |(_, rays)| rays.owed_nats)
+}
+
+/// The chosen cause that stands least, if what speaks for it would not do with other rays.
 pub(crate) fn unsettled(
     search: &Search<'_>,
     state: &State,
-    more_with_half: &[MoreWithHalf],
+    owed_to_rays: &[OwedToRays],
 ) -> Result<Option<usize>, Error> {
     let mut weakest: Option<(f64, usize)> = None;
-    for &(candidate, more) in
-        more_with_half.iter().filter(|(c, more)| *more > 0.0 && state.chosen.contains(c))
+    for (candidate, rays) in
+        owed_to_rays.iter().filter(|(c, rays)| rays.owed_nats > 0.0 && state.chosen.contains(c))
     {
-        let rest: Vec<usize> = state.chosen.iter().copied().filter(|&c| c != candidate).collect();
+        let rest: Vec<usize> = state.chosen.iter().copied().filter(|c| c != candidate).collect();
         let without = search.state(&rest, Some(state))?;
-        let nats = state.log_evidence() - without.log_evidence() - search.price(candidate) - more;
+        let nats = state.log_evidence() - without.log_evidence() - search.price(*candidate) - rays.owed_nats;
         if nats < search.threshold() && weakest.is_none_or(|(least, _)| nats < least) {
-            weakest = Some((nats, candidate));
+            weakest = Some((nats, *candidate));
         }
     }
     Ok(weakest.map(|(_, candidate)| candidate))
@@ -105,6 +143,8 @@ mod tests {
     use crate::hand_made::Tables;
     use crate::infer::candidates::cases;
     use crate::simulate::scene_tracer::{EachScene, Rays};
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_pcg::Pcg64Mcg;
     use sabine_propagate::PathTracer;
     use sabine_scene::{Levels, TimeZero};
 
@@ -124,14 +164,51 @@ mod tests {
         let state = search.state(&[0], None).expect("a fit");
         let nats = state.log_evidence() - search.state(&[], None).expect("a fit").log_evidence();
         assert!(nats > search.threshold() + 2.0, "{nats}");
-        let falls = |more: f64| unsettled(&search, &state, &[(0, more)]).expect("fits");
+        let owed = |owed_nats: f64| RayDependence { owed_nats, ..RayDependence::new(nats, vec![nats; 2]) };
+        let falls = |nats: f64| unsettled(&search, &state, &[(0, owed(nats))]).expect("fits");
         assert_eq!(falls(nats - search.threshold() + 1.0), Some(0));
         assert_eq!(falls(nats - search.threshold() - 1.0), None);
         assert!(could_be_chance(&search, &[0]).expect("fits") == (nats < BEYOND_CHANCE_NATS));
         assert!(!could_be_chance(&search, &[]).expect("fits"));
-        // What more rays make surer stands as it is, and what is not chosen is not asked.
-        assert_eq!(falls(-nats), None);
+        // What owes nothing stands as it is, and what is not chosen is not asked.
+        assert_eq!(falls(0.0), None);
         assert_eq!(unsettled(&search, &state, &[]).expect("fits"), None);
+    }
+
+    #[test]
+    fn evidence_that_other_rays_confirm_owes_nothing_and_the_luck_of_one_draw_owes_all() {
+        let owed = |all: f64, half: [f64; 2]| RayDependence::new(all, half.to_vec()).owed_nats;
+        assert!(owed(40.0, [40.0; 2]) < 1e-9);
+        // What half of the rays say more, all of them say too much.
+        assert!((owed(20.0, [30.0; 2]) - 10.0).abs() < 1.0, "{}", owed(20.0, [30.0; 2]));
+        // Large by the rays that were drawn, as other rays show.
+        assert!(owed(100.0, [20.0, 1.0]) > 99.0);
+        // Of a hundred nats that scatter by two, most stand.
+        assert!((1.0..15.0).contains(&owed(100.0, [98.0, 102.0])), "{}", owed(100.0, [98.0, 102.0]));
+        // Evidence against a cause is none for it.
+        assert!(owed(5.0, [-3.0, -8.0]) > 4.9);
+    }
+
+    /// An error of the rays alone, normal as no tracer's need be: how often it is named without any rule, with what half of the rays say more
+    /// alone, and with both estimates.
+    #[test]
+    fn an_error_of_the_rays_alone_is_named_in_few_rooms() {
+        let mut random = Pcg64Mcg::new(5);
+        let mut normal = |variance: f64| {
+            let z: f64 = StandardNormal.sample(&mut random);
+            z * variance.sqrt()
+        };
+        // Distances in standard deviations of the measurement; rays err by five of them.
+        let (mut named, mut by_mean, mut stand) = (0, 0, 0);
+        for _ in 0..4000 {
+            let [all, first, second] = [25.0, 50.0, 50.0].map(|variance| 0.5 * normal(variance).powi(2));
+            let rays = RayDependence::new(all, vec![first, second]);
+            named += usize::from(all > 6.0);
+            by_mean += usize::from(all > 6.0 && all - (0.5 * (first + second) - all) > 6.0);
+            stand += usize::from(all - rays.owed_nats > 6.0);
+        }
+        println!("of 4000: {named} named, {by_mean} with the estimate of the mean alone, {stand} with both");
+        assert!(named > 1800 && stand < by_mean / 3 && stand < named / 6, "{named} {by_mean} {stand}");
     }
 
     #[test]
@@ -145,7 +222,7 @@ mod tests {
         let other = EachScene(PathTracer::new(config).expect("settings"));
         let used = [true; 3];
         let mut of = |chosen: &[usize], tracer: &dyn SceneTracer| {
-            more_with_half(&mut baseline, &cases, chosen, &used, (tracer, &())).expect("fits")
+            owed_to_rays(&mut baseline, &cases, chosen, &used, (tracer, &())).expect("fits")
         };
         assert!(of(&[0], &rays).is_empty() && of(&[], &rays).is_empty() && of(&[1], &other).is_empty());
     }

@@ -2,7 +2,7 @@
 
 use crate::effect::Observable;
 use crate::infer::candidates::{CatalogueCase, EffectScore};
-use crate::infer::ray_dependence::MoreWithHalf;
+use crate::infer::ray_dependence::OwedToRays;
 
 /// What the search found.
 #[derive(Default)]
@@ -19,8 +19,8 @@ pub(crate) struct Selection {
     pub last: Option<(Vec<usize>, Vec<EffectScore>)>,
     /// Effects of these candidates are named no more: they did not help at positions left out.
     pub without: Vec<usize>,
-    /// What half of the rays say more for a cause.
-    pub more_with_half: Vec<MoreWithHalf>,
+    /// What the evidence for a cause owes to the rays that were drawn.
+    pub owed_to_rays: Vec<OwedToRays>,
     /// Each cause, and cases of the same effect that explained as much when it was named.
     pub(super) interchangeable: Vec<(usize, Vec<usize>)>,
 }

@@ -124,11 +124,7 @@ fn causes(
             explanation: effects[own.effect].info().explanation.into_owned(),
             probability: found.probability(candidate),
             nats: without(search, state, candidate)?,
-            more_nats_with_half_the_rays: found
-                .more_with_half
-                .iter()
-                .find(|(c, _)| *c == candidate)
-                .map(|m| m.1),
+            rays: found.owed_to_rays.iter().find(|(c, _)| *c == candidate).map(|(_, rays)| rays.clone()),
             parameters: parameters(search, state, candidate),
             slight: own.case.observable() == Observable::Decay && gain.is_some_and(is_slight),
             held_out_gain: gain.cloned(),

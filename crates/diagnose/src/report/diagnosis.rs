@@ -114,6 +114,18 @@ mod infinite_ends {
     }
 }
 
+/// Evidence for a cause with other rays.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct RayDependence {
+    /// Evidence of the decays alone beside the other causes that bear on them, in nats.
+    pub decay_nats: f64,
+    /// The same with half as many, other rays, once for each draw.
+    pub decay_nats_with_half: Vec<f64>,
+    /// Evidence that rays drawn again would not confirm, in nats, 0 or more: by what these draws say more, or by their scatter.
+    pub owed_nats: f64,
+}
+
 /// A named cause.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
@@ -133,10 +145,9 @@ pub struct Cause {
     pub probability: f64,
     /// Evidence for it beside the other causes, in nats, before correction for the number tried.
     pub nats: f64,
-    /// Evidence that half of the rays, others than these, give it beyond these, in nats: what it owes to their number, if above 0. `None`
-    /// where it does not bear on decays.
+    /// What its evidence owes to the rays that were drawn. `None` where it does not bear on decays, or nothing is drawn.
     #[serde(default)]
-    pub more_nats_with_half_the_rays: Option<f64>,
+    pub rays: Option<RayDependence>,
     /// Its parameters.
     pub parameters: Vec<FoundParameter>,
     /// What it gains; `None` where no position could be held out.

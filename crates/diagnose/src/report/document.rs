@@ -2,7 +2,7 @@
 
 use crate::found_parameter::FoundParameter;
 use crate::report::diagnosis::{
-    Cause, Diagnosis, FittedMaterial, FoundLaw, HeldOutGain, LawPoint, ResidualCell,
+    Cause, Diagnosis, FittedMaterial, FoundLaw, HeldOutGain, LawPoint, RayDependence, ResidualCell,
 };
 use serde::ser::{Serialize, SerializeMap, SerializeStruct, Serializer};
 
@@ -41,7 +41,7 @@ struct CauseEntry<'a> {
     explanation: &'a str,
     probability: f64,
     nats: f64,
-    more_nats_with_half_the_rays: Option<f64>,
+    rays: Option<&'a RayDependence>,
     parameters: ByName<'a, ParameterEntry<'a>>,
     held_out_gain: Option<&'a HeldOutGain>,
     slight: bool,
@@ -56,7 +56,7 @@ impl<'a> CauseEntry<'a> {
             explanation: &cause.explanation,
             probability: cause.probability,
             nats: cause.nats,
-            more_nats_with_half_the_rays: cause.more_nats_with_half_the_rays,
+            rays: cause.rays.as_ref(),
             parameters: ByName(cause.parameters.iter().map(ParameterEntry::of).collect()),
             held_out_gain: cause.held_out_gain.as_ref(),
             slight: cause.slight,
@@ -177,7 +177,7 @@ mod tests {
                 explanation: "Late.".into(),
                 probability: 0.9,
                 nats: 20.0,
-                more_nats_with_half_the_rays: Some(0.3),
+                rays: Some(RayDependence::new(20.0, vec![19.5, 19.8])),
                 parameters: vec![parameter("latency")],
                 held_out_gain: None,
                 slight: false,

@@ -24,9 +24,10 @@ pub trait SceneTracer: Send + Sync {
     /// For a scene that cannot be traced.
     fn prepare(&self, scene: &Scene, duration_s: f64) -> Result<Box<dyn PreparedTracer>, Error>;
 
-    /// A tracer that draws half as many rays, others than this one: what the evidence for a cause owes to the number of rays shows in it.
-    /// The default has none.
-    fn with_half_the_rays(&self) -> Option<Arc<dyn SceneTracer>> {
+    /// A tracer that draws half as many rays, others than this one and than any other `draw` of them: what the evidence for a cause owes to
+    /// rays shows in them. The default has none.
+    fn with_half_the_rays(&self, draw: u64) -> Option<Arc<dyn SceneTracer>> {
+        let _ = draw;
         None
     }
 
@@ -90,8 +91,8 @@ impl SceneTracer for Rays {
         Ok(Box::new(PreparedRays { tracer, prepared, scene }))
     }
 
-    fn with_half_the_rays(&self) -> Option<Arc<dyn SceneTracer>> {
-        let seed = self.config.seed ^ OTHER_RAYS;
+    fn with_half_the_rays(&self, draw: u64) -> Option<Arc<dyn SceneTracer>> {
+        let seed = self.config.seed ^ OTHER_RAYS.wrapping_add(draw << 48);
         Some(Arc::new(Self {
             config: TracerConfig { rays: self.config.rays.div_ceil(2), seed, ..self.config.clone() },
         }))

@@ -125,10 +125,10 @@ fn parameters(page: &mut Page, findings: &Findings) -> Result<()> {
 }
 
 fn rays_sentence(cause: &Cause) -> String {
-    let more = cause.more_nats_with_half_the_rays.filter(|more| *more > WORTH_SAYING_NATS);
-    more.map_or(String::new(), |more| {
+    let owed = cause.rays.as_ref().map(|rays| rays.owed_nats).filter(|owed| *owed > WORTH_SAYING_NATS);
+    owed.map_or(String::new(), |owed| {
         format!(
-            " Of its {:.0} nats of evidence about {more:.0} are owed to the chance of the rays: half as many give it so much more.",
+            " Of its {:.0} nats of evidence up to {owed:.0} may come from the rays that happened to be drawn.",
             cause.nats
         )
     })
