@@ -106,16 +106,16 @@ pub(crate) fn ratio_interval(groups: &[(f64, f64)]) -> [f64; 2] {
     let ratio = sum / weight;
     let squares: f64 = groups.iter().map(|(s, w)| (s - ratio * w).powi(2)).sum();
     let error = (squares * n / (n - 1.0)).sqrt() / weight;
-    let half = student_quantile(groups.len() - 1) * error;
+    let half = student_quantile(groups.len() - 1, 0.05) * error;
     [ratio - half, ratio + half]
 }
 
-/// Value that Student's t of so many degrees exceeds with a probability of 5 %, by bisection.
-pub(crate) fn student_quantile(degrees: usize) -> f64 {
-    let (mut low, mut high) = (0.0, 10.0);
-    for _ in 0..60 {
+/// Value that Student's t of so many degrees exceeds with this probability, up to ten thousand, by bisection.
+pub(crate) fn student_quantile(degrees: usize, tail: f64) -> f64 {
+    let (mut low, mut high) = (0.0, 1e4);
+    for _ in 0..70 {
         let middle = 0.5 * (low + high);
-        if student_tail(middle, degrees) > 0.05 { low = middle } else { high = middle }
+        if student_tail(middle, degrees) > tail { low = middle } else { high = middle }
     }
     0.5 * (low + high)
 }
@@ -262,12 +262,14 @@ mod tests {
 
     #[test]
     fn quantiles_of_student_are_those_of_the_tables() {
-        let table = [(1, 6.313_752), (2, 2.919_986), (3, 2.353_363), (4, 2.131_847), (7, 1.894_579)];
-        for (degrees, quantile) in
-            table.into_iter().chain([(11, 1.795_885), (30, 1.697_261), (100, 1.660_234)])
-        {
-            let found = student_quantile(degrees);
-            assert!((found - quantile).abs() < 1e-6, "{degrees}: {found}");
+        let at_5_percent = [(1, 6.313_752), (2, 2.919_986), (3, 2.353_363), (4, 2.131_847), (7, 1.894_579)];
+        let of_many = [(11, 1.795_885), (30, 1.697_261), (100, 1.660_234)];
+        let at_1_percent = [(1, 31.820_516), (2, 6.964_557), (7, 2.997_952)];
+        for (tail, table) in [(0.05, &at_5_percent[..]), (0.05, &of_many), (0.01, &at_1_percent)] {
+            for &(degrees, quantile) in table {
+                let found = student_quantile(degrees, tail);
+                assert!((found - quantile).abs() < 1e-6, "{degrees}: {found}");
+            }
         }
     }
 

@@ -50,8 +50,9 @@ impl RayDependence {
     /// over the number of rays, so that what half of them say more, all of them still say too much (Richardson's extrapolation). The other is of
     /// the scatter: the distance of a prediction without the cause from the measurement, along what the cause changes, is the root of twice the
     /// evidence in units of its standard deviation; the error of the rays adds to it, with a variance that halves where they are doubled. The
-    /// draws tell this variance, and evidence counts as far as its lower 95 % limit by Student's t reaches.
-    pub(crate) fn new(decay_nats: f64, decay_nats_with_half: Vec<f64>) -> Self {
+    /// draws tell this variance, and evidence counts as far as the limit that this distance falls below with the probability
+    /// `significance` (Student's t).
+    pub(crate) fn new(decay_nats: f64, decay_nats_with_half: Vec<f64>, significance: f64) -> Self {
         let draws = decay_nats_with_half.len() as f64;
         let distance = |nats: f64| (2.0 * nats.max(0.0)).sqrt();
         let half = || decay_nats_with_half.iter().map(|&nats| distance(nats));
@@ -61,7 +62,7 @@ impl RayDependence {
         let mean = (2.0 * whole + half().sum::<f64>()) / weights;
         let squares = 2.0 * (whole - mean).powi(2) + half().map(|d| (d - mean).powi(2)).sum::<f64>();
         let error = (squares / draws / weights).sqrt();
-        let least = (mean - student_quantile(decay_nats_with_half.len()) * error).max(0.0);
+        let least = (mean - student_quantile(decay_nats_with_half.len(), significance) * error).max(0.0);
         let by_scatter = decay_nats - 0.5 * least * least;
         let by_mean = decay_nats_with_half.iter().sum::<f64>() / draws - decay_nats;
         Self { decay_nats, decay_nats_with_half, owed_nats: by_scatter.max(by_mean).max(0.0) }
@@ -105,7 +106,9 @@ pub(crate) fn owed_to_rays(
         with_half.iter_mut().zip(drawn?).for_each(|(all, nats)| all.push(nats));
     }
     baseline.seconds.insert("half the rays", started.elapsed().as_secs_f64());
-    let owed = with_all.into_iter().zip(with_half).map(|(all, half)| RayDependence::new(all, half));
+    let significance = baseline.config.significance;
+    let owed = with_all.into_iter().zip(with_half);
+    let owed = owed.map(|(all, half)| RayDependence::new(all, half, significance));
     Ok(bear.into_iter().zip(owed).collect())
 }
 
@@ -164,7 +167,8 @@ mod tests {
         let state = search.state(&[0], None).expect("a fit");
         let nats = state.log_evidence() - search.state(&[], None).expect("a fit").log_evidence();
         assert!(nats > search.threshold() + 2.0, "{nats}");
-        let owed = |owed_nats: f64| RayDependence { owed_nats, ..RayDependence::new(nats, vec![nats; 2]) };
+        let owed =
+            |owed_nats: f64| RayDependence { owed_nats, ..RayDependence::new(nats, vec![nats; 2], 0.01) };
         let falls = |nats: f64| unsettled(&search, &state, &[(0, owed(nats))]).expect("fits");
         assert_eq!(falls(nats - search.threshold() + 1.0), Some(0));
         assert_eq!(falls(nats - search.threshold() - 1.0), None);
@@ -177,10 +181,12 @@ mod tests {
 
     #[test]
     fn evidence_that_other_rays_confirm_owes_nothing_and_the_luck_of_one_draw_owes_all() {
-        let owed = |all: f64, half: [f64; 2]| RayDependence::new(all, half.to_vec()).owed_nats;
+        let owed = |all: f64, half: [f64; 2]| RayDependence::new(all, half.to_vec(), 0.01).owed_nats;
         assert!(owed(40.0, [40.0; 2]) < 1e-9);
         // What half of the rays say more, all of them say too much.
-        assert!((owed(20.0, [30.0; 2]) - 10.0).abs() < 1.0, "{}", owed(20.0, [30.0; 2]));
+        assert!((10.0..20.0).contains(&owed(20.0, [30.0; 2])), "{}", owed(20.0, [30.0; 2]));
+        let willing = RayDependence::new(20.0, vec![30.0; 2], 0.5);
+        assert!((willing.owed_nats - 10.0).abs() < 1e-9, "{}", willing.owed_nats);
         // Large by the rays that were drawn, as other rays show.
         assert!(owed(100.0, [20.0, 1.0]) > 99.0);
         // Of a hundred nats that scatter by two, most stand.
@@ -202,7 +208,7 @@ mod tests {
         let (mut named, mut by_mean, mut stand) = (0, 0, 0);
         for _ in 0..4000 {
             let [all, first, second] = [25.0, 50.0, 50.0].map(|variance| 0.5 * normal(variance).powi(2));
-            let rays = RayDependence::new(all, vec![first, second]);
+            let rays = RayDependence::new(all, vec![first, second], 0.01);
             named += usize::from(all > 6.0);
             by_mean += usize::from(all > 6.0 && all - (0.5 * (first + second) - all) > 6.0);
             stand += usize::from(all - rays.owed_nats > 6.0);
