@@ -15,6 +15,11 @@ use std::path::PathBuf;
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum Error {
+    /// Walls that absorb by the angle of incidence, and paths that do not know at which angle they meet them.
+    AngleNotRecorded {
+        /// Number of the material.
+        material: usize,
+    },
     /// A centre frequency that is not nominal.
     UnknownBand {
         /// The frequency asked for, in Hz.
@@ -218,6 +223,10 @@ impl fmt::Display for Error {
                 write!(f, "{what} {index} does not exist; there are {count}")
             }
             Self::UnknownId { id } => write!(f, "there is no `{id}`"),
+            Self::AngleNotRecorded { material } => write!(
+                f,
+                "absorption by angle is not known: the tracer did not record at which angle paths meet material {material}"
+            ),
             Self::MaterialCount { expected, found } => {
                 write!(f, "{found} materials given where {expected} are needed")
             }

@@ -90,6 +90,7 @@
 //! - A. Lundeby, T. E. Vigran, H. Bietz, M. Vorländer: Uncertainties of measurements in room acoustics. Acustica 81, 1995.
 //! - H. Kuttruff: Room Acoustics, 6th edition, 2017.
 
+mod admittance;
 mod air;
 mod atomic_file;
 #[cfg(feature = "audio")]
@@ -109,6 +110,7 @@ mod estimate;
 mod filter_bank;
 mod interaural;
 mod lateral;
+mod local_reaction;
 mod material;
 mod material_library;
 mod onset;
@@ -134,6 +136,7 @@ mod sweep_error;
 mod targets;
 mod transforms;
 
+pub use admittance::{absorption_of_admittance, admittance_of_absorption};
 pub use air::Air;
 pub use atomic_file::{create_folder_beside, write_atomically};
 #[cfg(feature = "audio")]
@@ -153,6 +156,7 @@ pub use estimate::{Estimate, NoReading, Reading};
 pub use filter_bank::FilterBank;
 pub use interaural::InterauralCorrelation;
 pub use lateral::{LateralEnergy, LateralNormalisation};
+pub use local_reaction::LocalReaction;
 pub use material::Material;
 pub use material_library::{LibraryMaterial, library_material, material_library};
 pub use onset::Onset;

@@ -24,6 +24,8 @@ pub struct ModelArguments {
 pub struct PathModel {
     /// Formulas under which paths carry sound; none that adds sound or goes with the order of the recordings.
     pub laws: Vec<Law>,
+    /// By which share walls react locally; 0 is absorption that is the same at all angles.
+    pub locally_reacting_share: f64,
     /// Below this frequency in Hz responses are those of the wave equation.
     pub wave_below_hz: Option<f64>,
     diffraction: bool,
@@ -59,6 +61,7 @@ impl ModelArguments {
         }
         let own = PathModel {
             laws,
+            locally_reacting_share: extended.locally_reacting_share,
             wave_below_hz: extended.wave_below_hz,
             diffraction: extended.diffraction,
             cuboid_paths: extended.cuboid_paths,
@@ -78,22 +81,48 @@ impl PathModel {
         }
     }
 
-    /// The laws between a source and a receiver.
+    /// What the model says of paths between a source and a receiver.
     ///
     /// # Errors
     /// A law that does not fit the room.
-    pub fn laws_between(
+    pub fn between(
         &self,
         scene: &Scene,
         (source, receiver): (&Source, &Receiver),
         air: &Air,
-    ) -> Result<BoundLaws, ValueError> {
-        Ok(BoundLaws::new(&self.laws, &LawSite::new(scene, source, receiver, air))?)
+    ) -> Result<PairModel, ValueError> {
+        let laws = BoundLaws::new(&self.laws, &LawSite::new(scene, source, receiver, air))?;
+        Ok(PairModel { laws, locally_reacting_share: self.locally_reacting_share })
+    }
+
+    /// Whether it says nothing of what paths carry.
+    pub fn is_plain(&self) -> bool {
+        self.laws.is_empty() && self.locally_reacting_share == 0.0
     }
 }
 
-/// Surfaces and air under laws, if there are any.
-pub fn conditions<'a>(materials: &'a [Material], air: &'a Air, laws: &'a BoundLaws) -> Conditions<'a> {
-    let plain = Conditions::new(materials, air);
-    if laws.is_empty() { plain } else { plain.with_laws(laws) }
+/// What a model says of paths between one source and one receiver.
+#[derive(Clone, Debug)]
+pub struct PairModel {
+    laws: BoundLaws,
+    locally_reacting_share: f64,
+}
+
+impl PairModel {
+    /// Whether it says nothing.
+    pub fn is_plain(&self) -> bool {
+        self.laws.is_empty() && self.locally_reacting_share == 0.0
+    }
+
+    /// Surfaces and air under it.
+    pub fn conditions<'a>(&'a self, materials: &'a [Material], air: &'a Air) -> Conditions<'a> {
+        let mut conditions = Conditions::new(materials, air);
+        if !self.laws.is_empty() {
+            conditions = conditions.with_laws(&self.laws);
+        }
+        if self.locally_reacting_share != 0.0 {
+            conditions = conditions.with_local_reaction(self.locally_reacting_share, materials);
+        }
+        conditions
+    }
 }

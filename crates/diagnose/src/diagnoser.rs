@@ -117,7 +117,8 @@ impl Diagnoser {
         for response in room.responses() {
             let (source, receiver) = (&room.sources()[response.source], &room.receivers()[response.receiver]);
             let site = LawSite::new(room.scene(), source, receiver, &room.air());
-            let site = site.with_recording_order(response.recorded_at);
+            let site =
+                site.with_recording_order(response.recorded_at).among(room.sources(), room.receivers());
             for law in &self.laws {
                 BoundLaws::new(std::slice::from_ref(law), &site).map_err(sabine_acoustics::Error::from)?;
             }

@@ -104,7 +104,7 @@ pub use extend::box_object::BoxObject;
 pub use extend::displaced_surface::DisplacedSurface;
 pub use extend::extended_model::{ExtendedModel, ModelCause};
 pub use extend::extended_room::ExtendedRoom;
-pub use extend::law_file::{absorption_by_angle, laws_of_toml, read_laws, shipped_laws};
+pub use extend::law_file::{absorption_by_angle, channel_response, laws_of_toml, read_laws, shipped_laws};
 pub use extend::model_change::ModelChange;
 pub use extend::moved_mesh::DisplacementError;
 pub use extend::rigid_motion::RigidMotion;

@@ -1,13 +1,14 @@
 //! Cost of one band: the squared difference between the slope of its simulated decay and the slope that is wanted.
 
 use crate::decay_slope::DecaySlope;
-use crate::history::{History, Unabsorbed, check_paths};
+use crate::fit_problem::FitProblem;
+use crate::history::{Trace, check_paths};
 use crate::objective::Objective;
 use crate::single_paths::SinglePathSlope;
 use crate::slope_model::SlopeModel;
 use crate::{Error, FitConfig, SlopeObjective};
 use sabine_acoustics::{Air, Material};
-use sabine_paths::PathSet;
+use sabine_paths::{Conditions, PathSet};
 
 /// J(absorption) = (m - m')2 of one octave band, in (dB/s)2, m' = -60/T60 (Tang et al. 2020, section 3.4).
 ///
@@ -61,6 +62,35 @@ impl SlopeEvaluation {
         band: usize,
         target_t60_s: f64,
     ) -> Result<Self, Error> {
+        Self::of(config, paths, &FitProblem::new(materials, &[], air), (band, target_t60_s))
+    }
+
+    /// The same under conditions, one for each path set: another attenuation, directional ends, laws, walls that react locally. Their materials
+    /// must be the same in all; their scattering is used.
+    ///
+    /// # Errors
+    /// As [`SlopeEvaluation::new`], and [`Error::ConditionCount`], [`Error::AddedSound`], and a law that has no value on some path.
+    pub fn under(
+        config: &FitConfig,
+        paths: &[&PathSet],
+        conditions: &[Conditions<'_>],
+        band: usize,
+        target_t60_s: f64,
+    ) -> Result<Self, Error> {
+        let Some(first) = conditions.first() else {
+            return Err(Error::ConditionCount { pairs: paths.len(), found: 0 });
+        };
+        let problem = FitProblem::new(first.materials, &[], first.air).under(conditions);
+        Self::of(config, paths, &problem, (band, target_t60_s))
+    }
+
+    fn of(
+        config: &FitConfig,
+        paths: &[&PathSet],
+        problem: &FitProblem<'_>,
+        (band, target_t60_s): (usize, f64),
+    ) -> Result<Self, Error> {
+        let materials = problem.materials;
         config.check()?;
         check_paths(paths, materials)?;
         let bands = materials[0].bands();
@@ -78,13 +108,14 @@ impl SlopeEvaluation {
                 high_s,
             });
         }
-        let histories: Vec<History> = paths.iter().map(|p| History::new(p, air, config.bin_s)).collect();
-        let unabsorbed = Unabsorbed::Air(air.energy_exponent_per_m(bands));
+        let traces: Vec<Trace<'_>> =
+            paths.iter().enumerate().map(|(pair, paths)| Trace { pair, paths, share: 1.0 }).collect();
+        let (histories, unabsorbed) = problem.histories(&traces, config.bin_s)?;
         let pairs = histories
             .into_iter()
-            .zip(paths)
-            .map(|(history, paths)| {
-                let weights = history.weights(paths, materials, &unabsorbed, band, 1.0)?;
+            .zip(unabsorbed.iter().zip(paths))
+            .map(|(history, (own, paths))| {
+                let weights = history.weights(paths, materials, own, band, 1.0)?;
                 Ok((history, weights))
             })
             .collect::<Result<Vec<_>, Error>>()?;

@@ -30,12 +30,23 @@ pub struct Conditions<'a> {
     pub receiver: Option<(&'a Directivity, Orientation)>,
     /// Formulas that change what paths carry and when they arrive.
     pub laws: Option<&'a BoundLaws>,
+    /// By which share walls react locally, and the materials whose absorption at random incidence gives their impedances; `None` is absorption
+    /// that is the same at all angles.
+    pub local_reaction: Option<(f64, &'a [Material])>,
 }
 
 impl<'a> Conditions<'a> {
     /// Omnidirectional source and receiver between these surfaces.
     pub fn new(materials: &'a [Material], air: &'a Air) -> Self {
-        Self { materials, air, attenuation: None, source: None, receiver: None, laws: None }
+        Self {
+            materials,
+            air,
+            attenuation: None,
+            source: None,
+            receiver: None,
+            laws: None,
+            local_reaction: None,
+        }
     }
 
     /// The same between other surfaces.
@@ -66,6 +77,17 @@ impl<'a> Conditions<'a> {
     #[must_use]
     pub fn with_laws(self, laws: &'a BoundLaws) -> Self {
         Self { laws: Some(laws), ..self }
+    }
+
+    /// The same with walls that react locally by a share, so that they absorb by the angle at which sound meets them: the logarithm of what a
+    /// wall reflects lies so far between that of its absorption, the same at all angles (0), and that of the real impedance which absorbs
+    /// as much of sound from all directions as the wall's material among these (1; [`LocalReaction`](sabine_acoustics::LocalReaction)). The
+    /// materials are named on their own: where absorption is varied, impedances stay.
+    ///
+    /// Energies ask for the angles: a tracer that does not record them ([`Incidence::Unknown`](crate::Incidence::Unknown)) is an error then.
+    #[must_use]
+    pub fn with_local_reaction(self, share: f64, materials: &'a [Material]) -> Self {
+        Self { local_reaction: Some((share, materials)), ..self }
     }
 
     /// That directivities, if they have bands, have those of the materials.

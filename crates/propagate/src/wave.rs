@@ -1,6 +1,5 @@
 //! Sound as a wave at low frequencies: finite differences on a voxel grid of the mesh.
 
-mod admittance;
 mod axes;
 mod band_runs;
 mod crossings;
@@ -13,7 +12,8 @@ mod room;
 mod solver;
 mod source_pulse;
 
-pub use admittance::{absorption_of_admittance, admittance_of_absorption};
+pub use sabine_acoustics::{absorption_of_admittance, admittance_of_absorption};
+
 pub use crossover::{Crossover, JoinedResponse};
 pub use error::WaveError;
 pub use response::WaveResponse;

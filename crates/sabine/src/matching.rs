@@ -57,6 +57,9 @@ pub struct MatchConfig {
     /// Formulas that change what paths carry, those of an extended model for instance: materials are fitted and the response is rendered
     /// under them. None that adds sound.
     pub laws: Vec<Law>,
+    /// By which share walls react locally (-0.5 to 1.5; [`Conditions::with_local_reaction`]), as an extended model may have it; 0 is absorption
+    /// that is the same at all angles. Impedances are those of the stated materials while absorption is fitted.
+    pub locally_reacting_share: f64,
 }
 
 impl Default for MatchConfig {
@@ -71,6 +74,7 @@ impl Default for MatchConfig {
             above_8_khz_db: Some(-50.0),
             wave_below_hz: None,
             laws: Vec::new(),
+            locally_reacting_share: 0.0,
         }
     }
 }
@@ -299,8 +303,12 @@ pub(crate) fn match_targets(
     clock.lap("trace");
 
     let plain = Conditions::new(&materials_before, &air);
-    let before = if laws.is_empty() { plain } else { plain.with_laws(&laws) };
-    let under = if laws.is_empty() { Vec::new() } else { vec![before] };
+    let mut before = if laws.is_empty() { plain } else { plain.with_laws(&laws) };
+    if config.locally_reacting_share != 0.0 {
+        before = before.with_local_reaction(config.locally_reacting_share, &materials_before);
+    }
+    let is_plain = laws.is_empty() && config.locally_reacting_share == 0.0;
+    let under = if is_plain { Vec::new() } else { vec![before] };
     let problem = FitProblem::new(&materials_before, &priors, &air).under(&under);
     let mut aim = targets.t60_s().clone();
     let mut corrections = 0;

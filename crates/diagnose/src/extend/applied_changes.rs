@@ -68,6 +68,8 @@ pub struct AppliedChanges {
     pub diffraction: bool,
     /// Specular reflections add as pressures, to any order: image sources in a cuboid.
     pub coherent_reflections: bool,
+    /// By which share all walls react locally.
+    pub locally_reacting_share: Option<f64>,
     /// Flat surfaces that the mesh lacks.
     pub sheets: Vec<ThinPanel>,
     /// Box-shaped obstacles that the mesh lacks, as they stand in the room: neither its size nor displaced surfaces move them.

@@ -46,6 +46,8 @@ pub struct ExtendedRoom {
     pub directivities: Vec<Option<(Directivity, Orientation)>>,
     /// The same of each receiver.
     pub receiver_directivities: Vec<Option<(Directivity, Orientation)>>,
+    /// By which share all walls react locally: 0 is absorption that is the same at all angles.
+    pub locally_reacting_share: f64,
     /// Laws of each source and receiver, `[source][receiver]`; empty where there are none.
     laws: Vec<Vec<BoundLaws>>,
     chain: RecordingChain,
@@ -73,6 +75,9 @@ impl ExtendedRoom {
         }
         if let Some(laws) = self.laws.get(source) {
             conditions = conditions.with_laws(&laws[receiver]);
+        }
+        if self.locally_reacting_share != 0.0 {
+            conditions = conditions.with_local_reaction(self.locally_reacting_share, materials);
         }
         conditions
     }
@@ -192,6 +197,7 @@ impl AppliedChanges {
             wave_below_hz: self.wave_below_hz,
             directivities,
             receiver_directivities,
+            locally_reacting_share: self.locally_reacting_share.unwrap_or(0.0),
             laws,
             chain,
         })

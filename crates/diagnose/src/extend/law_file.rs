@@ -113,6 +113,9 @@ const SHIPPED: [(&str, &str); 10] = [
 const BY_ANGLE: (&str, &str) =
     ("absorption_by_angle.toml", include_str!("../../laws/absorption_by_angle.toml"));
 
+/// The file of a law that needs the name of a receiver.
+const OF_CHANNEL: (&str, &str) = ("channel_response.toml", include_str!("../../laws/channel_response.toml"));
+
 /// The law `absorption_by_angle` that comes with this crate, of a material: how much more it takes of sound that grazes it, by octave and angle.
 /// It is none of [`shipped_laws`], which fit every room.
 ///
@@ -125,11 +128,28 @@ const BY_ANGLE: (&str, &str) =
 /// # Errors
 /// [`Error::Acoustics`] naming the law for an identifier that is none (1 to 64 letters, digits and `_-.`).
 pub fn absorption_by_angle(id: &str, material: &str) -> Result<Law, Error> {
-    let (name, text) = BY_ANGLE;
-    let laws = parse(Path::new(name), text)?;
-    // The file has one law.
-    let law = laws[0].on_surface(id, material).map_err(Cause::from)?;
-    Ok(law)
+    Ok(only_law(BY_ANGLE)?.on_surface(id, material).map_err(Cause::from)?)
+}
+
+/// The law `channel_response` that comes with this crate, of a receiver: how its microphone rises or falls over the octaves as others do not. It
+/// is none of [`shipped_laws`], which fit every room.
+///
+/// ```
+/// let law = sabine_diagnose::channel_response("left_ear", "left ear")?;
+/// assert!(law.printed().starts_with("receiver(left ear) * "));
+/// # Ok::<(), sabine_diagnose::Error>(())
+/// ```
+///
+/// # Errors
+/// [`Error::Acoustics`] naming the law for an identifier that is none (1 to 64 letters, digits and `_-.`) and for a name that a formula cannot
+/// hold (empty, or with brackets).
+pub fn channel_response(id: &str, receiver: &str) -> Result<Law, Error> {
+    Ok(only_law(OF_CHANNEL)?.of_receiver(id, receiver).map_err(Cause::from)?)
+}
+
+/// The law of a file that has one.
+fn only_law((name, text): (&str, &str)) -> Result<Law, Error> {
+    Ok(parse(Path::new(name), text)?.swap_remove(0))
 }
 
 /// The laws that come with this crate, in `laws/*.toml`: what effects of the catalogue do, as formulas to start from. None is weighed unless it

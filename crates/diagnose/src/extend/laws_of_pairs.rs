@@ -15,7 +15,7 @@ pub(crate) fn bound_laws(
         return Ok(Vec::new());
     }
     let between = |from: usize, to: usize| {
-        let site = LawSite::new(scene, &sources[from], &receivers[to], air);
+        let site = LawSite::new(scene, &sources[from], &receivers[to], air).among(sources, receivers);
         BoundLaws::new(laws, &site.with_recording_order(room.recorded_at(from, to)))
     };
     let of_source = |from| (0..receivers.len()).map(|to| between(from, to)).collect();

@@ -68,6 +68,9 @@ pub enum ModelChange {
     Diffraction,
     /// Specular reflections add as pressures.
     CoherentReflections,
+    /// By which share all walls react locally: absorption by the angle of incidence (0: the same at all angles; 1: that of a real impedance).
+    #[serde(rename = "locally_reacting_share")]
+    LocalReaction(f64),
     /// Latency of all responses in seconds.
     #[serde(rename = "latency_s")]
     Latency(f64),
@@ -148,6 +151,7 @@ impl AppliedChanges {
             ModelChange::Object(object) => self.objects.push(object),
             ModelChange::Diffraction => self.diffraction = true,
             ModelChange::CoherentReflections => self.coherent_reflections = true,
+            ModelChange::LocalReaction(share) => self.locally_reacting_share = Some(share),
             ModelChange::Law(law) => {
                 self.laws.retain(|known| known.id() != law.id());
                 self.laws.push(*law);
@@ -204,8 +208,8 @@ mod tests {
     #[test]
     fn every_case_of_the_catalogue_that_is_fitted_changes_the_model_or_says_why_not() {
         let survey = hand_made::survey(Levels::Absolute, TimeZero::Emission);
-        // Absorption is always part of the model; the other two are named and not rendered.
-        let silent = ["surface_absorption", "angle_dependent_absorption", "nonlinear_distortion"];
+        // Absorption is always part of the model; distortion is named and not rendered.
+        let silent = ["surface_absorption", "nonlinear_distortion"];
         for effect in crate::effects::catalogue() {
             for case in effect.cases(&survey) {
                 let values: Vec<f64> = case.parameters.iter().map(|p| p.typical).collect();

@@ -109,6 +109,7 @@ impl AppliedChanges {
             ("temperature_c", one(self.temperature_c), (-20.0, 50.0), "between -20 and 50 C"),
             ("clock_ppm", one(self.clock_ppm), (-2e4, 2e4), "within 20000 ppm"),
             ("wave_below_hz", one(self.wave_below_hz), (20.0, 3500.0), "between 20 and 3,500 Hz"),
+            ("locally_reacting_share", one(self.locally_reacting_share), (-0.5, 1.5), "between -0.5 and 1.5"),
             ("latency_s", one(self.latency_s), (-10.0, 10.0), "within 10 s"),
             (
                 "truncation_s",

@@ -3,7 +3,6 @@
 pub(crate) mod band_state;
 pub(crate) mod edges;
 pub(crate) mod hit_groups;
-pub(crate) mod local_reaction;
 pub(crate) mod met_surfaces;
 pub(crate) mod modes;
 pub(crate) mod monte_carlo_modes;

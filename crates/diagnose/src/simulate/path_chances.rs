@@ -1,7 +1,7 @@
 //! Which paths a prediction can do without: most carry nothing until something scatters, or far less than others that come with them.
 
-use crate::simulate::local_reaction::LocalReaction;
 use crate::simulate::scattering_share::scattering_more;
+use sabine_acoustics::LocalReaction;
 use sabine_acoustics::{Air, Bands, Error, Material, PerBand};
 use sabine_paths::{Conditions, PathSet};
 

@@ -1,8 +1,10 @@
 //! Laws that come with the crate, held against the effects whose files they are, in the same hidden rooms.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
-use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, absorption_by_angle, shipped_laws};
-use sabine_paths::laws::Law;
+use sabine_diagnose::{
+    DiagnoseConfig, Diagnoser, Diagnosis, absorption_by_angle, channel_response, shipped_laws,
+};
+use sabine_paths::laws::{Law, LawSite};
 use sabine_scene::{Levels, MeasuredRoom};
 use sabine_testkit::{Hidden, LabConfig, Laboratory};
 
@@ -184,11 +186,50 @@ fn the_law_of_absorption_by_angle_finds_the_material_and_how_much_it_takes() {
     }
 }
 
+/// `channel_response` of each receiver of a room.
+fn of_channels(room: &MeasuredRoom) -> Vec<Law> {
+    let receivers = room.receivers().iter().enumerate();
+    receivers.map(|(r, own)| channel_response(&format!("channel_{r}"), &own.id).unwrap()).collect()
+}
+
+#[test]
+fn the_law_of_a_channel_finds_the_microphone_and_its_slope() {
+    const SLOPE_DB: f64 = 2.5;
+    const WHICH: usize = 5;
+    let lab = lab(LabConfig::default());
+    let bands = lab.config().bands;
+    let flat = vec![0.0; bands.len()];
+    let sloped = bands.iter_hz().map(|hz| SLOPE_DB * (hz / 1000.0).log2()).collect();
+    let mut gains_db = vec![flat; lab.config().receivers];
+    gains_db[WHICH] = sloped;
+    let folder = tempfile::tempdir().unwrap();
+    let hidden = [Hidden::ChannelResponse { gains_db }];
+    let room = lab.write(&hidden, &folder.path().join("room"), None).unwrap();
+    let by_effect = diagnose(&room, &["channel_response"], Vec::new());
+    let found = diagnose(&room, &["transducer_response", "air_absorption"], of_channels(&room));
+    let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
+    assert_eq!(named, [format!("channel_{WHICH}")], "{:?}", found.candidates);
+    let own = &found.causes[0];
+    println!("{:.1} nats, the effect {:.1}; {:?}", own.nats, by_effect.causes[0].nats, own.parameters);
+    let slope = own.parameters.iter().find(|p| p.name == "a").unwrap();
+    assert!(
+        (slope.value - SLOPE_DB).abs() < 0.5 && slope.low < SLOPE_DB && slope.high > SLOPE_DB,
+        "{slope:?}"
+    );
+    // What is named renders: at that microphone, and at no other one.
+    let law = found.model.causes[0].law().unwrap();
+    for (r, receiver) in room.receivers().iter().enumerate() {
+        let site = LawSite::new(room.scene(), &room.sources()[0], receiver, &room.air());
+        let ask = |name: &str| if name == "frequency_hz" { Some(4000.0) } else { site.variable(name) };
+        assert_eq!(law.value(ask).unwrap().abs() > 1.0, r == WHICH, "{}", receiver.id);
+    }
+}
+
 #[test]
 fn no_shipped_law_is_named_where_nothing_is_hidden() {
     let lab = lab(LabConfig { microphone_axes: true, levels: Levels::Absolute, ..LabConfig::default() });
     let folder = tempfile::tempdir().unwrap();
     let room = lab.write(&[], &folder.path().join("room"), None).unwrap();
-    let found = diagnose(&room, &[], [shipped_laws().unwrap(), by_angle(&room)].concat());
+    let found = diagnose(&room, &[], [shipped_laws().unwrap(), by_angle(&room), of_channels(&room)].concat());
     assert!(found.causes.is_empty(), "{:?}", found.causes);
 }

@@ -30,7 +30,7 @@ fn objective(objective: SlopeObjective, target_s: f64) -> SlopeEvaluation {
 
 /// Largest error of the gradient relative to its largest component. Central differences of two steps, extrapolated, so that
 /// what is left is rounding.
-fn gradient_error(objective: &dyn Objective, x: &[f64]) -> f64 {
+pub fn gradient_error(objective: &dyn Objective, x: &[f64]) -> f64 {
     let n = objective.dimension();
     let mut gradient = vec![0.0; n];
     objective.value_and_gradient(x, &mut gradient);

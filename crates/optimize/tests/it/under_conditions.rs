@@ -1,9 +1,10 @@
 //! Fits under laws and another attenuation, against closed forms: what a law takes at each meeting with a wall, absorption need not.
 
-use sabine_acoustics::{Bands, Estimate, Material, PerBand};
+use crate::gradient::gradient_error;
+use sabine_acoustics::{Air, Bands, Directivity, Estimate, Material, Orientation, PerBand};
 use sabine_optimize::{
     AbsorptionPrior, DecayMisfit, Error, FitConfig, FitProblem, MaterialFit, MaterialFitter, MeasuredDecay,
-    MeasuredPair, PredictedChange,
+    MeasuredPair, PredictedChange, SlopeEvaluation,
 };
 use sabine_paths::laws::{BoundLaws, Law, LawParameter, LawSite, LawTarget};
 use sabine_paths::{Conditions, PathSet, Propagator};
@@ -167,6 +168,40 @@ fn responses_under_a_law_give_their_materials_back() {
         found.rmse_db.values().iter().map(|rmse| rmse.as_ref().unwrap()).sum::<f64>()
     };
     assert!(misfit(&knowing) < misfit(&ignorant));
+}
+
+/// Materials are fitted with everything else in place: a law, walls that react locally, another attenuation, a directional source.
+#[test]
+fn gradients_are_exact_under_conditions() {
+    let traced = Traced::new();
+    let (air, dry) = (traced.room.air(), Air::new(20.0, 15.0, 101.325).unwrap());
+    let laws = traced.laws(LawTarget::Path, "-c * hits(carpet)");
+    let cardioid = Directivity::first_order(Directivity::CARDIOID).unwrap();
+    let facing = Orientation::towards([1.0, 0.2, 0.0]).unwrap();
+    let conditions: Vec<Conditions<'_>> = laws
+        .iter()
+        .map(|laws| {
+            Conditions::new(&traced.materials, &air)
+                .with_laws(laws)
+                .with_attenuation(&dry)
+                .with_local_reaction(0.8, &traced.materials)
+                .with_source(&cardioid, facing)
+        })
+        .collect();
+    let paths: Vec<&PathSet> = traced.paths.iter().collect();
+    let config = FitConfig::default();
+    let materials = traced.materials.len();
+    for band in [1, 4] {
+        let under = SlopeEvaluation::under(&config, &paths, &conditions, band, 0.7).unwrap();
+        let plain = SlopeEvaluation::new(&config, &paths, &traced.materials, &air, band, 0.7).unwrap();
+        for at in [0.05, 0.3] {
+            let x: Vec<f64> = (0..materials).map(|m| at + 0.05 * (m as f64).sin().abs()).collect();
+            let error = gradient_error(&under, &x);
+            assert!(error < 1e-6, "band {band} at {at}: {error}");
+            let slope = |of: &SlopeEvaluation| of.slope_db_per_s(&x, &mut vec![0.0; materials]).unwrap();
+            assert!((slope(&under) / slope(&plain) - 1.0).abs() > 0.005, "conditions change nothing");
+        }
+    }
 }
 
 #[test]

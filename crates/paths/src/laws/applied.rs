@@ -1,5 +1,6 @@
 //! Laws applied to paths.
 
+use crate::conditions::Conditions;
 use crate::laws::blocks::{Argument, Program};
 use crate::laws::bound::{BoundLaw, BoundLaws};
 use crate::laws::columns::{BLOCK, Columns, Slot};
@@ -12,33 +13,34 @@ use crate::laws::target::LawTarget;
 use crate::laws::variable::Variable;
 use crate::path_set::PathSet;
 use crate::reweighting::{LANES, Lanes};
-use sabine_acoustics::Bands;
+use sabine_acoustics::{Bands, Error};
 use std::ops::Range;
 
-/// Laws that act on the energy of paths, prepared for one set of them.
+/// Laws that act on the energy of paths, and walls that react locally, prepared for one set of paths.
 pub(crate) struct PathLaws<'l> {
     programs: Vec<Program<'l>>,
     reflections: Option<ReflectionTables>,
     bands: Bands,
-    last: &'l Law,
+    last: Option<&'l Law>,
 }
 
 impl<'l> PathLaws<'l> {
-    /// Prepares the laws; `None` where none acts on the energy of paths. What is recorded at a time is what arrives then, so that laws of the
+    /// Prepares what acts; `None` where nothing does. What is recorded at a time is what arrives then, so that laws of the
     /// recorder act on paths by their time of arrival.
-    pub fn new(
-        laws: &'l BoundLaws,
-        paths: &PathSet,
-        speed_m_s: f64,
-        bands: Bands,
-    ) -> Result<Option<Self>, LawError> {
-        let mut columns = Columns::new(paths, speed_m_s);
-        let of_paths = laws.of(LawTarget::Path).chain(laws.of(LawTarget::Recorder));
+    pub fn new(conditions: &Conditions<'l>, paths: &PathSet, bands: Bands) -> Result<Option<Self>, Error> {
+        if conditions.laws.is_none() && conditions.local_reaction.is_none() {
+            return Ok(None);
+        }
+        let mut columns = Columns::new(paths, conditions.air.speed_of_sound_m_s());
+        let all = || conditions.laws.into_iter();
+        let of = |target| all().flat_map(move |laws| laws.of(target));
+        let of_paths = of(LawTarget::Path).chain(of(LawTarget::Recorder));
         let programs =
             of_paths.map(|bound| Program::new(bound, bands, &mut columns)).collect::<Result<Vec<_>, _>>()?;
-        let reflections = ReflectionTables::new(laws, paths, bands)?;
-        let acting = laws.laws.last().filter(|_| reflections.is_some() || !programs.is_empty());
-        Ok(acting.map(|last| Self { programs, reflections, bands, last: &last.law }))
+        let reflections = ReflectionTables::new(conditions, paths, bands)?;
+        let acts = reflections.is_some() || !programs.is_empty();
+        let last = all().flat_map(|laws| &laws.laws).last().map(|bound| &bound.law);
+        Ok(acts.then_some(Self { programs, reflections, bands, last }))
     }
 
     /// The laws of reflections.
@@ -116,6 +118,8 @@ impl LawLanes<'_> {
 
     /// All laws together, and the geometric weight, leave the exponential in its range.
     fn check_sum(&self, range: &Range<usize>, block: &[Lanes]) -> Result<(), LawError> {
+        // Walls alone reflect no more than they receive.
+        let Some(last) = self.laws.last else { return Ok(()) };
         let most = (MAX_GAIN_DB * NEPERS_PER_DB) as f32;
         let none = [true; LANES];
         let within = block.iter().fold(none, |within, x| std::array::from_fn(|i| within[i] & (x[i] <= most)));
@@ -128,7 +132,7 @@ impl LawLanes<'_> {
         let path = block.iter().position(|x| x.contains(&greatest)).map(|i| range.start + i);
         let found_db = f64::from(greatest) / NEPERS_PER_DB;
         let place = Place { path, band_hz: None };
-        Err(self.laws.last.error(None, LawFault::TooLoud { found_db, max_db: MAX_GAIN_DB, place }))
+        Err(last.error(None, LawFault::TooLoud { found_db, max_db: MAX_GAIN_DB, place }))
     }
 }
 

@@ -142,6 +142,6 @@ pub(crate) fn fault_of(formula: &Formula, at: usize, zero_divisor: bool, place: 
         Op::Unary(function, _) => LawFault::NotFinite { what: function.name(), place },
         Op::Resonance(_) => LawFault::NotFinite { what: "resonance", place },
         Op::Variable(variable) => LawFault::NotFinite { what: variable.name(), place },
-        Op::Number(_) | Op::Parameter(_) | Op::Hits(_) => LawFault::NotFinite { what: "a value", place },
+        Op::Number(_) | Op::Parameter(_) | Op::Named(..) => LawFault::NotFinite { what: "a value", place },
     }
 }

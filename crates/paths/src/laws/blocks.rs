@@ -78,7 +78,7 @@ impl<'l> Program<'l> {
             homes.push(match (kind(depends_on), op) {
                 ((false, _), _) => Home::Table,
                 ((true, true), _) => Home::Nowhere,
-                ((true, false), Op::Variable(_) | Op::Hits(_)) => Home::Column(columns.place_of(bound, op)),
+                ((true, false), Op::Variable(_) | Op::Named(..)) => Home::Column(columns.place_of(bound, op)),
                 ((true, false), _) => {
                     slots += 1;
                     Home::Slot(slots - 1)
@@ -287,7 +287,7 @@ fn compute<'s>(op: Op, argument: impl Fn(u16) -> Argument<'s>, out: &mut [f64]) 
             out.iter_mut().enumerate().for_each(|(i, out)| *out = resonance(f.at(i), f0.at(i), q.at(i)));
         }
         // Leaves have no slot.
-        Op::Number(_) | Op::Parameter(_) | Op::Variable(_) | Op::Hits(_) => {}
+        Op::Number(_) | Op::Parameter(_) | Op::Variable(_) | Op::Named(..) => {}
     }
     out.iter().fold(true, |finite, value| finite & (value.abs() <= f64::MAX))
 }

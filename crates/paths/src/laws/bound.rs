@@ -5,7 +5,7 @@ use crate::laws::error::{LawError, LawFault, Place, nearest};
 use crate::laws::formula::{Binary, Op};
 use crate::laws::law::Law;
 use crate::laws::target::LawTarget;
-use crate::laws::variable::{Variable, scope};
+use crate::laws::variable::{Named, Variable, scope};
 use sabine_acoustics::{Air, Bands};
 use sabine_scene::{Receiver, Scene, Source};
 
@@ -18,10 +18,12 @@ pub struct LawSite {
     receiver: Receiver,
     air: Air,
     recording_order: Option<f64>,
+    /// Names of all sources and receivers of the room, where it is known which there are.
+    ends: Option<[Vec<String>; 2]>,
 }
 
 impl LawSite {
-    /// A source and a receiver in a scene whose materials are those of the paths, in the same order.
+    /// A source and a receiver in a scene whose materials are those of the paths, in the same order. A law may name any source and receiver.
     pub fn new(scene: &Scene, source: &Source, receiver: &Receiver, air: &Air) -> Self {
         Self {
             materials: scene.materials().iter().map(|named| named.name.clone()).collect(),
@@ -29,7 +31,16 @@ impl LawSite {
             receiver: receiver.clone(),
             air: *air,
             recording_order: None,
+            ends: None,
         }
+    }
+
+    /// The same in a room of these sources and receivers: a law that names another one is refused.
+    #[must_use]
+    pub fn among(self, sources: &[Source], receivers: &[Receiver]) -> Self {
+        let sources = sources.iter().map(|source| source.id.clone()).collect();
+        let receivers = receivers.iter().map(|receiver| receiver.id.clone()).collect();
+        Self { ends: Some([sources, receivers]), ..self }
     }
 
     /// The same with a number that rises with the time at which the response was recorded (`MeasuredRoom::recorded_at`); `None`: nobody
@@ -39,9 +50,10 @@ impl LawSite {
         Self { recording_order: order.into(), ..self }
     }
 
-    /// A variable of pair and response by its name: `distance_m`, `receiver_x_m`, `temperature_c` ...
+    /// A variable of pair and response by its name: `distance_m`, `receiver_x_m`, `temperature_c`, `receiver(mic_1)` ...
     pub fn variable(&self, name: &str) -> Option<f64> {
-        self.value(Variable::of_name(name)?)
+        end_variable(name, [&self.source.id, &self.receiver.id])
+            .or_else(|| self.value(Variable::of_name(name)?))
     }
 
     /// A variable of pair and response.
@@ -79,6 +91,20 @@ impl LawSite {
         }
     }
 
+    /// What stands for a name: the number of a material; one for the source or receiver of this pair, zero for another one.
+    fn number(&self, (named, name): &(Named, String)) -> Result<usize, LawFault> {
+        let (own, end) = match named {
+            Named::Hits => return self.material(name),
+            Named::Source => (&self.source.id, 0),
+            Named::Receiver => (&self.receiver.id, 1),
+        };
+        let others = self.ends.iter().flat_map(|ends| &ends[end]).map(String::as_str);
+        if name == own || self.ends.is_none() || others.clone().any(|other| other == name) {
+            return Ok(usize::from(name == own));
+        }
+        Err(LawFault::UnknownEnd { end: named.word(), name: name.clone(), nearest: nearest(name, others) })
+    }
+
     fn material(&self, name: &str) -> Result<usize, LawFault> {
         if let Some(index) = self.materials.iter().position(|material| material == name) {
             return Ok(index);
@@ -105,8 +131,9 @@ pub(crate) struct BoundLaw {
     pub law: Law,
     /// Number of the material whose reflections it changes.
     pub surface: Option<usize>,
-    /// Numbers of the materials whose meetings it counts, as in [`Formula::surfaces`](crate::laws::formula::Formula).
-    pub hits: Vec<usize>,
+    /// What stands for each of [`Formula::names`](crate::laws::formula::Formula): the number of a material whose meetings it counts; one for the
+    /// source and the receiver of this pair, zero for others.
+    pub named: Vec<usize>,
     /// Values of the variables of pair and response that it uses.
     known: Vec<(Variable, f64)>,
     pub axes: [Option<[f64; 3]>; 2],
@@ -138,13 +165,13 @@ impl BoundLaw {
     fn new(law: &Law, site: &LawSite) -> Result<Self, LawError> {
         let surface = law.surface().map(|name| site.material(name)).transpose();
         let surface = surface.map_err(|fault| law.error(None, fault))?;
-        let (mut hits, mut known) = (Vec::new(), Vec::new());
+        let (mut named, mut known) = (Vec::new(), Vec::new());
         for (at, &op) in law.formula.ops.iter().enumerate() {
             match op {
-                // In the order of their first mention, as the formula's surfaces are.
-                Op::Hits(index) if usize::from(index) == hits.len() => {
-                    let name = &law.formula.surfaces[usize::from(index)];
-                    hits.push(site.material(name).map_err(|fault| law.error_at(at, fault))?);
+                // In the order of their first mention, as the formula's names are.
+                Op::Named(_, index) if usize::from(index) == named.len() => {
+                    let number = site.number(&law.formula.names[usize::from(index)]);
+                    named.push(number.map_err(|fault| law.error_at(at, fault))?);
                 }
                 Op::Variable(variable) => {
                     if let Some(why) = site.unknown(variable) {
@@ -157,7 +184,7 @@ impl BoundLaw {
             }
         }
         let bound =
-            Self { law: law.clone(), surface, hits, known, axes: [site.source.axis, site.receiver.axis] };
+            Self { law: law.clone(), surface, named, known, axes: [site.source.axis, site.receiver.axis] };
         bound.check_constants()?;
         Ok(bound)
     }
@@ -177,6 +204,7 @@ impl BoundLaw {
             Op::Variable(variable) => {
                 self.known.iter().find(|(v, _)| *v == variable).map(|(_, value)| *value)
             }
+            Op::Named(Named::Source | Named::Receiver, index) => Some(self.named[usize::from(index)] as f64),
             _ => None,
         }
     }
@@ -231,4 +259,16 @@ impl BoundLaw {
     pub fn asks_for_angle(&self) -> bool {
         self.law.scopes.last().is_some_and(|scope| scope & scope::HIT != 0)
     }
+}
+
+/// The value of `source(ID)` or `receiver(ID)` in a response of these ends, source and receiver: 1 if it is one of them, else 0. `None` for other
+/// names.
+pub fn end_variable(name: &str, [source, receiver]: [&str; 2]) -> Option<f64> {
+    let (word, rest) = name.split_once('(')?;
+    let own = match Named::of_word(word)? {
+        Named::Hits => return None,
+        Named::Source => source,
+        Named::Receiver => receiver,
+    };
+    Some(f64::from(u8::from(rest.strip_suffix(')')? == own)))
 }

@@ -4,7 +4,7 @@ use crate::laws::error::{LawFault, Located};
 use crate::laws::formula::{Binary, Formula, Op, Unary};
 use crate::laws::target::LawTarget;
 use crate::laws::unit::{Dimension, Unit};
-use crate::laws::variable::{HITS, has, scope};
+use crate::laws::variable::has;
 
 /// What is known of a part of a formula.
 #[derive(Clone, Copy)]
@@ -31,9 +31,10 @@ pub(crate) fn check(
         let scope = scope_of(op, &scopes);
         let (variable, name) = match op {
             Op::Variable(variable) => (Some(variable), variable.name()),
-            _ => (None, HITS),
+            Op::Named(named, _) => (None, named.word()),
+            _ => (None, ""),
         };
-        if matches!(op, Op::Variable(_) | Op::Hits(_)) && !has(target, variable, scope) {
+        if matches!(op, Op::Variable(_) | Op::Named(..)) && !has(target, variable, scope) {
             return Err((column, LawFault::NotOfTarget { variable: name, target }));
         }
         if let Op::Unary(function @ (Unary::Cos | Unary::Sin), of) = op
@@ -58,7 +59,7 @@ fn scope_of(op: Op, before: &[u8]) -> u8 {
     match op {
         Op::Number(_) | Op::Parameter(_) => 0,
         Op::Variable(variable) => variable.scope(),
-        Op::Hits(_) => scope::PATH,
+        Op::Named(named, _) => named.scope(),
         Op::Unary(_, of) => before[usize::from(of)],
         Op::Binary(_, a, b) => before[usize::from(a)] | before[usize::from(b)],
         Op::Resonance(of) => of.iter().fold(0, |scope, &i| scope | before[usize::from(i)]),
@@ -84,7 +85,7 @@ fn part_of(op: Op, before: &[Part], parameters: &[Dimension]) -> Result<Part, La
         Op::Number(value) => Part { dimension: Dimension::PURE, zero: value == 0.0, written: Some(value) },
         Op::Parameter(index) => of(parameters[usize::from(index)]),
         Op::Variable(variable) => of(variable.dimension()),
-        Op::Hits(_) => of(Dimension::PURE),
+        Op::Named(..) => of(Dimension::PURE),
         Op::Unary(Unary::Negate, a) => {
             let part = before[usize::from(a)];
             Part { written: part.written.map(|value| -value), ..part }

@@ -3,7 +3,7 @@
 use crate::laws::angles::azimuth_degrees;
 use crate::laws::bound::BoundLaw;
 use crate::laws::formula::Op;
-use crate::laws::variable::Variable;
+use crate::laws::variable::{Named, Variable};
 use crate::path_set::PathSet;
 use std::ops::Range;
 
@@ -53,7 +53,7 @@ impl<'p> Columns<'p> {
     /// Number of the column of a variable, which is made if there is none yet.
     pub fn place_of(&mut self, bound: &BoundLaw, op: Op) -> usize {
         let counted = match op {
-            Op::Hits(index) => Some(Counted::Material(bound.hits[usize::from(index)])),
+            Op::Named(Named::Hits, index) => Some(Counted::Material(bound.named[usize::from(index)])),
             Op::Variable(Variable::Reflections) => Some(Counted::Reflections),
             Op::Variable(Variable::Scatterings) => Some(Counted::Scatterings),
             _ => None,

@@ -132,6 +132,15 @@ pub enum LawFault {
         /// The most alike of those that the mesh has.
         nearest: Option<String>,
     },
+    /// A source or a receiver that the room lacks.
+    UnknownEnd {
+        /// `source` or `receiver`.
+        end: &'static str,
+        /// Its name.
+        name: String,
+        /// The most alike of those that the room has.
+        nearest: Option<String>,
+    },
     /// A variable that this room or these paths do not tell.
     NotKnown {
         /// The variable.
@@ -274,6 +283,10 @@ impl LawFault {
         match self {
             Self::UnknownSurface { name, nearest } => {
                 write!(f, "the mesh has no material `{name}`")?;
+                perhaps(f, nearest.as_ref())
+            }
+            Self::UnknownEnd { end, name, nearest } => {
+                write!(f, "the room has no {end} `{name}`")?;
                 perhaps(f, nearest.as_ref())
             }
             Self::NotKnown { variable, why } => write!(f, "`{variable}` is not known: {why}"),

@@ -1,6 +1,6 @@
 //! A formula as a list of operations, arguments before what uses them, and its printing.
 
-use crate::laws::variable::{HITS, Variable};
+use crate::laws::variable::{Named, Variable};
 use std::fmt::Write;
 
 /// Longest formula in characters.
@@ -48,8 +48,8 @@ pub(crate) enum Op {
     Number(f64),
     Parameter(Index),
     Variable(Variable),
-    /// Meetings with the material of this number among [`Formula::surfaces`].
-    Hits(Index),
+    /// A variable of the name of this number among [`Formula::names`].
+    Named(Named, Index),
     Unary(Unary, Index),
     Binary(Binary, Index, Index),
     /// 1 / (1 + q^2 (f/f0 - f0/f)^2) of f, f0 and q.
@@ -120,8 +120,8 @@ pub(crate) struct Formula {
     pub ops: Vec<Op>,
     /// Where each stands in the text, the first character being 1.
     pub columns: Vec<u16>,
-    /// Materials that it names.
-    pub surfaces: Vec<String>,
+    /// Materials, sources and receivers that it names, each once.
+    pub names: Vec<(Named, String)>,
 }
 
 impl Formula {
@@ -133,7 +133,7 @@ impl Formula {
             let of = |index: Index| grows[usize::from(index)];
             grows.push(match op {
                 Op::Parameter(index) if parameters.contains(&index) => Growth::Proportional,
-                Op::Number(_) | Op::Parameter(_) | Op::Variable(_) | Op::Hits(_) => Growth::Constant,
+                Op::Number(_) | Op::Parameter(_) | Op::Variable(_) | Op::Named(..) => Growth::Constant,
                 Op::Unary(Unary::Negate, a) => of(a),
                 Op::Unary(_, a) => of(a).through(),
                 Op::Binary(Binary::Add | Binary::Subtract, a, b) if of(a) == of(b) => of(a),
@@ -164,6 +164,12 @@ impl Formula {
             && !self.ops.iter().any(uses)
     }
 
+    /// A variable of a name as it is written.
+    pub fn named(&self, index: Index) -> String {
+        let (named, name) = &self.names[usize::from(index)];
+        format!("{}({name})", named.word())
+    }
+
     /// The formula as text that reads as the same formula.
     pub fn print(&self, parameters: &[String]) -> String {
         let mut text = String::new();
@@ -187,9 +193,7 @@ impl Formula {
             Op::Number(value) => text.push_str(&number(value)),
             Op::Parameter(index) => text.push_str(&parameters[usize::from(index)]),
             Op::Variable(variable) => text.push_str(variable.name()),
-            Op::Hits(index) => {
-                let _ = write!(text, "{HITS}({})", self.surfaces[usize::from(index)]);
-            }
+            Op::Named(_, index) => text.push_str(&self.named(index)),
             Op::Unary(Unary::Negate, of) => self.bracketed(outside > SIGN, text, |text| {
                 text.push('-');
                 self.print_op(of.into(), SIGN, parameters, text);

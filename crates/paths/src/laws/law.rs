@@ -7,7 +7,7 @@ use crate::laws::formula::{Binary, Formula, Op};
 use crate::laws::parser::{is_name, is_reserved, parse};
 use crate::laws::target::LawTarget;
 use crate::laws::unit::{Dimension, Unit};
-use crate::laws::variable::HITS;
+use crate::laws::variable::Named;
 use std::collections::BTreeMap;
 
 /// Longest identifier.
@@ -39,7 +39,8 @@ impl LawParameter {
 /// A short formula that changes what the model predicts.
 ///
 /// The grammar is closed: numbers, parameters, the variables of the target, `+ - * / ^`, `sqrt ln exp abs cos sin min max`,
-/// `above(x, x0)` (1 from `x0` on, else 0), `below(x, x0)` (the rest), `resonance(f, f0, q)` = 1 / (1 + q² (f/f0 - f0/f)²), and `hits(MATERIAL)`.
+/// `above(x, x0)` (1 from `x0` on, else 0), `below(x, x0)` (the rest), `resonance(f, f0, q)` = 1 / (1 + q² (f/f0 - f0/f)²), `hits(MATERIAL)`,
+/// `source(ID)` and `receiver(ID)` (1 in responses of that source or receiver, else 0).
 /// Units are checked: sums need the same unit, `exp`, `ln`, exponents a pure number, `cos` and `sin` degrees or a pure number (radians), and the
 /// whole has the unit of the target. Variables are in the unit that their name ends in; a frequency is one over a time.
 ///
@@ -292,6 +293,27 @@ impl Law {
         Ok(Self::new(id, self.target, Some(surface), &self.text, own)?.with_words(self.words.clone()))
     }
 
+    /// The same law of another receiver, under another identifier: each `receiver(...)` of its formula becomes that of this one.
+    ///
+    /// ```
+    /// use sabine_paths::laws::{Law, LawParameter, LawTarget};
+    /// let a = [("a", LawParameter::new(3.0, [-9.0, 9.0], "dB"))];
+    /// let law = Law::new("first", LawTarget::Path, None, "a * receiver(mic 1)", a)?;
+    /// assert_eq!(law.of_receiver("second", "mic 2")?.formula(), "a * receiver(mic 2)");
+    /// # Ok::<(), sabine_paths::laws::LawError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Law::new`]: for an identifier that is none, and for a receiver whose name a formula cannot hold (empty, or with brackets).
+    pub fn of_receiver(&self, id: &str, receiver: &str) -> Result<Self, LawError> {
+        let mut formula = self.formula.clone();
+        let own = formula.names.iter_mut().filter(|(named, _)| *named == Named::Receiver);
+        own.for_each(|(_, name)| receiver.clone_into(name));
+        let parameters = self.names.iter().cloned().zip(self.parameters.iter().cloned());
+        let law = Self::new(id, self.target, self.surface(), &formula.print(&self.names), parameters)?;
+        Ok(law.with_words(self.words.clone()))
+    }
+
     /// Its identifier.
     pub fn id(&self) -> &str {
         &self.id
@@ -328,7 +350,7 @@ impl Law {
     }
 
     /// The value in dB, or in ms for a delay, where variables have these values, in the unit that their name ends in. Meetings with a material
-    /// are asked for as `hits(NAME)`.
+    /// are asked for as `hits(NAME)`, whether a response has a source or a receiver as `source(ID)` and `receiver(ID)`.
     ///
     /// # Errors
     /// [`LawFault::NotKnown`] for a variable without a value, [`LawFault::DivisionByZero`], [`LawFault::NotFinite`].
@@ -388,9 +410,7 @@ impl Law {
         for (at, &op) in self.formula.ops.iter().enumerate() {
             let (name, known) = match op {
                 Op::Variable(of) => (of.name(), variable(of.name())),
-                Op::Hits(index) => {
-                    (HITS, variable(&format!("{HITS}({})", self.formula.surfaces[usize::from(index)])))
-                }
+                Op::Named(named, index) => (named.word(), variable(&self.formula.named(index))),
                 _ => continue,
             };
             let why = "nobody gave its value";

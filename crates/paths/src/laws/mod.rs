@@ -59,7 +59,7 @@ mod values;
 mod variable;
 
 pub(crate) use applied::{AddedEnergy, PathLaws, delays_s};
-pub use bound::{BoundLaws, LawSite};
+pub use bound::{BoundLaws, LawSite, end_variable};
 pub(crate) use columns::BLOCK;
 pub(crate) use columns::Counted;
 pub use error::{LawError, LawFault, Place};

@@ -5,12 +5,12 @@
 //! product = signed { ("*" | "/") signed }
 //! signed  = "-" signed | power
 //! power   = atom [ "^" signed ]
-//! atom    = number | name | name "(" sum { "," sum } ")" | "hits" "(" material ")" | "(" sum ")"
+//! atom    = number | name | name "(" sum { "," sum } ")" | ("hits" | "source" | "receiver") "(" id ")" | "(" sum ")"
 //! ```
 
 use crate::laws::error::{LawFault, Located, nearest};
 use crate::laws::formula::{Binary, Formula, Index, MAX_DEPTH, MAX_LENGTH, Op, Unary};
-use crate::laws::variable::{HITS, Variable};
+use crate::laws::variable::{Named, Variable};
 
 /// Functions, with the number of their arguments.
 const FUNCTIONS: [(&str, usize); 11] = [
@@ -29,7 +29,9 @@ const FUNCTIONS: [(&str, usize); 11] = [
 
 /// Whether a name stands for something in every formula, so that no parameter may have it.
 pub(crate) fn is_reserved(name: &str) -> bool {
-    name == HITS || Variable::of_name(name).is_some() || FUNCTIONS.iter().any(|(known, _)| *known == name)
+    Named::of_word(name).is_some()
+        || Variable::of_name(name).is_some()
+        || FUNCTIONS.iter().any(|(known, _)| *known == name)
 }
 
 /// Whether this can be read as the name of a parameter.
@@ -45,7 +47,7 @@ pub(crate) fn parse(text: &str, parameters: &[String]) -> Result<Formula, Locate
     if characters.len() > MAX_LENGTH {
         return Err((Some(MAX_LENGTH + 1), LawFault::TooLong { max: MAX_LENGTH }));
     }
-    let formula = Formula { ops: Vec::new(), columns: Vec::new(), surfaces: Vec::new() };
+    let formula = Formula { ops: Vec::new(), columns: Vec::new(), names: Vec::new() };
     let mut parser = Parser { characters, at: 0, depth: 0, parameters, formula };
     parser.sum()?;
     match parser.peek() {
@@ -195,8 +197,8 @@ impl Parser<'_> {
         let name: String = self.characters[start..].iter().take_while(|c| is_part(c)).collect();
         self.at += name.len();
         let column = start + 1;
-        if name == HITS {
-            return self.hits(column);
+        if let Some(named) = Named::of_word(&name) {
+            return self.with_name(named, column);
         }
         if let Some(&(function, expected)) = FUNCTIONS.iter().find(|(known, _)| *known == name) {
             return self.call(function, expected, column);
@@ -215,24 +217,29 @@ impl Parser<'_> {
         Err((Some(column), LawFault::UnknownName { name, nearest }))
     }
 
-    /// The name of a material, up to the closing bracket.
-    fn hits(&mut self, column: usize) -> Result<Index, Located> {
+    /// The name of a material, a source or a receiver, up to the closing bracket.
+    fn with_name(&mut self, named: Named, column: usize) -> Result<Index, Located> {
+        let (opened, wanted) = match named {
+            Named::Hits => ("`(` and the name of a material", "the name of a material"),
+            Named::Source => ("`(` and the name of a source", "the name of a source"),
+            Named::Receiver => ("`(` and the name of a receiver", "the name of a receiver"),
+        };
         if !self.take('(') {
-            return Err(self.expected("`(` and the name of a material"));
+            return Err(self.expected(opened));
         }
         let name: String = self.characters[self.at..].iter().take_while(|c| **c != ')').collect();
         if name.trim().is_empty() || name.contains('(') {
-            return Err(self.expected("the name of a material"));
+            return Err(self.expected(wanted));
         }
         self.at += name.chars().count();
         self.close()?;
-        let name = name.trim().to_owned();
-        let known = self.formula.surfaces.iter().position(|surface| *surface == name);
+        let own = (named, name.trim().to_owned());
+        let known = self.formula.names.iter().position(|known| *known == own);
         let index = known.unwrap_or_else(|| {
-            self.formula.surfaces.push(name);
-            self.formula.surfaces.len() - 1
+            self.formula.names.push(own);
+            self.formula.names.len() - 1
         });
-        Ok(self.push(Op::Hits(index as Index), column))
+        Ok(self.push(Op::Named(named, index as Index), column))
     }
 
     fn call(&mut self, function: &'static str, expected: usize, column: usize) -> Result<Index, Located> {

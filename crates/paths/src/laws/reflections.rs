@@ -1,6 +1,7 @@
 //! Laws of reflections: tables by angle, summed along chains.
 
-use crate::laws::bound::{BoundLaw, BoundLaws};
+use crate::conditions::Conditions;
+use crate::laws::bound::BoundLaw;
 use crate::laws::error::{LawError, LawFault, Place};
 use crate::laws::formula::Op;
 use crate::laws::gain::{check_gain, nepers};
@@ -8,7 +9,7 @@ use crate::laws::target::LawTarget;
 use crate::laws::variable::Variable;
 use crate::path_set::{ANGLES, PathSet, angle_cosine};
 use crate::reweighting::Lanes;
-use sabine_acoustics::Bands;
+use sabine_acoustics::{Bands, Error, LocalReaction, Material, OutOfRange};
 
 /// What laws do to the logarithm of the energy at each meeting with a surface.
 pub(crate) struct ReflectionTables {
@@ -19,22 +20,38 @@ pub(crate) struct ReflectionTables {
 }
 
 impl ReflectionTables {
-    /// The tables of the laws of reflections; `None` where there are none.
-    pub fn new(laws: &BoundLaws, paths: &PathSet, bands: Bands) -> Result<Option<Self>, LawError> {
+    /// The tables of the laws of reflections and of walls that react locally; `None` where there are none.
+    pub fn new(conditions: &Conditions<'_>, paths: &PathSet, bands: Bands) -> Result<Option<Self>, Error> {
         let mut tables = vec![Vec::new(); paths.materials()];
         let (mut along_axes, mut any) = (false, false);
-        for bound in laws.of(LawTarget::Reflection) {
+        if let Some((share, materials)) = conditions.local_reaction {
+            OutOfRange::check("locally reacting share", share, -1.0, 2.0, "between -1 and 2")?;
+            let own = paths.check_materials(materials)?;
+            if own != bands {
+                return Err(Error::BandMismatch { left: bands, right: own });
+            }
+            for (material, table) in tables.iter_mut().enumerate() {
+                let (unknown, axes) = paths.untold_angles(material);
+                if unknown {
+                    return Err(Error::AngleNotRecorded { material });
+                }
+                along_axes |= axes;
+                *table = reacting_locally(&materials[material], share);
+            }
+            any = true;
+        }
+        for bound in conditions.laws.iter().flat_map(|laws| laws.of(LawTarget::Reflection)) {
             let Some(surface) = bound.surface.filter(|&surface| surface < paths.materials()) else {
                 let name = bound.law.surface().unwrap_or_default().to_owned();
                 let fault = LawFault::UnknownSurface { name, nearest: None };
-                return Err(bound.law.error(None, fault));
+                return Err(bound.law.error(None, fault).into());
             };
             if bound.asks_for_angle() {
                 let (unknown, axes) = paths.untold_angles(surface);
                 if unknown {
                     let (variable, why) =
                         ("cos_incidence", "the tracer did not record at which angle paths meet this surface");
-                    return Err(bound.law.error(None, LawFault::NotKnown { variable, why }));
+                    return Err(bound.law.error(None, LawFault::NotKnown { variable, why }).into());
                 }
                 along_axes |= axes;
             }
@@ -76,6 +93,16 @@ fn lanes(table: &[Vec<f64>], first_band: usize) -> Vec<Lanes> {
     }
     let at = |angle: usize, lane: usize| table.get(first_band + lane).map_or(0.0, |row| row[angle]);
     (0..=ANGLES).map(|angle| std::array::from_fn(|lane| at(angle, lane) as f32)).collect()
+}
+
+/// What a wall that reacts locally by a share adds to the logarithm of what it reflects, `[band][angle]`; nothing at an angle that nobody knows,
+/// as no path has it.
+fn reacting_locally(material: &Material, share: f64) -> Vec<Vec<f64>> {
+    let of_band = |absorption: &f64| {
+        let wall = LocalReaction::new(*absorption);
+        (0..ANGLES).map(|angle| share * wall.log_change(angle_cosine(angle))).chain([0.0]).collect()
+    };
+    material.absorption().values().iter().map(of_band).collect()
 }
 
 /// Adds the natural logarithm of the energy factor of a law at all angles in all bands.

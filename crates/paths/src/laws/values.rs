@@ -6,7 +6,7 @@ use crate::laws::columns::{BLOCK, Columns};
 use crate::laws::error::{LawError, LawFault};
 use crate::laws::formula::Op;
 use crate::laws::law::Law;
-use crate::laws::variable::{HITS, Variable, scope};
+use crate::laws::variable::{Named, Variable, scope};
 use crate::path_set::PathSet;
 
 /// A variable at many places.
@@ -49,7 +49,7 @@ impl Held<'_> {
 
 impl Law {
     /// Values in dB, or in ms for a delay, at `count` places, for values of the parameters (in their order and units) that may lie outside
-    /// their intervals. Variables are in the unit that their name ends in; meetings with a material are asked for as `hits(NAME)`. Where the
+    /// their intervals. Variables are in the unit that their name ends in; what has a name is asked for with it: `hits(NAME)`, `receiver(NAME)`. Where the
     /// law has no value, the result is not finite.
     ///
     /// ```
@@ -87,13 +87,17 @@ impl Law {
                 Op::Parameter(index) => {
                     Held::Same(parameters[usize::from(index)] * self.scale(usize::from(index)))
                 }
-                Op::Variable(_) | Op::Hits(_) => {
+                Op::Variable(_) | Op::Named(..) => {
                     let name = self.variable_of(op);
                     match variable(&name) {
                         Some(LawVariable::Same(value)) => Held::Same(value),
                         Some(LawVariable::Each(values)) => Held::Given(&values[..count]),
                         None => {
-                            let name = if let Op::Variable(known) = op { known.name() } else { HITS };
+                            let name = match op {
+                                Op::Variable(known) => known.name(),
+                                Op::Named(named, _) => named.word(),
+                                _ => "",
+                            };
                             let why = "nobody gave its value";
                             return Err(self.error_at(at, LawFault::NotKnown { variable: name, why }));
                         }
@@ -123,7 +127,7 @@ impl Law {
     pub fn variables(&self) -> Vec<String> {
         let mut names: Vec<String> = Vec::new();
         for &op in &self.formula.ops {
-            if matches!(op, Op::Variable(_) | Op::Hits(_)) {
+            if matches!(op, Op::Variable(_) | Op::Named(..)) {
                 let name = self.variable_of(op);
                 if !names.contains(&name) {
                     names.push(name);
@@ -136,7 +140,7 @@ impl Law {
     fn variable_of(&self, op: Op) -> String {
         match op {
             Op::Variable(variable) => variable.name().to_owned(),
-            Op::Hits(index) => format!("{HITS}({})", self.formula.surfaces[usize::from(index)]),
+            Op::Named(_, index) => self.formula.named(index),
             _ => String::new(),
         }
     }
@@ -164,7 +168,7 @@ impl BoundLaws {
                         Variable::Length | Variable::Time | Variable::TimeAfterDirect | Variable::FileTime,
                     ) => true,
                     Op::Variable(other) if other.scope() & scope::PATH == 0 => continue,
-                    Op::Variable(_) | Op::Hits(_) => false,
+                    Op::Variable(_) | Op::Named(Named::Hits, _) => false,
                     _ => continue,
                 };
                 let name = bound.law.variable_of(op);

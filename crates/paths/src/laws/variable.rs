@@ -83,8 +83,38 @@ variables! {
     Frequency "frequency_hz" HZ scope::BAND;
 }
 
-/// Name of the variable that takes the name of a material: meetings with it.
-pub(crate) const HITS: &str = "hits";
+/// A variable that takes a name: `hits(carpet)`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Named {
+    /// Meetings with the material of this name.
+    Hits,
+    /// One in responses of the source of this name, zero in others.
+    Source,
+    /// One in responses of the receiver of this name, zero in others.
+    Receiver,
+}
+
+impl Named {
+    pub const ALL: [Self; 3] = [Self::Hits, Self::Source, Self::Receiver];
+
+    /// What stands before the bracket.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Hits => "hits",
+            Self::Source => "source",
+            Self::Receiver => "receiver",
+        }
+    }
+
+    /// What it depends on.
+    pub fn scope(self) -> u8 {
+        if self == Self::Hits { scope::PATH } else { 0 }
+    }
+
+    pub fn of_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|named| named.word() == word)
+    }
+}
 
 impl Variable {
     pub fn of_name(name: &str) -> Option<Self> {

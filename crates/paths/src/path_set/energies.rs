@@ -26,17 +26,14 @@ impl PathSet {
     /// Energy of each contribution in each band of the materials, `[band][contribution]`.
     ///
     /// # Errors
-    /// As [`PathSet::log_reflectance`]; [`Error::BandMismatch`] for a directivity on other bands than the materials.
+    /// As [`PathSet::log_reflectance`]; [`Error::BandMismatch`] for a directivity on other bands than the materials;
+    /// [`Error::AngleNotRecorded`] for walls that react locally and paths without angles; a law that has no value on some path.
     pub fn energies(&self, conditions: &Conditions) -> Result<Vec<Vec<f32>>, Error> {
         let Conditions { materials, air, attenuation, .. } = *conditions;
         let bands = self.check_materials(materials)?;
         conditions.check_bands(bands)?;
         let exponents = attenuation.unwrap_or(air).energy_exponent_per_m(bands);
-        let speed_m_s = air.speed_of_sound_m_s();
-        let laws = match conditions.laws {
-            Some(laws) => PathLaws::new(laws, self, speed_m_s, bands)?,
-            None => None,
-        };
+        let laws = PathLaws::new(conditions, self, bands)?;
         let groups: Vec<usize> = (0..bands.len()).step_by(LANES).collect();
         let columns = for_each_index(groups.len(), |group| {
             let first = groups[group];
@@ -134,7 +131,7 @@ impl PathSet {
         EnergyResponse::new(bands, bin_s, energy, standard_error)
     }
 
-    pub(super) fn check_materials(&self, materials: &[Material]) -> Result<Bands, Error> {
+    pub(crate) fn check_materials(&self, materials: &[Material]) -> Result<Bands, Error> {
         if materials.len() != self.materials || materials.is_empty() {
             return Err(Error::MaterialCount { expected: self.materials, found: materials.len() });
         }

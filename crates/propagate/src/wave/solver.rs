@@ -1,6 +1,5 @@
 //! Pressure responses at low frequencies, from the wave equation.
 
-use super::admittance::admittance_of_absorption;
 use super::band_runs::{BandRun, RunPlan};
 use super::error::WaveError;
 use super::leapfrog::Leapfrog;
@@ -13,7 +12,7 @@ use crate::band_masks::{BandMasks, Transition};
 use crate::placement::check_placement;
 use crate::spectrum::Spectrum;
 use realfft::num_complex::Complex;
-use sabine_acoustics::{Air, Bands, Material, Observer, OutOfRange};
+use sabine_acoustics::{Air, Bands, Material, Observer, OutOfRange, admittance_of_absorption};
 use sabine_scene::{Receiver, Scene, Source};
 use std::f64::consts::{PI, SQRT_2};
 

@@ -9,10 +9,9 @@ use super::{
 };
 use crate::bar::Bar;
 use crate::failure::Failure;
-use crate::modelled::conditions;
+use crate::modelled::PairModel;
 use sabine::acoustics::Material;
 use sabine::optimize::{MeasuredDecay, MeasuredPair, MeasuredTable};
-use sabine::paths::laws::BoundLaws;
 use sabine::paths::{Conditions, PathSet};
 use sabine::scene::{MeasuredRoom, Receiver, Source};
 use std::time::Instant;
@@ -40,21 +39,23 @@ impl<'a> Room<'a> {
         let start = Instant::now();
         let paths = trace(seed)?;
         let traced_s = start.elapsed().as_secs_f64();
-        let laws = places.iter().map(|place| self.laws(*place)).collect::<Result<Vec<_>, _>>()?;
+        let models = places.iter().map(|place| self.model_between(*place)).collect::<Result<Vec<_>, _>>()?;
         let under: Vec<Conditions<'_>> =
-            laws.iter().map(|laws| conditions(&self.materials, &self.air, laws)).collect();
+            models.iter().map(|own| own.conditions(&self.materials, &self.air)).collect();
         let of_fitted: Vec<Conditions<'_>> =
             under.iter().zip(held_out).filter(|(_, held)| !**held).map(|(own, _)| *own).collect();
         let (responses, tables) = (measured.pairs(&paths), measured.tables(&paths));
         let start = Instant::now();
-        let done =
-            fitter.fit_measured(
-                (&fitted(&responses, held_out), self.file.measurement()),
-                &fitted(&tables, &held_out[responses.len()..]),
-                &FitProblem::new(&self.materials, &self.priors, &self.air)
-                    .under(if self.model.laws.is_empty() { &[] } else { &of_fitted }),
-                bar,
-            )?;
+        let done = fitter.fit_measured(
+            (&fitted(&responses, held_out), self.file.measurement()),
+            &fitted(&tables, &held_out[responses.len()..]),
+            &FitProblem::new(&self.materials, &self.priors, &self.air).under(if self.model.is_plain() {
+                &[]
+            } else {
+                &of_fitted
+            }),
+            bar,
+        )?;
         let fit_s = start.elapsed().as_secs_f64();
 
         // Held against rays that the fit has not seen.
@@ -63,7 +64,7 @@ impl<'a> Room<'a> {
         let (compared, curves) = self.compared(&measured, &other, &under, materials)?;
         let report = measured.report(self, &other, &under, &done)?;
         let curves = if curves.is_empty() {
-            self.curves_of_tables(&measured, (&other, &laws), materials, report.as_ref())?
+            self.curves_of_tables(&measured, (&other, &models), materials, report.as_ref())?
         } else {
             curves
         };
@@ -182,13 +183,13 @@ impl<'a> Room<'a> {
     fn curves_of_tables(
         &self,
         measured: &Measured<'_>,
-        (paths, laws): (&[PathSet], &[BoundLaws]),
+        (paths, models): (&[PathSet], &[PairModel]),
         materials: &[Material],
         report: Option<&TableReport>,
     ) -> Result<Vec<Vec<super::Curve>>, Failure> {
         let pair = measured.held_out.iter().position(|held| *held).unwrap_or(0);
-        let before = self.decay(&paths[pair], &self.materials, &laws[pair])?;
-        let after = self.decay(&paths[pair], materials, &laws[pair])?;
+        let before = self.decay(&paths[pair], &self.materials, &models[pair])?;
+        let after = self.decay(&paths[pair], materials, &models[pair])?;
         let (source, receiver) = measured.places[pair];
         let wanted_s = |b: usize| report.and_then(|r| r.decay_time_s((&source.id, &receiver.id), b));
         Ok((0..OCTAVES.len()).map(|b| wanted_curves(&before, &after, b, wanted_s(b))).collect())

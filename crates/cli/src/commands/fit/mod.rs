@@ -12,7 +12,7 @@ use crate::bar::Bar;
 use crate::chart::{Chart, Look, Scale, Series};
 use crate::demo::Demo;
 use crate::failure::Failure;
-use crate::modelled::{ModelArguments, PathModel, conditions};
+use crate::modelled::{ModelArguments, PairModel, PathModel};
 use crate::output::OutputFolder;
 use crate::page::Page;
 use crate::room::{PlaceArguments, RoomArguments};
@@ -26,7 +26,6 @@ use sabine::optimize::{
     AbsorptionPrior, DecayMisfit, FitConfig, FitProblem, MaterialFit, MaterialFitter, Retrace, RetraceConfig,
     SlopeObjective,
 };
-use sabine::paths::laws::BoundLaws;
 use sabine::paths::{PathSet, Propagator};
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use sabine::scene::{MeasuredRoom, Receiver, Scene, Source};
@@ -148,9 +147,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
     let names: Vec<&str> = file.scene().materials().iter().map(|m| m.name.as_str()).collect();
     let summary = Summary::new(&names, &outcome);
-    let rendered = room.laws(outcome.place)?;
+    let between = room.model_between(outcome.place)?;
     let response =
-        renderer.render(&outcome.independent, &conditions(&outcome.fit.materials, &room.air, &rendered))?;
+        renderer.render(&outcome.independent, &between.conditions(&outcome.fit.materials, &room.air))?;
     let json = serde_json::to_string_pretty(&summary)?;
     out.write("impulse_response.wav", &encode_wav(&Signal::from(response), SampleFormat::Float32)?)?;
     out.write("fit.json", json.as_bytes())?;
@@ -208,9 +207,9 @@ impl<'a> Room<'a> {
         Ok(Self { file, scene, materials, priors, air: file.air(), model, arguments })
     }
 
-    /// The model's laws between a source and a receiver.
-    fn laws(&self, place: (&Source, &Receiver)) -> Result<BoundLaws, AcousticsError> {
-        self.model.laws_between(&self.scene, place, &self.air)
+    /// What the model says of paths between a source and a receiver.
+    fn model_between(&self, place: (&Source, &Receiver)) -> Result<PairModel, AcousticsError> {
+        self.model.between(&self.scene, place, &self.air)
     }
 
     fn fitter(&self) -> Result<MaterialFitter, Failure> {
@@ -244,9 +243,9 @@ impl<'a> Room<'a> {
         &self,
         paths: &PathSet,
         materials: &[Material],
-        laws: &BoundLaws,
+        model: &PairModel,
     ) -> Result<EnergyResponse, AcousticsError> {
-        paths.energy_response(&conditions(materials, &self.air, laws), DECAY_STEP_S)
+        paths.energy_response(&model.conditions(materials, &self.air), DECAY_STEP_S)
     }
 
     fn fit_t60(&self, t60_s: &[f64], bar: &Bar) -> Result<Outcome<'a>, Failure> {
@@ -256,10 +255,10 @@ impl<'a> Room<'a> {
         let fitter = self.fitter()?;
         fitter.check_t60(&targets, OCTAVES, &self.air, duration_s)?;
         let place = self.arguments.place.of(self.file)?;
-        let laws = self.laws(place)?;
+        let model = self.model_between(place)?;
         let under =
-            if laws.is_empty() { Vec::new() } else { vec![conditions(&self.materials, &self.air, &laws)] };
-        let retraced = Retraced { room: self, places: place, laws: &laws, duration_s };
+            if model.is_plain() { Vec::new() } else { vec![model.conditions(&self.materials, &self.air)] };
+        let retraced = Retraced { room: self, places: place, model: &model, duration_s };
         let config = RetraceConfig { seed: self.arguments.seed, ..RetraceConfig::default() };
         let done = fitter.fit_t60_retracing(
             &retraced,
@@ -269,8 +268,8 @@ impl<'a> Room<'a> {
             bar,
         )?;
         let independent = done.independent_paths.into_iter().next().ok_or("no paths")?;
-        let before = self.decay(&independent, &self.materials, &laws)?;
-        let after = self.decay(&independent, &done.fit.materials, &laws)?;
+        let before = self.decay(&independent, &self.materials, &model)?;
+        let after = self.decay(&independent, &done.fit.materials, &model)?;
         let curves = (0..OCTAVES.len()).map(|b| wanted_curves(&before, &after, b, Some(t60_s[b])));
         let warnings = done.not_verified.iter().map(ToString::to_string).collect();
         let (trace, fit) = done.seconds;
@@ -294,7 +293,7 @@ impl<'a> Room<'a> {
 struct Retraced<'a> {
     room: &'a Room<'a>,
     places: (&'a Source, &'a Receiver),
-    laws: &'a BoundLaws,
+    model: &'a PairModel,
     duration_s: f64,
 }
 
@@ -309,7 +308,7 @@ impl Retrace for Retraced<'_> {
         materials: &[Material],
     ) -> Result<Option<PerBand<Reading>>, AcousticsError> {
         let failed = |e| AcousticsError::implementation("rendering", e);
-        let between = conditions(materials, &self.room.air, self.laws);
+        let between = self.model.conditions(materials, &self.room.air);
         let read = |rendering: u64| -> Result<PerBand<Reading>, AcousticsError> {
             let seed = self.room.arguments.seed.wrapping_add(rendering);
             let config = RenderConfig { sample_rate_hz: RATE_HZ, seed, ..RenderConfig::default() };

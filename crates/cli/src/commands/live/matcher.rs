@@ -1,11 +1,10 @@
 //! From an estimate to a response that meets it.
 
 use crate::failure::Failure;
-use crate::modelled::{PathModel, conditions};
+use crate::modelled::{PairModel, PathModel};
 use sabine::acoustics::{Air, Bands, ImpulseResponse, Material, PerBand, RoomTargets, Signal, equalisation};
 use sabine::eqfilter::{AboveBand, EqDesigner, EqFilterConfig};
 use sabine::optimize::{AbsorptionPrior, FitConfig, FitProblem, MaterialFitter};
-use sabine::paths::laws::BoundLaws;
 use sabine::paths::{PathSet, Propagator};
 use sabine::propagate::{PathTracer, PressureRenderer, RenderConfig, TracerConfig};
 use sabine::scene::{DiffuseRoom, MeasuredRoom, Receiver, Scene, Source};
@@ -27,7 +26,7 @@ pub struct Matcher {
     receiver: Receiver,
     air: Air,
     materials: Vec<Material>,
-    laws: BoundLaws,
+    model: PairModel,
     priors: Vec<AbsorptionPrior>,
     tracer: TracerConfig,
     fitter: MaterialFitter,
@@ -72,7 +71,7 @@ impl Matcher {
         let diffuse = DiffuseRoom::of_scene(&scene, &air, bands)?;
         let longest_s = diffuse.values().iter().map(DiffuseRoom::eyring_t60_s).fold(0.0, f64::max);
         let tracer = model.tracer(TracerConfig { rays, seed, ..TracerConfig::default() });
-        let laws = model.laws_between(&scene, (source, receiver), &air)?;
+        let own = model.between(&scene, (source, receiver), &air)?;
         let render = RenderConfig { sample_rate_hz: SAMPLE_RATE_HZ, seed, ..RenderConfig::default() };
         let renderer = PressureRenderer::new(render)?;
         let duration_s = trace_s(longest_s);
@@ -81,7 +80,7 @@ impl Matcher {
             let (from, to) = (source.id.clone(), receiver.id.clone());
             return Err(sabine::Error::NoPath { source_id: from, receiver: to }.into());
         }
-        let first = renderer.render(&paths, &conditions(&materials, &air, &laws))?;
+        let first = renderer.render(&paths, &own.conditions(&materials, &air))?;
         let above = Some(AboveBand { from_band_hz: 8000.0, gain_db: -50.0 });
         let config = EqFilterConfig { above, ..EqFilterConfig::default() };
         Ok(Self {
@@ -90,7 +89,7 @@ impl Matcher {
             receiver: receiver.clone(),
             air,
             materials,
-            laws,
+            model: own,
             priors,
             tracer,
             fitter: MaterialFitter::new(FitConfig::default())?,
@@ -129,11 +128,11 @@ impl Matcher {
             self.paths = (duration_s, paths);
         }
         let paths = &self.paths.1;
-        let stated = conditions(&self.materials, &self.air, &self.laws);
-        let under = if self.laws.is_empty() { Vec::new() } else { vec![stated] };
+        let stated = self.model.conditions(&self.materials, &self.air);
+        let under = if self.model.is_plain() { Vec::new() } else { vec![stated] };
         let problem = FitProblem::new(&self.materials, &self.priors, &self.air).under(&under);
         let fit = self.fitter.fit_t60(&[paths], &problem, targets.t60_s(), &())?;
-        let response = self.renderer.render(paths, &conditions(&fit.materials, &self.air, &self.laws))?;
+        let response = self.renderer.render(paths, &self.model.conditions(&fit.materials, &self.air))?;
         let simulated = equalisation(&response, Bands::EQ)?;
         let gains_db = PerBand::from_fn(Bands::EQ, |band| {
             // An octave in which the simulation cannot be read is left as it is.

@@ -84,6 +84,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut config = MatchConfig { seed: arguments.seed, wave_below_hz, ..MatchConfig::default() };
     config.tracer = model.tracer(config.tracer);
     config.laws = model.laws;
+    config.locally_reacting_share = model.locally_reacting_share;
     if let Some(rays) = arguments.rays {
         config.tracer.rays = rays;
     }

@@ -111,6 +111,11 @@ fn changed(change: &ModelChange) -> String {
         }
         ModelChange::Diffraction => "paths: sound bends around edges".into(),
         ModelChange::CoherentReflections => "reflections: their pressures add".into(),
+        ModelChange::LocalReaction(share) => {
+            format!(
+                "absorption by the angle of incidence: walls react locally by {share:.2} (0: at all angles alike)"
+            )
+        }
         ModelChange::Latency(seconds) => format!("the latency of all responses to {:.3} ms", 1e3 * seconds),
         ModelChange::CoordinateShift(motion) => {
             let ([x, y, z], [east, north, _]) = (motion.shift_m, motion.about_m);

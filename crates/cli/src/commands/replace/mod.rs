@@ -9,7 +9,7 @@ use crate::bar::Bar;
 use crate::channel::channel;
 use crate::demo::Demo;
 use crate::failure::Failure;
-use crate::modelled::{ModelArguments, conditions};
+use crate::modelled::ModelArguments;
 use crate::output::OutputFolder;
 use crate::room::{PlaceArguments, RoomArguments};
 use clap::Args;
@@ -139,18 +139,18 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let air = room.air();
     let paths = PathTracer::new(config)?.trace(&scene, source, receiver, &air, &bar)?;
     bar.finish();
-    let laws = model.laws_between(&scene, (source, receiver), &air)?;
-    let change = if laws.is_empty() {
+    let own = model.between(&scene, (source, receiver), &air)?;
+    let change = if own.is_plain() {
         PredictedChange::new(&paths, &before, &after, &air)?
     } else {
-        PredictedChange::under(&paths, &conditions(&before, &air, &laws), &after)?
+        PredictedChange::under(&paths, &own.conditions(&before, &air), &after)?
     };
     let render = RenderConfig { seed: arguments.seed, ..RenderConfig::default() };
     let renderer_rate_hz = render.sample_rate_hz;
     let renderer = PressureRenderer::new(render)?;
     let mut voices = Vec::new();
     for (file, materials) in [("before.wav", &before), ("after.wav", &after)] {
-        let response = Signal::from(renderer.render(&paths, &conditions(materials, &air, &laws))?);
+        let response = Signal::from(renderer.render(&paths, &own.conditions(materials, &air))?);
         out.write(file, &encode_wav(&response, SampleFormat::Float32)?)?;
         voices.push(convolve(resample(&dry, response.sample_rate_hz())?.samples(), response.samples()));
     }

@@ -172,7 +172,9 @@ fn trace_room(arguments: &Arguments) -> Result<(), Failure> {
     let recorded_at = from.zip(to).and_then(|(from, to)| room.recorded_at(from, to));
     let laws = match &extended {
         None => {
-            let site = LawSite::new(room.scene(), source, receiver, &air).with_recording_order(recorded_at);
+            let site = LawSite::new(room.scene(), source, receiver, &air)
+                .among(room.sources(), room.receivers())
+                .with_recording_order(recorded_at);
             Some(BoundLaws::new(&own_laws, &site)?)
         }
         // The model has them.

@@ -5,7 +5,7 @@ mod route;
 use crate::bar::Bar;
 use crate::demo::Demo;
 use crate::failure::Failure;
-use crate::modelled::{ModelArguments, PathModel, conditions};
+use crate::modelled::{ModelArguments, PathModel};
 use crate::room::read_room;
 use clap::{Args, ValueEnum};
 use route::{Walk, read_corners};
@@ -154,8 +154,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         work.trace_s.push(start.elapsed().as_secs_f64());
         work.effective_rays = frame.effective_rays;
         let start = Instant::now();
-        let laws = model.laws_between(&scene, (&source, &receiver), &air)?;
-        let between = conditions(&materials, &air, &laws);
+        let own = model.between(&scene, (&source, &receiver), &air)?;
+        let between = own.conditions(&materials, &air);
         let response = renderer.response(&frame.paths, &between, walk.facing(time_s)?)?;
         work.render_s.push(start.elapsed().as_secs_f64());
         Ok(response)

@@ -1,9 +1,9 @@
 //! What it changes if walls react locally: they then absorb by the angle at which sound meets them.
 
 use crate::error::Error;
-use crate::simulate::local_reaction::LocalReaction;
 use crate::simulate::tables::{Tables, between};
 use crate::simulate::traced_views::{TracedPairView, TracedRoomView};
+use sabine_acoustics::LocalReaction;
 
 /// Shares of local reaction at which energies are tabulated: multiples of a half, so that one exponential serves all.
 const GRID: [f64; 5] = [-0.5, 0.0, 0.5, 1.0, 1.5];

@@ -5,6 +5,7 @@ mod local_reaction;
 use crate::effect::EffectInfo;
 use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, DecayTerm, Effect, Parameter};
+use crate::extend::model_change::ModelChange;
 use crate::simulate::tables::{Tables, Unprepared};
 use crate::simulate::traced_views::TracedRoomView;
 use crate::simulate::views::BandView;
@@ -16,8 +17,7 @@ use local_reaction::LocalReactionTable;
 ///
 /// Mark: paths that graze the walls live longer, and those that meet them at some 50 to 70 degrees from the normal die sooner (a hard wall
 /// absorbs most near grazing and nothing at it), so that decays bend and differ between positions. Mimicked by: absorption, which is refitted beside it; an open patch or
-/// another material on one wall; scattering, which straightens decays. The extended model keeps random-incidence absorption: what was found
-/// is said, not rendered.
+/// another material on one wall; scattering, which straightens decays.
 ///
 /// The share comes out low, by about a fifth where all walls react locally (docs/validation/diagnose.md): more paths do not change that.
 ///
@@ -37,7 +37,11 @@ impl Effect for AngleDependentAbsorption {
 
     fn cases(&self, _: &Survey) -> Vec<Case> {
         let share = Parameter::new("locally_reacting_share", "", 0.0, 0.5, (-0.5, 1.3)).typically(1.0);
-        vec![Case::decay(vec![share], *self).starting(vec![vec![0.1], vec![0.9]])]
+        vec![
+            Case::decay(vec![share], *self)
+                .starting(vec![vec![0.1], vec![0.9]])
+                .changing(|fitted| vec![ModelChange::LocalReaction(fitted.values()[0])]),
+        ]
     }
 }
 

@@ -7,7 +7,7 @@ use crate::simulate::tables::{Tables, Unprepared};
 use crate::simulate::traced_views::TracedRoomView;
 use crate::simulate::views::BandView;
 use crate::survey::{Survey, SurveyedResponse};
-use sabine_paths::laws::LawVariable;
+use sabine_paths::laws::{LawVariable, end_variable};
 
 /// Equal steps of a response at which a law is looked at beforehand.
 const CHECKED: usize = 32;
@@ -73,7 +73,8 @@ impl DecayTerm for AddedLaw {
 
 /// A variable of a pair as the survey has it: where source and receiver are said to be, and the air of the room.
 pub(super) fn of_survey(survey: &Survey, (source, receiver): (usize, usize), name: &str) -> Option<f64> {
-    let (source, receiver) = (survey.sources()[source].position_m, survey.receivers()[receiver].position_m);
+    let (from, to) = (&survey.sources()[source], &survey.receivers()[receiver]);
+    let (source, receiver) = (from.position_m, to.position_m);
     Some(match name {
         "distance_m" => (0..3).map(|k| (source[k] - receiver[k]).powi(2)).sum::<f64>().sqrt(),
         "source_x_m" => source[0],
@@ -84,7 +85,7 @@ pub(super) fn of_survey(survey: &Survey, (source, receiver): (usize, usize), nam
         "receiver_z_m" => receiver[2],
         "temperature_c" => survey.air().temperature_c(),
         "relative_humidity_percent" => survey.air().relative_humidity_percent(),
-        _ => return None,
+        _ => return end_variable(name, [&from.id, &to.id]),
     })
 }
 

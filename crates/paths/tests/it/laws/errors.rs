@@ -37,6 +37,8 @@ fn formulas_that_cannot_be_read_say_where() {
         ("a * 1e999", 5, "`1e999` is no finite number"),
         ("a * 2 n", 7, "an operator or the end is expected"),
         ("a * hits()", 10, "the name of a material"),
+        ("a * source", 11, "`(` and the name of a source"),
+        ("a * receiver(r(1))", 14, "the name of a receiver"),
         ("a * hits", 9, "`(` and the name of a material"),
         ("a * cos_incidence", 5, "a law of `path` has no variable `cos_incidence`"),
         ("a * level_db", 5, "has no variable `level_db`"),
@@ -127,7 +129,7 @@ fn parameters_have_names_units_and_intervals() {
         assert_eq!(error.column, None);
         assert!(error.to_string().contains(words), "{error}");
     }
-    for name in ["length_m", "exp", "hits", "1a", "a b", "", "ä"] {
+    for name in ["length_m", "exp", "hits", "source", "receiver", "1a", "a b", "", "ä"] {
         assert!(
             matches!(law(name, range(1.0, 0.0, 2.0)).unwrap_err().fault, LawFault::BadParameterName(_)),
             "{name}"
@@ -151,6 +153,27 @@ fn surfaces_and_targets_go_together() {
         let error = Law::new(id, LawTarget::Path, None, "0", Vec::<(String, LawParameter)>::new());
         assert_eq!(error.unwrap_err().fault, LawFault::BadIdentifier, "{id}");
     }
+}
+
+#[test]
+fn names_of_ends_are_those_of_the_room() {
+    let bind = |formula: &str, site: &LawSite| BoundLaws::new(&[path_law(formula).unwrap()], site);
+    // Nobody said which there are.
+    assert!(bind("a * receiver(mic)", &site()).is_ok());
+    let receivers = ["r", "left ear"].map(|id| Receiver::omni(id, [2.0; 3]).unwrap());
+    let among = site().among(&[Source::omni("s", [1.0; 3]).unwrap()], &receivers);
+    for formula in ["a * receiver(r)", "a * receiver( left ear )", "a * source(s)"] {
+        assert!(bind(formula, &among).is_ok(), "{formula}");
+    }
+    let error = bind("a + a * receiver(left eat)", &among).unwrap_err();
+    assert_eq!(error.column, Some(9));
+    assert!(error.to_string().contains("no receiver `left eat`; the nearest name is `left ear`"), "{error}");
+    let error = bind("a * source(r)", &among).unwrap_err();
+    assert!(error.to_string().contains("the room has no source `r`"), "{error}");
+    for (name, value) in [("receiver(r)", Some(1.0)), ("receiver(s)", Some(0.0)), ("source(s)", Some(1.0))] {
+        assert_eq!(among.variable(name), value, "{name}");
+    }
+    assert_eq!((among.variable("hits(floor)"), among.variable("receiver(r")), (None, None));
 }
 
 fn site() -> LawSite {

@@ -15,8 +15,14 @@ enum Tree {
 }
 
 const PARAMETERS: [&str; 3] = ["b", "c", "d"];
-const VARIABLES: [&str; 5] =
-    ["reflections", "scatterings", "departure_cos", "arrival_cos", "hits(rough plaster)"];
+const VARIABLES: [&str; 6] = [
+    "reflections",
+    "scatterings",
+    "departure_cos",
+    "arrival_cos",
+    "hits(rough plaster)",
+    "receiver(mic-2 b)",
+];
 
 impl Tree {
     fn value(&self, parameters: &[f64], variables: &[f64]) -> f64 {
@@ -145,7 +151,7 @@ proptest! {
     fn a_formula_has_the_value_of_its_tree_and_prints_as_itself(
         tree in trees(),
         parameters in prop::array::uniform3(0.2f64..3.0),
-        variables in prop::array::uniform5(0.1f64..4.0),
+        variables in prop::array::uniform6(0.1f64..4.0),
     ) {
         let expected = 2.0 * tree.value(&parameters, &variables);
         let law = law(&all_in_use(&tree), &parameters);
@@ -170,7 +176,7 @@ proptest! {
     fn derivatives_are_those_of_central_differences(
         tree in trees(),
         parameters in prop::array::uniform3(0.2f64..3.0),
-        variables in prop::array::uniform5(0.1f64..4.0),
+        variables in prop::array::uniform6(0.1f64..4.0),
     ) {
         prop_assume!(all_finite(&tree, &parameters, &variables));
         let law = law(&all_in_use(&tree), &parameters);

@@ -79,9 +79,6 @@ impl TrueModel {
             Hidden::CoupledVolume { .. } => {
                 self.less(Statement::NotStated, "the level falls with the distance from the aperture");
             }
-            Hidden::AngleDependentAbsorption { .. } => {
-                self.less(Statement::NotStated, "no change of the model has walls that react locally");
-            }
             Hidden::NonlinearDistortion { .. } => {
                 self.less(Statement::NotStated, "no change of the model distorts");
             }
@@ -176,6 +173,7 @@ fn in_air_and_ends(hidden: &Hidden, lab: &Laboratory, truth: &Truth) -> Option<M
             let materials = lab.scene().materials().iter();
             ModelChange::Scattering(materials.map(|m| (m.name.clone(), scattering.clone())).collect())
         }
+        Hidden::AngleDependentAbsorption { share } => ModelChange::LocalReaction(*share),
         Hidden::TransducerResponse { gains_db } => ModelChange::BandGains(gains_db.clone()),
         Hidden::RoomModes { below_hz } if *below_hz > 0.0 => ModelChange::WaveBelow(*below_hz),
         Hidden::SourceDirectivity { omni_share, axis } => {

@@ -17,7 +17,7 @@ const STEPS: usize = 60;
 /// It rises as 8 times the admittance at first, reaches 0.951 at 0.638 and falls thereafter.
 ///
 /// ```
-/// use sabine_propagate::wave::absorption_of_admittance;
+/// use sabine_acoustics::absorption_of_admittance;
 /// assert!((absorption_of_admittance(1.0) - 8.0 * (1.5 - 2.0 * 2f64.ln())).abs() < 1e-12);
 /// ```
 pub fn absorption_of_admittance(admittance: f64) -> f64 {
@@ -35,7 +35,7 @@ pub fn absorption_of_admittance(admittance: f64) -> f64 {
 /// No such wall absorbs more than 0.951 of the sound from all directions: what is said to absorb more absorbs that.
 ///
 /// ```
-/// use sabine_propagate::wave::{absorption_of_admittance, admittance_of_absorption};
+/// use sabine_acoustics::{absorption_of_admittance, admittance_of_absorption};
 /// let admittance = admittance_of_absorption(0.1);
 /// assert!((absorption_of_admittance(admittance) - 0.1).abs() < 1e-12);
 /// ```

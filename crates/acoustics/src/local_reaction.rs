@@ -1,26 +1,36 @@
 //! A wall that reacts locally absorbs by the angle at which sound meets it.
 
-use sabine_propagate::wave::admittance_of_absorption;
+use crate::admittance::admittance_of_absorption;
 
 /// A wall of impedance cos(theta) absorbs everything; no real one does (energy).
 const MIN_REFLECTED: f64 = 1e-3;
 
-/// A wall of a real impedance, by its absorption at random incidence.
+/// A locally reacting wall of a real impedance, by its absorption at random incidence: what it reflects of sound that meets it at an angle.
+///
+/// ```
+/// use sabine_acoustics::LocalReaction;
+/// let wall = LocalReaction::new(0.2);
+/// // It reflects more than 80 % of what grazes it, and less of what meets it at 70 degrees.
+/// assert!(wall.log_change(0.01) > 0.0);
+/// assert!(wall.log_change(70f64.to_radians().cos()) < 0.0);
+/// ```
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct LocalReaction {
+pub struct LocalReaction {
     impedance: f64,
     /// Natural logarithm of what is reflected on average over all angles.
     ln_reflected: f64,
 }
 
 impl LocalReaction {
+    /// The wall that absorbs so much of sound from all directions, 0 to 1; from 1e-4 to 0.99, and as an impedance no more than 0.951 (see
+    /// [`admittance_of_absorption`](crate::admittance_of_absorption)), are kept.
     pub fn new(absorption: f64) -> Self {
         let absorption = absorption.clamp(1e-4, 0.99);
         Self { impedance: 1.0 / admittance_of_absorption(absorption), ln_reflected: (1.0 - absorption).ln() }
     }
 
-    /// Logarithm of what it reflects at an angle over its average over all (Kuttruff, Room Acoustics, 6th ed., 2.3:
-    /// R = (z cos - 1) / (z cos + 1)).
+    /// Natural logarithm of the energy that it reflects at an angle, given by the cosine to its normal (0 to 1), over its average over all
+    /// (Kuttruff, Room Acoustics, 6th ed., 2.3: R = (z cos - 1) / (z cos + 1)). It reflects 0.001 at least.
     pub fn log_change(self, cosine: f64) -> f64 {
         let x = self.impedance * cosine;
         ((x - 1.0) / (x + 1.0)).powi(2).max(MIN_REFLECTED).ln() - self.ln_reflected
