@@ -229,6 +229,10 @@ fn no_shipped_law_is_named_where_nothing_is_hidden() {
     let lab = lab(LabConfig { microphone_axes: true, levels: Levels::Absolute, ..LabConfig::default() });
     let folder = tempfile::tempdir().unwrap();
     let room = lab.write(&[], &folder.path().join("room"), None).unwrap();
-    let found = diagnose(&room, &[], [shipped_laws().unwrap(), by_angle(&room), of_channels(&room)[..2].to_vec()].concat());
+    let found = diagnose(
+        &room,
+        &[],
+        [shipped_laws().unwrap(), by_angle(&room), of_channels(&room)[..2].to_vec()].concat(),
+    );
     assert!(found.causes.is_empty(), "{:?}", found.causes);
 }

@@ -4,5 +4,6 @@ mod cost;
 mod effect_on_paths;
 mod errors;
 mod formulas;
+mod local_reaction;
 #[cfg(feature = "serde")]
 mod tables;
