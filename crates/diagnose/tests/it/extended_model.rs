@@ -3,6 +3,9 @@
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
 use sabine_diagnose::{Error, ExtendedModel, ModelChange};
+use sabine_paths::{Conditions, Propagator};
+use sabine_propagate::{PathTracer, TracerConfig};
+use sabine_scene::MeasuredRoom;
 
 const HEAD: &str = "version = 2\ncentres_hz = [500, 1000]\n[absorption]\n\"a/b~c\" = [0.3, 0.4]\n";
 const LATE: &str = r#"
@@ -49,6 +52,28 @@ fn a_model_comes_back_to_the_byte() {
     let applied = again.applied();
     assert_eq!((applied.latency_s, applied.response_gain_db["s-r"]), (Some(0.003), 2.0));
     assert!(applied.diffraction);
+}
+
+#[test]
+fn walls_that_react_locally_are_rendered() {
+    let room = MeasuredRoom::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/room")).unwrap();
+    let with = |change: &str| {
+        let cause = format!("[[causes]]\nid = \"angle_dependent_absorption\"\nchanges = [{{ {change} }}]\n");
+        read(&format!("version = 2\ncentres_hz = [500, 1000]\n[absorption]\n{cause}")).unwrap().room(&room)
+    };
+    let extended = with("locally_reacting_share = 1.0").unwrap();
+    let materials: Vec<_> = extended.scene.materials().iter().map(|m| m.material.clone()).collect();
+    let config = TracerConfig { rays: 200, duration_s: 0.3, ..TracerConfig::default() };
+    let (source, receiver) = (&extended.sources[0], &extended.receivers[0]);
+    let paths = PathTracer::new(config).unwrap();
+    let paths = paths.trace(&extended.scene, source, receiver, &extended.air, &()).unwrap();
+    let energies = |conditions: &Conditions<'_>| paths.energies(conditions).unwrap().concat();
+    let found = energies(&extended.conditions(&materials, 0, 0));
+    let plain = Conditions::new(&materials, &extended.air);
+    assert_eq!(found, energies(&plain.with_local_reaction(1.0, &materials)));
+    assert_ne!(found, energies(&plain));
+    let error = with("locally_reacting_share = 1.6").unwrap_err();
+    assert!(error.to_string().contains("locally_reacting_share"), "{error}");
 }
 
 #[test]
