@@ -59,7 +59,7 @@ fn walls_that_react_locally_are_rendered() {
     let room = MeasuredRoom::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/room")).unwrap();
     let with = |change: &str| {
         let cause = format!("[[causes]]\nid = \"angle_dependent_absorption\"\nchanges = [{{ {change} }}]\n");
-        read(&format!("version = 2\ncentres_hz = [500, 1000]\n[absorption]\n{cause}")).unwrap().room(&room)
+        read(&format!("version = 2\ncentres_hz = [500, 1000]\n[absorption]\n{cause}"))?.room(&room)
     };
     let extended = with("locally_reacting_share = 1.0").unwrap();
     let materials: Vec<_> = extended.scene.materials().iter().map(|m| m.material.clone()).collect();
