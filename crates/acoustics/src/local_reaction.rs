@@ -10,9 +10,9 @@ const MIN_REFLECTED: f64 = 1e-3;
 /// ```
 /// use sabine_acoustics::LocalReaction;
 /// let wall = LocalReaction::new(0.2);
-/// // It reflects more than 80 % of what grazes it, and less of what meets it at 70 degrees.
-/// assert!(wall.log_change(0.01) > 0.0);
-/// assert!(wall.log_change(70f64.to_radians().cos()) < 0.0);
+/// // It reflects more than 80 % of what meets it squarely, and less of what meets it at 80 degrees.
+/// assert!(wall.log_change(1.0) > 0.0);
+/// assert!(wall.log_change(80f64.to_radians().cos()) < 0.0);
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct LocalReaction {
