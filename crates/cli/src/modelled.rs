@@ -94,11 +94,6 @@ impl PathModel {
         let laws = BoundLaws::new(&self.laws, &LawSite::new(scene, source, receiver, air))?;
         Ok(PairModel { laws, locally_reacting_share: self.locally_reacting_share })
     }
-
-    /// Whether it says nothing of what paths carry.
-    pub fn is_plain(&self) -> bool {
-        self.laws.is_empty() && self.locally_reacting_share == 0.0
-    }
 }
 
 /// What a model says of paths between one source and one receiver.

@@ -49,11 +49,8 @@ impl<'a> Room<'a> {
         let done = fitter.fit_measured(
             (&fitted(&responses, held_out), self.file.measurement()),
             &fitted(&tables, &held_out[responses.len()..]),
-            &FitProblem::new(&self.materials, &self.priors, &self.air).under(if self.model.is_plain() {
-                &[]
-            } else {
-                &of_fitted
-            }),
+            &FitProblem::new(&self.materials, &self.priors, &self.air)
+                .under(if models.iter().all(PairModel::is_plain) { &[] } else { &of_fitted }),
             bar,
         )?;
         let fit_s = start.elapsed().as_secs_f64();

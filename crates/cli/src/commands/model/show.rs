@@ -113,7 +113,7 @@ fn changed(change: &ModelChange) -> String {
         ModelChange::CoherentReflections => "reflections: their pressures add".into(),
         ModelChange::LocalReaction(share) => {
             format!(
-                "absorption by the angle of incidence: walls react locally by {share:.2} (0: at all angles alike)"
+                "absorption by the angle of incidence: walls react locally by {share:.2} (0: the same at all angles)"
             )
         }
         ModelChange::Latency(seconds) => format!("the latency of all responses to {:.3} ms", 1e3 * seconds),
