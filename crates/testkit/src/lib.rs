@@ -41,6 +41,7 @@ mod brute_force;
 mod filter;
 mod geometry;
 mod laboratory;
+mod night;
 mod own_air;
 mod phonons;
 mod polyhedra;
@@ -54,6 +55,7 @@ pub use laboratory::{
     End, Fault, Gap, Hidden, LabConfig, Laboratory, ScreenedConfig, ScreenedRoom, TrueMaterial,
     TrueMicrophone, TrueSession, TrueSource, Truth,
 };
+pub use night::at_night;
 pub use phonons::{PhononConfig, PhononEnergy, Phonons};
 pub use polyhedra::{MovedWall, Planted, PolyhedralConfig, PolyhedralRoom, Polyhedron};
 pub use shoebox::{Image, ShoeboxImages};

@@ -1,7 +1,7 @@
 //! Places that were measured in coordinates that are not those of the mesh.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
-use crate::hidden_effects::{ON_TIMES, diagnose_among, lab, only_cause};
+use crate::hidden_effects::{ON_TIMES, THREE_OCTAVES_HZ, diagnose_among, lab, only_cause, small_lab};
 use sabine_diagnose::{ExtendedModel, ModelCause, ModelChange, RigidMotion};
 use sabine_scene::MeasuredRoom;
 use sabine_testkit::Hidden;
@@ -12,7 +12,7 @@ fn apart_m(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 /// The one name, the shift to 3 cm, the turn to half a degree; the extended model has all places where they are.
 fn places_in_other_coordinates_are_found(seed: u64, shift_m: [f64; 3], turn_deg: f64) {
-    let lab = lab(seed);
+    let lab = small_lab(seed, 6, THREE_OCTAVES_HZ);
     let hidden = [Hidden::CoordinateShift { shift_m, turn_deg }];
     let rivals = ["coordinate_shift", "position_error", "room_dimensions", "time_zero"];
     let found = diagnose_among(&lab, &hidden, &rivals);

@@ -162,7 +162,8 @@ fn levels_that_go_with_the_order_of_recording_are_a_law() {
 
 #[test]
 fn where_no_law_is_at_work_none_is_named() {
-    let (_folder, room) = room(in_few_octaves(), &[]);
+    let bands = Bands::octaves(500.0, 2000.0).unwrap();
+    let (_folder, room) = room(LabConfig { bands, receivers: 6, ..in_few_octaves() }, &[]);
     let found = diagnoser(laws(&room), 1000).unwrap().discovering().diagnose(&room, &[], &()).unwrap();
     assert_eq!(found.verdict, Verdict::Adequate, "{:?}", found.causes);
     assert!(found.causes.is_empty() && found.model.causes.is_empty() && found.laws.is_empty());

@@ -10,6 +10,12 @@ fn lab(seed: u64, receivers: usize) -> Laboratory {
     Laboratory::new(LabConfig { seed, receivers, ..LabConfig::default() }).unwrap()
 }
 
+fn in_three_octaves(seed: u64, receivers: usize) -> Laboratory {
+    let bands = Bands::octaves(500.0, 2000.0).unwrap();
+    let config = LabConfig { seed, receivers, bands, sample_rate_hz: 16_000, ..LabConfig::default() };
+    Laboratory::new(config).unwrap()
+}
+
 /// What absorbs, or reflects, as a surface does that the mesh lacks.
 const RIVALS: [&str; 7] = [
     "extra_reflector",
@@ -98,7 +104,7 @@ fn a_hole_in_a_wall_is_found_and_located() {
 
 #[test]
 fn a_room_whose_mesh_is_right_lacks_no_surface() {
-    let found = diagnose(&lab(701, 12), &[]);
+    let found = diagnose(&in_three_octaves(701, 12), &[]);
     assert_eq!(found.verdict, Verdict::Adequate, "{:?} {:?}", found.candidates.first(), found.lack_of_fit);
     for c in
         found.candidates.iter().filter(|c| ["extra_reflector", "open_patch"].contains(&c.effect.as_str()))
@@ -110,9 +116,7 @@ fn a_room_whose_mesh_is_right_lacks_no_surface() {
 /// Forty responses confirm every image, those of the walls too: they must not count a second time.
 #[test]
 fn a_wall_of_the_mesh_is_not_found_again_by_many_receivers() {
-    let bands = Bands::T60;
-    let config = LabConfig { seed: 8000, receivers: 40, bands, ..LabConfig::default() };
-    let lab = Laboratory::new(config).unwrap();
+    let lab = in_three_octaves(8000, 40);
     let config = DiagnoseConfig { rays: 200, ..DiagnoseConfig::default() };
     let diagnoser = Diagnoser::new(config).unwrap().with_only(&["extra_reflector".to_owned()]).unwrap();
     let found = diagnose_by(&diagnoser, &lab, &[]);

@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
 use crate::hidden_effects::ON_TIMES;
-use crate::rivals::{at_night, diagnoser_among};
+use crate::rivals::diagnoser_among;
 use sabine_diagnose::{DiagnoseConfig, Diagnosis, Verdict};
-use sabine_testkit::{Planted, PolyhedralConfig, PolyhedralRoom, Polyhedron};
+use sabine_testkit::{Planted, PolyhedralConfig, PolyhedralRoom, Polyhedron, at_night};
 
 /// What has been named wrongly in such rooms, and what else bends decays.
 const EASILY_NAMED: [&str; 8] = [

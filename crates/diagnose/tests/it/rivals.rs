@@ -1,14 +1,7 @@
 //! Which effects a test weighs: in the gate those that could pass for the hidden one, at night the whole catalogue.
 
 use sabine_diagnose::{DiagnoseConfig, Diagnoser};
-
-/// Set by `cargo xtask nightly`: every test weighs the whole catalogue.
-const WHOLE_CATALOGUE: &str = "SABINE_WHOLE_CATALOGUE";
-
-/// Whether all is tested that there is no time for in the gate.
-pub(crate) fn at_night() -> bool {
-    std::env::var_os(WHOLE_CATALOGUE).is_some()
-}
+use sabine_testkit::at_night;
 
 /// Weighs these effects, or the whole catalogue at night.
 pub(crate) fn diagnoser_among(config: DiagnoseConfig, effects: &[&str]) -> Diagnoser {

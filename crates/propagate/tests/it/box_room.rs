@@ -6,6 +6,7 @@ use sabine_acoustics::*;
 use sabine_paths::*;
 use sabine_propagate::*;
 use sabine_scene::Scene;
+use sabine_testkit::at_night;
 
 const SIZE_M: [f64; 3] = [10.0, 7.0, 3.0];
 const SOURCE_M: [f64; 3] = [2.0, 3.0, 1.5];
@@ -77,7 +78,8 @@ fn without_scattering_t30_and_decay_are_those_of_image_sources() {
 
 #[test]
 fn with_scattering_t30_is_that_of_the_whole_room() {
-    for (scattering, expected_s) in [(0.1, 1.493), (0.3, 1.373), (0.5, 1.359), (1.0, 1.360)] {
+    let all = [(0.1, 1.493), (0.5, 1.359), (0.3, 1.373), (1.0, 1.360)];
+    for (scattering, expected_s) in all.into_iter().take(if at_night() { 4 } else { 2 }) {
         let scene = uniform_box(SIZE_M, one_band(), 0.1, scattering);
         // Receivers anywhere stand for the room; each is an independent part.
         let parts: Vec<Vec<f64>> = anywhere(16, 7)

@@ -18,7 +18,7 @@ fn tracers_conform() {
     let tracers: [(&str, Box<dyn Propagator>, bool); 3] = [
         ("PathTracer", Box::new(PathTracer::new(config(4000)).unwrap()), true),
         // Its Monte-Carlo error falls slowly: a sphere catches what the path tracer joins.
-        ("ReferenceTracer", Box::new(ReferenceTracer::new(config(200_000)).unwrap()), true),
+        ("ReferenceTracer", Box::new(ReferenceTracer::new(config(50_000)).unwrap()), true),
         ("ShoeboxImages", Box::new(ShoeboxImages::new(0.3).unwrap()), false),
     ];
     for (name, tracer, scatters) in tracers {

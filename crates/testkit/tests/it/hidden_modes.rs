@@ -2,7 +2,7 @@
 
 use crate::rooms::{db, energy, samples, seven_octaves};
 use crate::spectrum::middle_of_octave;
-use sabine_testkit::{BoxModes, Hidden, Laboratory, Truth};
+use sabine_testkit::{BoxModes, Hidden, Laboratory, Truth, at_night};
 
 /// Width of a window of the decay, in seconds.
 const WINDOW_S: f64 = 0.05;
@@ -62,7 +62,7 @@ fn modal_fall_db(truth: &Truth, from: usize, to: usize) -> f64 {
 #[test]
 fn standing_waves_are_as_loud_and_last_as_long_as_theory_has_it() {
     let (mut level_off_db, mut fall_off_db) = (Vec::new(), Vec::new());
-    for seed in [601, 602, 603] {
+    for seed in [601, 602, 603].into_iter().take(if at_night() { 3 } else { 2 }) {
         let lab = seven_octaves(seed, 12);
         let (hidden, below_hz) = modal(&lab);
         assert!((280.0..=400.0).contains(&below_hz), "{below_hz} Hz");

@@ -2,10 +2,10 @@
 
 use crate::rooms::{db, energy, one_octave, quick_room, samples, seven_octaves, true_places};
 use crate::spectrum::{middle_of_octave, widths_hz};
-use sabine_acoustics::{Air, Error};
+use sabine_acoustics::{Air, Bands, Error};
 use sabine_scene::{Levels, MeasuredRoom, TimeZero};
 use sabine_testkit::{
-    Fault, Hidden, LabConfig, Laboratory, ShoeboxImages, Truth, assert_all_close, assert_close,
+    Fault, Hidden, LabConfig, Laboratory, ShoeboxImages, Truth, assert_all_close, assert_close, at_night,
 };
 
 /// Energies in windows of 50 ms over all receivers, against a plain sum of images; random signs scatter them by 1 / sqrt(B t).
@@ -138,9 +138,11 @@ fn a_room_is_written_and_read_back_and_the_truth_lies_elsewhere() {
     let config = LabConfig {
         seed: 18,
         sources: 2,
-        receivers: 3,
+        receivers: 2,
         time_zero: TimeZero::Common,
         orientation: false,
+        bands: Bands::octaves(500.0, 2000.0).unwrap(),
+        sample_rate_hz: 16_000,
         ..LabConfig::default()
     };
     let lab = Laboratory::new(config).unwrap();
@@ -159,7 +161,7 @@ fn a_room_is_written_and_read_back_and_the_truth_lies_elsewhere() {
     assert_eq!((room.sources(), room.receivers()), (lab.sources(), lab.receivers()));
     assert_eq!((room.air(), room.priors()), (lab.air(), lab.priors()));
     assert!(room.sources().iter().all(|s| s.axis.is_none()));
-    assert_eq!(room.responses().len(), 6);
+    assert_eq!(room.responses().len(), 4);
     let expected = lab.responses(&effects).unwrap();
     for (i, response) in expected.iter().enumerate() {
         assert_eq!(&room.load_response(i).unwrap(), response);
@@ -223,7 +225,7 @@ fn at_strength_0_nothing_is_hidden() {
     }
 }
 
-/// Each effect alone changes what is recorded, and so does a second one beside it.
+/// Each effect alone changes what is recorded, and so does a second one beside it: in the gate the two that follow it.
 #[test]
 fn any_two_effects_work_together() {
     let lab = quick_room(2);
@@ -236,7 +238,7 @@ fn any_two_effects_work_together() {
     for (i, first) in effects.iter().enumerate() {
         let alone = lab.responses(std::slice::from_ref(first)).unwrap();
         assert_ne!(alone, plain, "{} changes nothing", first.name());
-        for second in &effects[i + 1..] {
+        for second in effects[i + 1..].iter().take(if at_night() { effects.len() } else { 2 }) {
             let both = lab.responses(&[first.clone(), second.clone()]).unwrap();
             assert_ne!(both, alone, "{} changes nothing beside {}", second.name(), first.name());
         }
