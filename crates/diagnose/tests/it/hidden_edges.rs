@@ -77,6 +77,7 @@ fn where_there_is_no_screen_nothing_bends() {
 }
 
 #[test]
+#[ignore = "nightly: a minute and more, and what bends is found in the gate"]
 fn where_sound_goes_straight_past_a_screen_nothing_bends() {
     let room = ScreenedRoom::new(ROOM).unwrap();
     let config = DiagnoseConfig { rays: 10_000, ..DiagnoseConfig::default() };

@@ -1,11 +1,10 @@
 //! Places that are known worse than a tape measure knows them, and say so.
 #![allow(clippy::unwrap_used)] // a panic is how a test fails
 
-use crate::hidden_effects::ON_TIMES;
+use crate::hidden_effects::{ON_TIMES, THREE_OCTAVES_HZ, small_lab};
 use crate::rivals::diagnoser_among;
 use sabine_diagnose::{DiagnoseConfig, Diagnosis, Verdict};
 use sabine_scene::MeasuredRoom;
-use sabine_testkit::{LabConfig, Laboratory};
 use std::path::Path;
 
 /// Distances from where places are to where they are said to be, along an axis, of unit standard deviation: normal quantiles, mixed.
@@ -49,7 +48,7 @@ fn diagnose(room: &MeasuredRoom) -> Diagnosis {
 #[test]
 fn places_that_are_off_by_as_much_as_is_stated_name_nothing() {
     let folder = tempfile::tempdir().unwrap();
-    let lab = Laboratory::new(LabConfig { seed: 571, receivers: 8, ..LabConfig::default() }).unwrap();
+    let lab = small_lab(571, 6, THREE_OCTAVES_HZ);
     let write = |name: &str| {
         let path = folder.path().join(name);
         lab.write(&[], &path, None).unwrap();
