@@ -15,7 +15,7 @@ pub(crate) fn lab(seed: u64) -> Laboratory {
     Laboratory::new(LabConfig { seed, receivers: 8, ..LabConfig::default() }).unwrap()
 }
 
-/// What takes a third of the time in the gate, where an effect shows in it: so many receivers, and four octaves or three. At night, all.
+/// So many receivers and a few octaves, which take less time in the gate, where an effect shows in them. At night eight, and all octaves.
 pub(crate) fn small_lab(seed: u64, receivers: usize, hz: [f64; 2]) -> Laboratory {
     if at_night() {
         return lab(seed);

@@ -7,7 +7,7 @@ use sabine_paths::conformance::check;
 use sabine_paths::{Contribution, PathSet, Propagator};
 use sabine_propagate::{PathTracer, ReferenceTracer, TracerConfig};
 use sabine_scene::{Receiver, Scene, Source};
-use sabine_testkit::ShoeboxImages;
+use sabine_testkit::{ShoeboxImages, at_night};
 
 fn config(rays: usize) -> TracerConfig {
     TracerConfig { rays, duration_s: 0.6, ..TracerConfig::default() }
@@ -18,7 +18,11 @@ fn tracers_conform() {
     let tracers: [(&str, Box<dyn Propagator>, bool); 3] = [
         ("PathTracer", Box::new(PathTracer::new(config(4000)).unwrap()), true),
         // Its Monte-Carlo error falls slowly: a sphere catches what the path tracer joins.
-        ("ReferenceTracer", Box::new(ReferenceTracer::new(config(50_000)).unwrap()), true),
+        (
+            "ReferenceTracer",
+            Box::new(ReferenceTracer::new(config(if at_night() { 200_000 } else { 50_000 })).unwrap()),
+            true,
+        ),
         ("ShoeboxImages", Box::new(ShoeboxImages::new(0.3).unwrap()), false),
     ];
     for (name, tracer, scatters) in tracers {
