@@ -97,12 +97,7 @@ impl Baseline {
 
     /// The traced room at the present absorption, for tables.
     pub fn room_view(&self) -> Result<TracedRoomView<'_>, Error> {
-        Ok(TracedRoomView {
-            survey: &self.observations.survey,
-            simulation: &self.simulation,
-            pulses: &self.observations.pulses,
-            materials: self.simulation.expanded_materials()?,
-        })
+        TracedRoomView::new(&self.observations.survey, &self.simulation, &self.observations.pulses)
     }
 
     /// Number of pairs, and of responses.

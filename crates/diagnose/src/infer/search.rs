@@ -348,7 +348,7 @@ mod tests {
                 measured.energies.iter_mut().zip(states).zip([below, above])
             {
                 let group =
-                    |g: usize| state.group_energy[g] * (-nepers * state.group_hits[2 * g + material]).exp();
+                    |g: usize| state.group_energy[g] * (-nepers * state.group_hits[material][g]).exp();
                 let bin = |k: usize| (state.groups[k]..state.groups[k + 1]).map(group).sum();
                 *energies = Some((0..state.ln_energy.len()).map(bin).collect());
             }

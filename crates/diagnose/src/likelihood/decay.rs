@@ -236,17 +236,15 @@ impl<'a> EnergyModel<'a> {
         let gain = self.gain_db(values, pair) * LN_PER_DB;
         let mut group_energy = state.group_energy[..state.groups[count]].to_vec();
         if moved {
-            let hits = state.group_hits.chunks_exact(m);
-            let mut changes: Vec<f64> = hits
-                .take(group_energy.len())
-                .map(|hits| hits.iter().zip(&shift).map(|(n, s)| n * s).sum())
-                .collect();
+            let mut changes = vec![0.0; group_energy.len()];
+            for (hits, shift) in state.group_hits.iter().zip(&shift) {
+                changes.iter_mut().zip(hits).for_each(|(change, n)| *change += n * shift);
+            }
             exp_all(&mut changes);
             group_energy.iter_mut().zip(&changes).for_each(|(e, change)| *e *= change);
         }
         let mut ln_energy = Vec::with_capacity(count);
         let mut slopes = Vec::with_capacity(if sloping { count * m } else { 0 });
-        let mut mean_hits = vec![0.0; m];
         for bin in 0..count {
             let groups = state.groups[bin]..state.groups[bin + 1];
             let energy: f64 = group_energy[groups.clone()].iter().sum();
@@ -254,14 +252,11 @@ impl<'a> EnergyModel<'a> {
             if !sloping {
                 continue;
             }
-            mean_hits.fill(0.0);
-            for group in groups {
-                let hits = &state.group_hits[group * m..(group + 1) * m];
-                mean_hits.iter_mut().zip(hits).for_each(|(sum, n)| *sum += group_energy[group] * n);
-            }
-            slopes.extend(
-                (0..m).map(|k| -mean_hits[k] / (energy * (1.0 - values[self.layout.absorption(k, band)]))),
-            );
+            slopes.extend(state.group_hits.iter().enumerate().map(|(k, hits)| {
+                let own = group_energy[groups.clone()].iter().zip(&hits[groups.clone()]);
+                let mean_hits: f64 = own.map(|(e, n)| e * n).sum();
+                -mean_hits / (energy * (1.0 - values[self.layout.absorption(k, band)]))
+            }));
         }
         (ln_energy, slopes)
     }

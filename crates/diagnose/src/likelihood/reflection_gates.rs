@@ -210,8 +210,7 @@ fn fitted(
         })
         .collect();
     let one = |(i, l): (usize, &f64)| {
-        let hits = &state.group_hits[i * materials..(i + 1) * materials];
-        l + hits.iter().zip(&change).map(|(n, c)| n * c).sum::<f64>()
+        l + state.group_hits.iter().zip(&change).map(|(hits, c)| hits[i] * c).sum::<f64>()
     };
     state.ln_energy.iter().enumerate().map(one).collect()
 }

@@ -17,8 +17,8 @@ pub(crate) struct BandState {
     pub groups: Vec<usize>,
     /// Energy of each group.
     pub group_energy: Vec<f64>,
-    /// Its mean number of hits, `[group * materials + material]`.
-    pub group_hits: Vec<f64>,
+    /// Its mean number of hits, `[material][group]`.
+    pub group_hits: Vec<Vec<f64>>,
     /// Energy-weighted mean time after the direct sound.
     pub time_s: Vec<f64>,
     pub departure: Vec<[f64; 3]>,
@@ -42,7 +42,7 @@ pub(crate) struct BandState {
 
 impl BandState {
     /// Without any bin; room for so many.
-    pub fn empty(bins: Bins, own_share: f64, count: usize) -> Self {
+    pub fn empty(bins: Bins, own_share: f64, count: usize, materials: usize) -> Self {
         Self {
             bins,
             ln_energy: Vec::with_capacity(count),
@@ -50,7 +50,7 @@ impl BandState {
             leaks: Vec::new(),
             groups: vec![0],
             group_energy: Vec::new(),
-            group_hits: Vec::new(),
+            group_hits: vec![Vec::new(); materials],
             time_s: Vec::with_capacity(count),
             departure: Vec::with_capacity(count),
             departure_products: Vec::with_capacity(count),
@@ -80,15 +80,14 @@ impl BandState {
         let early = |bin: usize| (-0.25 * bin as f64 - offset).exp();
         let group_energy: Vec<f64> =
             (0..count).flat_map(|bin| [0.7 * early(bin), 0.3 * early(bin)]).collect();
-        let hits =
-            |group: usize| (0..materials).map(move |m| 0.3 * (group / 2) as f64 + (group % 2 + m) as f64);
+        let hits = |group: usize, m: usize| 0.3 * (group / 2) as f64 + (group % 2 + m) as f64;
         Self {
             bins,
             ln_energy: (0..count).map(|bin| early(bin).ln()).collect(),
             own_share: 1.0,
             leaks: Vec::new(),
             groups: (0..=count).map(|bin| 2 * bin).collect(),
-            group_hits: (0..2 * count).flat_map(hits).collect(),
+            group_hits: (0..materials).map(|m| (0..2 * count).map(|g| hits(g, m)).collect()).collect(),
             group_energy,
             time_s: (0..count).map(|bin| bins.centre_s(bin)).collect(),
             departure: (0..count).map(|bin| [0.5 - 0.1 * bin as f64, 0.2, -0.1]).collect(),

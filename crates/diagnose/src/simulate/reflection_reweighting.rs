@@ -17,7 +17,7 @@ pub(crate) struct HitChanges {
 
 impl HitChanges {
     /// Logarithm of the change of a bin's energy if each meeting with a material left so much less (logarithm).
-    pub fn of(&self, state: &BandState, materials: usize, bin: usize, material: usize, ln_kept: f64) -> f64 {
+    pub fn of(&self, state: &BandState, bin: usize, material: usize, ln_kept: f64) -> f64 {
         let mut asked = self.asked.borrow_mut();
         let same = asked.iter().position(|(m, l, _)| *m == material && *l == ln_kept);
         let place = same.unwrap_or_else(|| {
@@ -29,24 +29,18 @@ impl HitChanges {
         });
         let change = &mut asked[place].2[bin];
         if change.is_nan() {
-            *change = reflection_reweighting(state, materials, bin, material, ln_kept);
+            *change = reflection_reweighting(state, bin, material, ln_kept);
         }
         *change
     }
 }
 
-fn reflection_reweighting(
-    state: &BandState,
-    materials: usize,
-    bin: usize,
-    material: usize,
-    ln_kept: f64,
-) -> f64 {
+fn reflection_reweighting(state: &BandState, bin: usize, material: usize, ln_kept: f64) -> f64 {
     let (mut before, mut after) = (0.0, 0.0);
     for group in state.groups[bin]..state.groups[bin + 1] {
         let energy = state.group_energy[group];
         before += energy;
-        after += energy * (state.group_hits[group * materials + material] * ln_kept).exp();
+        after += energy * (state.group_hits[material][group] * ln_kept).exp();
     }
     if before > 0.0 { (after / before).ln() } else { 0.0 }
 }

@@ -165,20 +165,26 @@ impl Simulation {
     /// Energies of all bins at the present absorption; early reflections one by one, too, where wanted.
     pub fn expand(&mut self, observations: &Observations, reflections: bool) -> Result<(), Error> {
         let materials = self.expanded_materials()?;
-        let one = |pair: &TracedPair| pair.expand(&materials, &observations.pulses, self.traced_s);
-        self.states = self.pairs.par_iter().map(one).collect::<Result<_, _>>()?;
-        if reflections {
-            let one = |(index, pair): (usize, &TracedPair)| -> Result<_, Error> {
-                let (mut found, states) = pair.isolated_reflections(&materials, PEAKS_S)?;
+        let bands = observations.survey.bands;
+        let one = |(index, pair): (usize, &TracedPair)| -> Result<_, Error> {
+            let energies = pair.energies(&materials)?;
+            let states = pair.expand(&energies, bands, &observations.pulses, self.traced_s);
+            let isolated = reflections.then(|| {
+                let (mut found, states) = pair.isolated_reflections(&energies, bands, PEAKS_S);
                 let places_m = self.places_m(&observations.survey, index);
                 for r in &mut found {
                     let met = self.met.of(places_m, r.length_m, [r.departure, r.arrival]);
                     r.surfaces = met.unwrap_or_default();
                 }
-                Ok((found, states))
-            };
-            self.isolated_reflections =
-                self.pairs.par_iter().enumerate().map(one).collect::<Result<_, _>>()?;
+                (found, states)
+            });
+            Ok((states, isolated))
+        };
+        let expanded: Vec<_> = self.pairs.par_iter().enumerate().map(one).collect::<Result<_, Error>>()?;
+        let isolated: Vec<Option<_>>;
+        (self.states, isolated) = expanded.into_iter().unzip();
+        if reflections {
+            self.isolated_reflections = isolated.into_iter().flatten().collect();
         }
         self.ends =
             self.states.iter().map(|s| s.iter().map(|b| range_end(b, self.range_db)).collect()).collect();

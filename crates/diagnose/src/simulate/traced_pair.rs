@@ -12,7 +12,7 @@ use crate::simulate::band_state::BandState;
 use crate::simulate::hit_groups;
 use crate::simulate::path_chances;
 use rayon::prelude::*;
-use sabine_acoustics::{Air, Error, Material};
+use sabine_acoustics::{Air, Bands, Error, Material};
 use sabine_paths::{Conditions, PathSet};
 
 /// What the model itself may be off by, as a share of a bin's energy: a single early pulse is never predicted better.
@@ -128,7 +128,7 @@ impl TracedPair {
 
     /// The exact paths, the shortest first. Which surfaces they meet is not filled in.
     pub fn arrivals(&self, materials: &[Material], within_s: f64) -> Result<Vec<Arrival>, Error> {
-        let energies = self.paths.energies(&Conditions::new(materials, &self.air))?;
+        let energies = self.energies(materials)?;
         let bands = materials[0].bands();
         // All bands are as wide in proportion.
         let widths: Vec<f64> = (0..bands.len()).map(|band| bands.exact_hz(band)).collect();
@@ -167,15 +167,19 @@ impl TracedPair {
         (0..self.paths.len()).any(|i| self.paths.is_direct(i))
     }
 
-    /// Predicted energies in all bands for `duration_s` after the direct sound.
+    /// Energies of the paths under materials, `[band][path]`.
+    pub fn energies(&self, materials: &[Material]) -> Result<Vec<Vec<f32>>, Error> {
+        self.paths.energies(&Conditions::new(materials, &self.air))
+    }
+
+    /// Predicted energies in all bands for `duration_s` after the direct sound, from those of the paths.
     pub fn expand(
         &self,
-        materials: &[Material],
+        energies: &[Vec<f32>],
+        bands: Bands,
         kernels: &[BandPulse],
         duration_s: f64,
-    ) -> Result<Vec<BandState>, Error> {
-        let bands = materials[0].bands();
-        let energies = self.paths.energies(&Conditions::new(materials, &self.air))?;
+    ) -> Vec<BandState> {
         let mut states: Vec<BandState> = energies
             .par_iter()
             .enumerate()
@@ -190,7 +194,7 @@ impl TracedPair {
                 }
             }
         }
-        Ok(states)
+        states
     }
 
     /// The bins that a path's energy falls into, with its share of each.

@@ -14,6 +14,7 @@ use sabine_paths::laws::{BoundLaws, LawSite};
 use sabine_paths::{Conditions, PathSet};
 use sabine_propagate::ImageSource;
 use sabine_scene::{Receiver, Scene, Source};
+use std::sync::OnceLock;
 
 /// Energy of a bin without paths, as a share of the strongest: it counts as nothing.
 const NOTHING: f64 = 1e-12;
@@ -23,10 +24,22 @@ pub struct TracedRoomView<'a> {
     pub(crate) survey: &'a Survey,
     pub(crate) simulation: &'a Simulation,
     pub(crate) pulses: &'a [BandPulse],
-    pub(crate) materials: Vec<Material>,
+    materials: Vec<Material>,
+    /// Energies of the paths of each pair under these, once a term has asked for them.
+    energies: Vec<OnceLock<Vec<Vec<f32>>>>,
 }
 
-impl TracedRoomView<'_> {
+impl<'a> TracedRoomView<'a> {
+    pub(crate) fn new(
+        survey: &'a Survey,
+        simulation: &'a Simulation,
+        pulses: &'a [BandPulse],
+    ) -> Result<Self, Error> {
+        let materials = simulation.expanded_materials()?;
+        let energies = simulation.pairs.iter().map(|_| OnceLock::new()).collect();
+        Ok(Self { survey, simulation, pulses, materials, energies })
+    }
+
     /// The survey.
     pub fn survey(&self) -> &Survey {
         self.survey
@@ -154,6 +167,19 @@ impl<'a> TracedPairView<'a> {
     /// When the first path arrives, in seconds after the emission.
     pub fn direct_s(&self) -> f64 {
         self.pair.direct_s
+    }
+
+    /// Energies of its paths under [`TracedRoomView::materials`], `[band][path]`; computed once.
+    ///
+    /// # Errors
+    /// [`Error::Acoustics`] from the paths.
+    pub fn expanded_energies(&self) -> Result<&'a [Vec<f32>], Error> {
+        let once = &self.room.energies[self.index];
+        if let Some(known) = once.get() {
+            return Ok(known);
+        }
+        let found = self.energies(self.room.materials())?;
+        Ok(once.get_or_init(|| found))
     }
 
     /// Energies of its paths under other materials, `[band][path]`.

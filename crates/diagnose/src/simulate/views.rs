@@ -120,8 +120,7 @@ impl BandView<'_> {
 
     /// Natural logarithm of the change of a bin's energy if each meeting with a material left less, by this logarithm of the share.
     pub fn reflection_reweighting(&self, bin: usize, material: usize, ln_kept: f64) -> f64 {
-        let materials = self.survey.materials.len();
-        self.hit_changes.of(self.state, materials, bin, material, ln_kept)
+        self.hit_changes.of(self.state, bin, material, ln_kept)
     }
 }
 

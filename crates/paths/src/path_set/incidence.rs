@@ -25,7 +25,7 @@ pub(crate) fn angle_cosine(angle: usize) -> f64 {
 }
 
 /// The angle of a cosine, below [`ANGLES`].
-pub(super) fn angle_of(cosine: f64) -> usize {
+fn angle_of(cosine: f64) -> usize {
     usize::from(code(Incidence::Cosine(cosine)))
 }
 
@@ -70,22 +70,27 @@ impl PathSet {
             .flat_map(|material| (0..steps).map(move |code| (material, angle_cosine(code))))
             .map(|(material, cosine)| step(material, cosine).map(|x| x as f32))
             .collect();
-        // Hits on each material along each axis: few sets have any.
-        let wide =
-            if self.incidences.iter().any(|&i| i >= STEPS && i != UNKNOWN) { 3 * self.materials } else { 0 };
+        // Hits on each material along each axis, one row for each chain that has any; the first row is that of all others.
+        let wide = 3 * self.materials;
+        let mut rows = vec![0u32; self.parents.len()];
+        let mut along = vec![0u16; wide];
         let mut sums = vec![[0.0f32; N]; self.parents.len()];
-        let mut along = vec![0u16; self.parents.len() * wide];
         for chain in 1..self.parents.len() {
             let parent = self.parents[chain] as usize;
             sums[chain] = sums[parent];
-            along.copy_within(parent * wide..(parent + 1) * wide, chain * wide);
+            rows[chain] = rows[parent];
             let material = usize::from(self.events[chain] >> 1);
             match self.incidences[chain] {
                 UNKNOWN => {}
                 code if code < STEPS => {
                     add(&mut sums[chain], 1.0, &table[material * steps + usize::from(code)])
                 }
-                axis => along[chain * wide + 3 * material + usize::from(axis - STEPS)] += 1,
+                axis => {
+                    let before = rows[parent] as usize * wide;
+                    rows[chain] = (along.len() / wide) as u32;
+                    along.extend_from_within(before..before + wide);
+                    along[rows[chain] as usize * wide + 3 * material + usize::from(axis - STEPS)] += 1;
+                }
             }
         }
         (0..self.len())
@@ -93,16 +98,13 @@ impl PathSet {
                 let chains = [self.chains[i] as usize, self.tails[i] as usize];
                 let mut sum = sums[chains[0]];
                 add(&mut sum, 1.0, &sums[chains[1]]);
-                if wide == 0 || chains == [0, 0] {
+                let rows = chains.map(|chain| rows[chain] as usize);
+                if rows == [0, 0] {
                     return sum;
                 }
-                let departure = self.departure(i);
-                let codes = self.axes.map(|axis| {
-                    let cosine: f64 = (0..3).map(|k| axis[k] * departure[k]).sum();
-                    usize::from(code(Incidence::Cosine(cosine.abs())))
-                });
+                let codes = self.angles_to_axes(i);
                 for place in 0..wide {
-                    let hits: u16 = chains.iter().map(|&c| along[c * wide + place]).sum();
+                    let hits: u16 = rows.iter().map(|row| along[row * wide + place]).sum();
                     if hits > 0 {
                         add(&mut sum, f32::from(hits), &table[place / 3 * steps + codes[place % 3]]);
                     }
@@ -110,6 +112,17 @@ impl PathSet {
                 sum
             })
             .collect()
+    }
+}
+
+impl PathSet {
+    /// The angle to each of the axes at which a contribution departs.
+    pub(super) fn angles_to_axes(&self, contribution: usize) -> [usize; 3] {
+        let departure = self.departure(contribution);
+        self.axes.map(|axis| {
+            let cosine: f64 = (0..3).map(|k| axis[k] * departure[k]).sum();
+            angle_of(cosine.abs())
+        })
     }
 }
 

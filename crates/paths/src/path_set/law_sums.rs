@@ -1,7 +1,7 @@
 //! What laws ask of chains of reflections.
 
 use super::PathSet;
-use super::incidence::{ANGLES, UNKNOWN, angle_of};
+use super::incidence::{ANGLES, UNKNOWN};
 use crate::laws::Counted;
 use crate::reweighting::Lanes;
 
@@ -45,15 +45,17 @@ impl PathSet {
         }
         let of = |i: usize| {
             let mut sum = [0.0; 4];
+            if !any[self.chains[i] as usize] && !any[self.tails[i] as usize] {
+                return sum;
+            }
+            let angles = self.angles_to_axes(i);
             for end in [self.chains[i], self.tails[i]] {
                 let mut chain = end as usize;
                 while any[chain] {
                     let rows = &table[usize::from(self.events[chain] >> 1)];
                     if is_axis(chain) && !rows.is_empty() {
-                        let axis = self.axes[usize::from(self.incidences[chain]) - ANGLES];
-                        let departure = self.departure(i);
-                        let cosine: f64 = (0..3).map(|k| axis[k] * departure[k]).sum();
-                        let (here, nowhere) = (rows[angle_of(cosine.abs())], rows[ANGLES]);
+                        let angle = angles[usize::from(self.incidences[chain]) - ANGLES];
+                        let (here, nowhere) = (rows[angle], rows[ANGLES]);
                         sum = std::array::from_fn(|k| sum[k] + here[k] - nowhere[k]);
                     }
                     chain = self.parents[chain] as usize;

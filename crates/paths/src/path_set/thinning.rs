@@ -19,10 +19,12 @@ impl PathSet {
         }
         let mut kept: Vec<bool> = chances.iter().map(|&chance| chance >= 1.0).collect();
         let by_lot = |&i: &usize| chances[i] > 0.0 && chances[i] < 1.0;
-        let mut drawn: Vec<usize> = (0..self.len()).filter(by_lot).collect();
-        drawn.sort_unstable_by(|&a, &b| self.lengths_m[a].total_cmp(&self.lengths_m[b]).then(a.cmp(&b)));
+        // Lengths are positive: their bits are in their order, and to sort numbers is faster than to look each of them up.
+        let key = |i: usize| u64::from(self.lengths_m[i].to_bits()) << 32 | i as u64;
+        let mut drawn: Vec<u64> = (0..self.len()).filter(by_lot).map(key).collect();
+        drawn.sort_unstable();
         let mut sum = unit_interval(seed);
-        for i in drawn {
+        for i in drawn.into_iter().map(|key| (key & u64::from(u32::MAX)) as usize) {
             sum += f64::from(chances[i]);
             if sum >= 1.0 {
                 sum -= 1.0;

@@ -38,7 +38,7 @@ pub(super) fn prepare(room: &TracedRoomView<'_>) -> Result<Tables, Error> {
 
 fn of_bins(pair: &TracedPairView<'_>) -> Result<Vec<LocalReactionTable>, Error> {
     let materials = pair.room().materials();
-    let energies = pair.energies(materials)?;
+    let energies = pair.expanded_energies()?;
     let mut found = Vec::with_capacity(energies.len());
     for first in (0..energies.len()).step_by(OCTAVES) {
         let walls: Vec<[LocalReaction; OCTAVES]> = materials

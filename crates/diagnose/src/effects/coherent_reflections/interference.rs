@@ -113,7 +113,7 @@ fn specular_paths(pair: &TracedPairView<'_>, reaches_s: &[f64]) -> Result<Specul
     let speed_m_s = air.speed_of_sound_m_s();
     let longest_s = reaches_s.iter().copied().fold(0.0, f64::max);
     let Some(faces) = pair.room().cuboid_faces() else {
-        let energies = pair.energies(pair.room().materials())?;
+        let energies = pair.expanded_energies()?;
         let paths = pair.paths();
         let end_m = (direct_s + EXACT_S + longest_s) * speed_m_s;
         let early = |i: &usize| paths.is_exact(*i) && f64::from(paths.lengths_m()[*i]) < end_m;
@@ -121,7 +121,7 @@ fn specular_paths(pair: &TracedPairView<'_>, reaches_s: &[f64]) -> Result<Specul
             found.lengths_m.push(f64::from(paths.lengths_m()[i]));
             found.departures.push(paths.departure(i).map(|x| x as f32));
             found.arrivals.push(paths.arrival(i).map(|x| x as f32));
-            found.energies.iter_mut().zip(&energies).for_each(|(own, all)| own.push(f64::from(all[i])));
+            found.energies.iter_mut().zip(energies).for_each(|(own, all)| own.push(f64::from(all[i])));
         }
         found.summed_until_s.fill(EXACT_S);
         return Ok(found);

@@ -13,7 +13,7 @@ const SOUGHT: [f64; 3] = [0.5, 0.2, 0.8];
 /// Most parameters that start from several places each.
 const MAX_SPREAD: usize = 3;
 /// Most that a law may add, in dB.
-const MAX_GAIN_DB: f64 = 200.0;
+pub(super) const MAX_GAIN_DB: f64 = 200.0;
 /// Most combinations of ends of intervals at which a law is looked at beforehand.
 const MAX_CORNERS: usize = 256;
 /// Shares of the farther end from which an amplitude is sought.

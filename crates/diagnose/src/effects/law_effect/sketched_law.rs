@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Natural logarithm of the energy per decibel.
-const NEPERS_PER_DB: f64 = std::f64::consts::LN_10 / 10.0;
+pub(super) const NEPERS_PER_DB: f64 = std::f64::consts::LN_10 / 10.0;
 /// Least logarithm of a share of energy that counts.
 const LEAST_NEPERS: f64 = -600.0;
 
@@ -48,7 +48,7 @@ impl SketchedLaw {
         let known: BTreeMap<String, f64> = law.variables().into_iter().filter_map(known).collect();
         let sketched = sketched(law, &self.0.plain(), &bound, pair)?;
         let (site, names) = (Arc::new(known), Arc::new(sketched.names));
-        let energies = pair.energies(pair.room().materials())?;
+        let energies = pair.expanded_energies()?;
         let of_band = |(band, energies): (usize, &Vec<f32>)| {
             let width = sketched.paths.width();
             let (site, names) = (Arc::clone(&site), Arc::clone(&names));

@@ -1,5 +1,7 @@
 //! A law whose amplitude varies, tabulated for the bins of a traced room.
 
+use super::free_parameters::MAX_GAIN_DB;
+use super::sketched_law::NEPERS_PER_DB;
 use crate::error::Error;
 use crate::simulate::tables::{Tables, Unprepared, between};
 use crate::simulate::traced_views::{TracedPairView, TracedRoomView};
@@ -65,25 +67,28 @@ impl TabulatedLaw {
         pair.energies_under(&bound)
     }
 
-    /// Tables of all bands. The decibels of a law go with its amplitude: each twelfth multiplies the energy of a path by the same factor.
+    /// Tables of all bands. The decibels of a law go with its amplitude: what it leaves of the energy of a path at one amplitude says what it
+    /// leaves at all others.
     fn tables(&self, pair: &TracedPairView<'_>) -> Result<Vec<LawTable>, Error> {
-        let without = pair.energies(pair.room().materials())?;
         let zero = self.grid.iter().position(|x| *x == 0.0).unwrap_or(0);
-        let (below, above) = (self.grid[..zero].iter().rev(), self.grid[zero + 1..].iter());
-        let one_side = |amplitudes: Vec<f64>| -> Result<Vec<Vec<Vec<f64>>>, Error> {
-            let (Some(&first), Some(&last)) = (amplitudes.first(), amplitudes.last()) else {
-                return Ok(vec![Vec::new(); without.len()]);
-            };
+        let (below, above) = (&self.grid[..zero], &self.grid[(zero + 1).min(self.grid.len())..]);
+        let without = pair.expanded_energies()?;
+        let none = || without.iter().enumerate().map(|(band, _)| vec![0.0; pair.ln_energy(band).len()]);
+        let mut tables: Vec<LawTable> =
+            none().map(|at_zero| LawTable { grid: self.grid.clone(), ln_changes: vec![at_zero] }).collect();
+        let Some(&tried) = above.first().or(below.last()) else { return Ok(tables) };
+        let kept = KeptEnergy::new(without, &self.energies(pair, tried)?);
+        for last in below.first().into_iter().chain(above.last()) {
             // Where the law would be too loud is an error, not a number.
-            self.energies(pair, last)?;
-            let stepped = self.energies(pair, first)?;
-            let in_band = |band: usize| {
+            if kept.greatest_nepers(last / tried) > 0.5 * MAX_GAIN_DB * NEPERS_PER_DB {
+                self.energies(pair, *last)?;
+            }
+        }
+        for (band, table) in tables.iter_mut().enumerate() {
+            let side = |first: Option<&f64>| -> Vec<Vec<f64>> {
+                let Some(first) = first else { return Vec::new() };
+                let factors = kept.in_band(band, first / tried);
                 let mut energies = without[band].clone();
-                let factors: Vec<f32> = energies
-                    .iter()
-                    .zip(&stepped[band])
-                    .map(|(e, s)| if *e > 0.0 { s / e } else { 0.0 })
-                    .collect();
                 let mut done = 0;
                 let step = |to: i32| {
                     let more = to - std::mem::replace(&mut done, to);
@@ -92,16 +97,53 @@ impl TabulatedLaw {
                 };
                 STEPS.into_iter().map(step).collect()
             };
-            Ok((0..without.len()).map(in_band).collect())
+            let (below, above) = (side(below.last()), side(above.first()));
+            table.ln_changes.splice(..0, below.into_iter().rev());
+            table.ln_changes.extend(above);
+        }
+        Ok(tables)
+    }
+}
+
+/// What a law leaves of the energy of each path at one amplitude.
+struct KeptEnergy {
+    /// `[band][path]`; 0 where too little is left to tell, or was there before.
+    shares: Vec<Vec<f32>>,
+    least: f32,
+    greatest: f32,
+}
+
+impl KeptEnergy {
+    fn new(without: &[Vec<f32>], with: &[Vec<f32>]) -> Self {
+        let (mut least, mut greatest) = (1.0f32, 1.0f32);
+        let mut share = |(before, after): (&f32, &f32)| {
+            if !before.is_normal() {
+                return 0.0;
+            }
+            let share = if after.is_normal() { after / before } else { 0.0 };
+            (least, greatest) = (least.min(share), greatest.max(share));
+            share
         };
-        let (below, above) = (one_side(below.copied().collect())?, one_side(above.copied().collect())?);
-        let joined = |(mut below, above): (Vec<Vec<f64>>, Vec<Vec<f64>>)| {
-            below.reverse();
-            below.push(vec![0.0; above.first().or(below.first()).map_or(0, Vec::len)]);
-            below.extend(above);
-            LawTable { grid: self.grid.clone(), ln_changes: below }
+        let shares =
+            without.iter().zip(with).map(|(a, b)| a.iter().zip(b).map(&mut share).collect()).collect();
+        Self { shares, least, greatest }
+    }
+
+    /// The shares of a band at so many times that amplitude.
+    fn in_band(&self, band: usize, times: f64) -> Vec<f32> {
+        let one = |&share: &f32| match share {
+            0.0 => 0.0,
+            _ if times == 1.0 => share,
+            _ if times == -1.0 => share.recip(),
+            _ => share.powf(times as f32),
         };
-        Ok(below.into_iter().zip(above).map(joined).collect())
+        self.shares[band].iter().map(one).collect()
+    }
+
+    /// By how much the law lifts the logarithm of a path's energy at most at so many times that amplitude; infinite where that cannot be told.
+    fn greatest_nepers(&self, times: f64) -> f64 {
+        let nepers = |share: f32| times * f64::from(share).ln();
+        nepers(self.least).max(nepers(self.greatest))
     }
 }
 
@@ -110,4 +152,56 @@ impl TabulatedLaw {
 struct LawTable {
     grid: Vec<f64>,
     ln_changes: Vec<Vec<f64>>,
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)] // a panic is how a test fails
+    use super::*;
+    use crate::config::DiagnoseConfig;
+    use crate::infer::baseline::Baseline;
+    use crate::simulate::scene_tracer::{Rays, SceneTracer};
+    use sabine_paths::laws::{LawParameter, LawTarget};
+    use sabine_testkit::{LabConfig, Laboratory};
+    use std::sync::Arc;
+
+    #[test]
+    fn every_place_of_the_grid_holds_what_the_law_does_there_and_what_is_too_loud_is_an_error() {
+        let lab = Laboratory::new(LabConfig { seed: 32, receivers: 2, ..LabConfig::default() }).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let room = lab.write(&[], &folder.path().join("room"), None).unwrap();
+        let config = DiagnoseConfig { rays: 200, wave_solutions: false, ..DiagnoseConfig::default() };
+        let tracer: Arc<dyn SceneTracer> = Arc::new(Rays { config: config.tracer() });
+        let baseline = Baseline::new(&room, &[], &config, &tracer, &()).unwrap();
+        let view = baseline.room_view().unwrap();
+        let pair = view.pair(1);
+        let of_range = |low: f64, high: f64| {
+            let a = LawParameter::new(high, [low, high], "dB");
+            let formula = "a * reflections / (reflections + 3)";
+            TabulatedLaw::new(
+                Law::new("x", LawTarget::Path, None, formula, [("a", a)]).unwrap(),
+                0,
+                (low, high),
+            )
+        };
+        for (low, high) in [(-12.0, 12.0), (-3.0, 24.0), (-30.0, 0.0), (0.0, 6.0)] {
+            let law = of_range(low, high);
+            let tables = law.tables(&pair).unwrap();
+            for (place, &amplitude) in law.grid.iter().enumerate() {
+                let energies = law.energies(&pair, amplitude).unwrap();
+                for (band, table) in tables.iter().enumerate() {
+                    assert_eq!(table.ln_changes.len(), law.grid.len());
+                    let expected = pair.ln_changes(band, &energies[band]);
+                    let off = table.ln_changes[place].iter().zip(&expected).map(|(a, b)| (a - b).abs());
+                    let off = off.fold(0.0, f64::max);
+                    assert!(off < 1e-4, "{low} to {high}, {amplitude} in band {band}: off by {off}");
+                }
+            }
+        }
+        // A law may take what it will, and add 200 dB.
+        for (low, high) in [(-1500.0, 1.0), (-1.0, 1500.0), (-1500.0, 0.0)] {
+            let refused = of_range(low, high).tables(&pair);
+            assert_eq!(refused.is_err(), high > 1.0, "{low} to {high}");
+        }
+    }
 }

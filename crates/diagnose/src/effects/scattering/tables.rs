@@ -58,7 +58,13 @@ fn of_bins(pair: &TracedPairView<'_>) -> Result<Vec<ScatteringTable>, Error> {
     let at = |extra: &f64| -> Result<Vec<ExpectedBins>, Error> {
         let changed: Vec<Material> =
             materials.iter().map(|m| scattering_more(m, *extra)).collect::<Result<_, _>>()?;
-        let energies = pair.energies(&changed)?;
+        let found;
+        let energies = if changed == materials {
+            pair.expanded_energies()?
+        } else {
+            found = pair.energies(&changed)?;
+            &found
+        };
         Ok(energies.iter().enumerate().map(|(band, e)| pair.expected_energies(band, e)).collect())
     };
     // `[grid][band]`.

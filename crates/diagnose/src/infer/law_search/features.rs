@@ -131,7 +131,7 @@ fn of_pair(
     }
     let columns = numbers.len();
     let paths = ClassedPaths { classes: vec![0; pair.paths().len()], count: 1, numbers };
-    let energies = pair.energies(pair.room().materials())?;
+    let energies = pair.expanded_energies()?;
     let of_band = |(band, energies): (usize, &Vec<f32>)| {
         let rows = pair.class_sums(band, energies, &paths);
         let mean = |bin: usize, column: usize| {

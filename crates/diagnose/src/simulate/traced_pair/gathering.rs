@@ -249,7 +249,7 @@ impl Gathered {
     ) -> BandState {
         let count = self.count;
         let floor = NOTHING * (0..count).map(|k| self.sums[k * COLUMNS]).fold(0.0, f64::max).max(1e-30);
-        let mut state = BandState::empty(bins, own_share, count);
+        let mut state = BandState::empty(bins, own_share, count, materials);
         for bin in 0..count {
             let s = &self.sums[bin * COLUMNS..(bin + 1) * COLUMNS];
             let e = s[0].max(floor);
@@ -261,11 +261,11 @@ impl Gathered {
             state.arrival_products.push(std::array::from_fn(|k| s[14 + k] / e));
             for row in self.rows[bin].values().filter(|r| r[0] > 0.0) {
                 state.group_energy.push(row[0]);
-                state.group_hits.extend(row[1..].iter().map(|h| h / row[0]));
+                state.group_hits.iter_mut().zip(&row[1..]).for_each(|(all, h)| all.push(h / row[0]));
             }
             if s[0] <= floor {
                 state.group_energy.push(floor);
-                state.group_hits.extend(std::iter::repeat_n(0.0, materials));
+                state.group_hits.iter_mut().for_each(|all| all.push(0.0));
             }
             state.groups.push(state.group_energy.len());
             let interference = interference(&self.weighted[bin], pulse)

@@ -3,8 +3,7 @@
 use super::{BandState, TracedPair};
 use crate::observe::time_bins::Bins;
 use crate::simulate::modes::Modes;
-use sabine_acoustics::{Error, Material};
-use sabine_paths::Conditions;
+use sabine_acoustics::Bands;
 
 /// An early path that was found exactly.
 #[derive(Clone, Debug)]
@@ -24,13 +23,14 @@ fn products([x, y, z]: [f64; 3]) -> [f64; 6] {
 }
 
 impl TracedPair {
-    /// The early exact paths, the shortest first, each as a bin of its own in the state of each band. Which surfaces they meet is not
-    /// filled in.
+    /// The early exact paths, the shortest first, each as a bin of its own in the state of each band, from the energies of all
+    /// paths. Which surfaces they meet is not filled in.
     pub fn isolated_reflections(
         &self,
-        materials: &[Material],
+        energies: &[Vec<f32>],
+        bands: Bands,
         within_s: f64,
-    ) -> Result<(Vec<IsolatedReflection>, Vec<BandState>), Error> {
+    ) -> (Vec<IsolatedReflection>, Vec<BandState>) {
         let m = self.paths.materials();
         let mut chosen: Vec<usize> = (0..self.paths.len())
             .filter(|&i| self.paths.is_exact(i) && f64::from(self.times_s[i]) <= within_s)
@@ -48,8 +48,6 @@ impl TracedPair {
                 surfaces: Vec::new(),
             })
             .collect();
-        let energies = self.paths.energies(&Conditions::new(materials, &self.air))?;
-        let bands = materials[0].bands();
         let states = energies
             .iter()
             .enumerate()
@@ -60,9 +58,8 @@ impl TracedPair {
                 leaks: Vec::new(),
                 groups: (0..=chosen.len()).collect(),
                 group_energy: chosen.iter().map(|&i| f64::from(energies[i]).max(1e-30)).collect(),
-                group_hits: chosen
-                    .iter()
-                    .flat_map(|&i| self.hits[i * m..(i + 1) * m].iter().map(|h| f64::from(*h)))
+                group_hits: (0..m)
+                    .map(|material| chosen.iter().map(|&i| f64::from(self.hits[i * m + material])).collect())
                     .collect(),
                 time_s: isolated_reflections.iter().map(|s| s.after_direct_s).collect(),
                 departure: isolated_reflections.iter().map(|s| s.departure).collect(),
@@ -76,6 +73,6 @@ impl TracedPair {
                 batch_deviations: Vec::new(),
             })
             .collect();
-        Ok((isolated_reflections, states))
+        (isolated_reflections, states)
     }
 }
