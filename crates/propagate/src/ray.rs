@@ -89,6 +89,15 @@ pub(crate) struct Met {
     /// Of the way to this point.
     pub ways: Ways,
     pub patch: Patch,
+    /// What a ray that stands for one carries, in units of what rays carry on average; none without a weight window.
+    pub carried: Option<f64>,
+}
+
+impl Met {
+    /// What a ray carries, in units of what rays carry on average.
+    pub fn importance(&self, ray: &Ray) -> f64 {
+        self.carried.map_or(1.0, |carried| carried * ray.at.log_rays.exp())
+    }
 }
 
 /// Where a ray is.

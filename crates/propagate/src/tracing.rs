@@ -229,7 +229,9 @@ impl<'a> Tracing<'a> {
         let patch = self.scene.patches.at(surface.plane, plane, at.origin, at.heading);
         let kept = &self.scene.ln_kept[surface.material as usize];
         at.ln_energy.iter_mut().zip(kept).for_each(|(energy, kept)| *energy += kept);
-        Some(Met { normal, material: surface.material, cosine, ways, patch })
+        let of = |windows: &[WeightWindow; 2]| windows[ray.end].importance(&at.ln_energy, at.travelled_m);
+        let carried = self.windows.as_ref().map(of);
+        Some(Met { normal, material: surface.material, cosine, ways, patch, carried })
     }
 
     /// Mirrors or scatters a ray; one that carries much goes both ways. Then it is split, or ends, as the weight window asks.
@@ -245,7 +247,7 @@ impl<'a> Tracing<'a> {
         let scattering = self.scene.probabilities.scattering(met.material, ray.walk.hero);
         let incoming = Some(ray.at.log_rays);
         let both = scattering > 0.0 && scattering < 1.0 && most > 1;
-        if both && WeightWindow::is_above(self.importance(ray)) {
+        if both && WeightWindow::is_above(met.importance(ray)) {
             let mut scattered = ray.split_off(paths);
             scattered.at.log_rays += scattering.ln();
             // It came here but once.
@@ -264,13 +266,6 @@ impl<'a> Tracing<'a> {
         self.split(ray, met, most, waiting, random, paths);
     }
 
-    /// What a ray carries, in units of what rays carry on average.
-    fn importance(&self, ray: &Ray) -> f64 {
-        let at = &ray.at;
-        let of = |windows: &[WeightWindow; 2]| windows[ray.end].importance(&at.ln_energy, at.travelled_m);
-        self.windows.as_ref().map_or(1.0, |windows| of(windows) * at.log_rays.exp())
-    }
-
     /// Splits a ray after a reflection into `most` parts at most, or ends it.
     fn split(
         &self,
@@ -283,7 +278,7 @@ impl<'a> Tracing<'a> {
     ) {
         // A ray that was sent for what its direction promises carries less until the promise is kept.
         let promised = (-ray.at.log_guided).exp();
-        match WeightWindow::fate(self.importance(ray) * promised) {
+        match WeightWindow::fate(met.importance(ray) * promised) {
             // Parts of a ray that was mirrored would go the same way.
             Fate::Parts(parts) if !ray.at.mirrored => {
                 let parts = parts.min(most).max(1);

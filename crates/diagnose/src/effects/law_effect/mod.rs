@@ -39,7 +39,7 @@ const STRENGTHS: [f64; 2] = [-1.5, 1.5];
 /// parameter whose `low` and `high` are one value stays there. An **edge of bands** (`f0` in `above(frequency_hz, f0)`) changes nothing between
 /// the centres of two bands: each of the places that it may have is a case of its own, and the law pays for their number.
 ///
-/// Energies under one amplitude alone are tabulated at six values on each side and joined by straight lines. Laws of more parameters are
+/// Energies under one amplitude alone are tabulated at nine values on each side and joined by straight lines. Laws of more parameters are
 /// evaluated at every step of the fit on classes of paths in each time bin: at most 12 classes of a variable, and laws of reflections at 12
 /// angles. Single reflections stay as they are. Laws of delay move arrivals, laws of added sound add energy to each bin.
 ///
