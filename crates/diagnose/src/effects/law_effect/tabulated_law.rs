@@ -71,11 +71,11 @@ impl TabulatedLaw {
     /// leaves at all others.
     fn tables(&self, pair: &TracedPairView<'_>) -> Result<Vec<LawTable>, Error> {
         let zero = self.grid.iter().position(|x| *x == 0.0).unwrap_or(0);
-        let (below, above) = (&self.grid[..zero], &self.grid[(zero + 1).min(self.grid.len())..]);
+        let (below, above) = (&self.grid[..zero], &self.grid[zero + 1..]);
         let without = pair.expanded_energies()?;
-        let none = || without.iter().enumerate().map(|(band, _)| vec![0.0; pair.ln_energy(band).len()]);
-        let mut tables: Vec<LawTable> =
-            none().map(|at_zero| LawTable { grid: self.grid.clone(), ln_changes: vec![at_zero] }).collect();
+        let nothing = |band: usize| vec![vec![0.0; pair.ln_energy(band).len()]];
+        let table = |band: usize| LawTable { grid: self.grid.clone(), ln_changes: nothing(band) };
+        let mut tables: Vec<LawTable> = (0..without.len()).map(table).collect();
         let Some(&tried) = above.first().or(below.last()) else { return Ok(tables) };
         let kept = KeptEnergy::new(without, &self.energies(pair, tried)?);
         for last in below.first().into_iter().chain(above.last()) {
