@@ -385,6 +385,21 @@ impl Baseline {
     }
 }
 
+#[cfg(test)]
+impl Baseline {
+    /// Of a laboratory room with nothing hidden in it: two receivers, few rays.
+    pub fn of_laboratory(seed: u64) -> Self {
+        use crate::simulate::scene_tracer::Rays;
+        use sabine_testkit::{LabConfig, Laboratory};
+        let lab = Laboratory::new(LabConfig { seed, receivers: 2, ..LabConfig::default() }).expect("a room");
+        let folder = tempfile::tempdir().expect("a folder");
+        let room = lab.write(&[], &folder.path().join("room"), None).expect("files");
+        let config = DiagnoseConfig { rays: 200, wave_solutions: false, ..DiagnoseConfig::default() };
+        let tracer: Arc<dyn SceneTracer> = Arc::new(Rays { config: config.tracer() });
+        Self::new(&room, &[], &config, &tracer, &()).expect("a fit")
+    }
+}
+
 /// Mean squared standardised residual of each band; what a bin measures above the prediction counts up to e^5 times.
 pub(crate) fn dispersion(residuals: &[BinResidual], bands: usize) -> Vec<f64> {
     (0..bands)

@@ -304,21 +304,12 @@ fn add_pulse(signal: &mut [f64], at: f64, amplitude: f64) {
 mod tests {
     #![allow(clippy::unwrap_used)] // a panic is how a test fails
     use super::*;
-    use crate::config::DiagnoseConfig;
     use crate::infer::baseline::Baseline;
-    use crate::simulate::scene_tracer::{Rays, SceneTracer};
-    use sabine_testkit::{LabConfig, Laboratory};
-    use std::sync::Arc;
 
     /// A low octave rings for several bins: images that arrive after the last one are heard in it.
     #[test]
     fn what_arrives_after_the_last_bin_is_summed_with_it() {
-        let lab = Laboratory::new(LabConfig { seed: 31, receivers: 2, ..LabConfig::default() }).unwrap();
-        let folder = tempfile::tempdir().unwrap();
-        let room = lab.write(&[], &folder.path().join("room"), None).unwrap();
-        let config = DiagnoseConfig { rays: 200, wave_solutions: false, ..DiagnoseConfig::default() };
-        let tracer: Arc<dyn SceneTracer> = Arc::new(Rays { config: config.tracer() });
-        let baseline = Baseline::new(&room, &[], &config, &tracer, &()).unwrap();
+        let baseline = Baseline::of_laboratory(31);
         let view = baseline.room_view().unwrap();
         let pair = view.pair(0);
         let pulses = pulses(view.survey().bands()).unwrap();

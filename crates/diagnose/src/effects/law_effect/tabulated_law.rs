@@ -158,21 +158,12 @@ struct LawTable {
 mod tests {
     #![allow(clippy::unwrap_used)] // a panic is how a test fails
     use super::*;
-    use crate::config::DiagnoseConfig;
     use crate::infer::baseline::Baseline;
-    use crate::simulate::scene_tracer::{Rays, SceneTracer};
     use sabine_paths::laws::{LawParameter, LawTarget};
-    use sabine_testkit::{LabConfig, Laboratory};
-    use std::sync::Arc;
 
     #[test]
     fn every_place_of_the_grid_holds_what_the_law_does_there_and_what_is_too_loud_is_an_error() {
-        let lab = Laboratory::new(LabConfig { seed: 32, receivers: 2, ..LabConfig::default() }).unwrap();
-        let folder = tempfile::tempdir().unwrap();
-        let room = lab.write(&[], &folder.path().join("room"), None).unwrap();
-        let config = DiagnoseConfig { rays: 200, wave_solutions: false, ..DiagnoseConfig::default() };
-        let tracer: Arc<dyn SceneTracer> = Arc::new(Rays { config: config.tracer() });
-        let baseline = Baseline::new(&room, &[], &config, &tracer, &()).unwrap();
+        let baseline = Baseline::of_laboratory(32);
         let view = baseline.room_view().unwrap();
         let pair = view.pair(1);
         let of_range = |low: f64, high: f64| {
