@@ -1,6 +1,7 @@
 //! The whole diagnosis: observe, simulate, infer, confirm, report.
 
 mod discovering;
+mod parts_of_rays;
 
 use crate::config::DiagnoseConfig;
 use crate::effect::Effect;
@@ -13,7 +14,6 @@ use crate::infer::baseline::Baseline;
 use crate::infer::candidates::{self, CatalogueCase};
 use crate::infer::confirmation::{Confirmation, Doubt, confirm};
 use crate::infer::naming::{give, select};
-use crate::infer::ray_dependence::{could_be_chance, owed_to_rays};
 use crate::infer::search::Search;
 use crate::infer::selection::Selection;
 use crate::infer::visibility::d_prime;
@@ -37,7 +37,8 @@ const MOST_FALLEN: usize = 3;
 ///    likelihood with all parameters integrated out (Laplace's approximation), which charges for every parameter that is not needed.
 /// 3. Names the strongest if its odds, corrected for the number tried, reach [`DiagnoseConfig::naming_nats`]; and so on up to
 ///    [`DiagnoseConfig::most_causes`] of decays and as many others; drops those that later ones made superfluous.
-/// 4. Where a cause of decays could owe its evidence to the rays that were drawn, starts again with four times as many.
+/// 4. Where a cause of decays could owe its evidence to the rays that were drawn, and quarters of them do not bear it out, starts again with
+///    four times as many.
 /// 5. Predicts positions that it leaves out.
 ///
 /// Same seed, same diagnosis, on any number of threads.
@@ -254,20 +255,18 @@ impl Diagnoser {
         let &Task { effects, held, .. } = task;
         let started = Instant::now();
         let mut weighed = self.weigh(task, &self.tracer, observer)?;
-        let mut tracer = Arc::clone(&self.tracer);
         // Where sound is found to bend around an edge, a second look takes the wrong `scattering` away that stands beside it, and leaves the
         // gain at positions left out no interval above zero: half of them hear nothing of the edge. The first answer stays.
         let bends = |&c: &usize| weighed.cases[c].id == MissingDiffraction.id();
-        let again = weighed.could_be_chance && !weighed.found.chosen.iter().any(bends);
+        let again = !weighed.found.chosen.iter().any(bends) && weighed.owes_a_name(effects, observer)?;
         if let Some(more) = self.tracer.with_more_rays().filter(|_| again) {
             let first_s = started.elapsed().as_secs_f64();
             weighed = self.weigh(task, &more, observer)?;
             weighed.baseline.seconds.insert("with fewer rays first", first_s);
-            tracer = more;
         }
         let mut dropped: Vec<(usize, Doubt)> = Vec::new();
         loop {
-            let mut confirmed = weighed.confirmed((&*tracer, held), effects, observer)?;
+            let mut confirmed = weighed.confirmed(held, effects, observer)?;
             let fallen: Vec<usize> = confirmed.dropped.iter().map(|(candidate, _)| *candidate).collect();
             dropped.append(&mut confirmed.dropped);
             let nothing_stands = confirmed.state.chosen.is_empty() && weighed.given.is_empty();
@@ -322,7 +321,6 @@ impl Diagnoser {
             used,
             found: Selection::default(),
             arrival_fits: Arc::default(),
-            could_be_chance: false,
         };
         let weighed = weighed.searched(task.effects, Vec::new(), observer)?;
         if task.laws.is_some() { self.searched_beside(weighed, task, observer) } else { Ok(weighed) }
@@ -426,8 +424,6 @@ struct Weighed {
     /// Dispersion before anything was named.
     first_dispersion: Vec<f64>,
     arrival_fits: Arc<ArrivalFits>,
-    /// Whether more rays might name something else.
-    could_be_chance: bool,
 }
 
 impl Weighed {
@@ -447,7 +443,6 @@ impl Weighed {
         let mut named = give(&mut self.baseline, &self.cases, effects, fits, &self.given)?;
         named.without = without;
         self.found = select(&mut self.baseline, &self.cases, effects, fits, named, observer)?;
-        self.could_be_chance = could_be_chance(&self.search(effects), &self.found.chosen)?;
         *self.baseline.seconds.entry("search").or_default() += started.elapsed().as_secs_f64();
         Ok(self)
     }
@@ -455,19 +450,19 @@ impl Weighed {
     /// Which of them stand.
     fn confirmed(
         &mut self,
-        (tracer, held): (&dyn SceneTracer, &[usize]),
+        held: &[usize],
         effects: usize,
         observer: &dyn Observer,
     ) -> Result<Confirmation, Error> {
         let started = Instant::now();
-        let chosen = &self.found.chosen;
-        self.found.owed_to_rays =
-            owed_to_rays(&mut self.baseline, &self.cases, chosen, &self.used, (tracer, observer))?;
+        let fallen = self.settled(effects, observer)?;
         *self.baseline.seconds.entry("search").or_default() += started.elapsed().as_secs_f64();
         let mut found = std::mem::take(&mut self.found);
         let confirmed = confirm(&self.search(effects), &mut found, held, observer);
         self.found = found;
-        confirmed
+        let mut confirmed = confirmed?;
+        confirmed.dropped.splice(0..0, fallen.into_iter().map(|candidate| (candidate, Doubt::Rays)));
+        Ok(confirmed)
     }
 }
 

@@ -20,6 +20,8 @@ pub(crate) struct History {
     pub times_s: Vec<f64>,
     /// Batch of each path; `PathSet::BATCHES` for an exact one.
     pub batches: Vec<u8>,
+    /// Number of batches.
+    pub batch_count: usize,
     /// Where in the path set each path stands.
     order: Vec<u32>,
     speed_m_s: f64,
@@ -79,6 +81,7 @@ impl History {
             hits,
             times_s: order.iter().map(|&i| time_s(i as usize)).collect(),
             batches: order.iter().map(|&i| paths.batch(i as usize).unwrap_or(PathSet::BATCHES)).collect(),
+            batch_count: usize::from(paths.batch_count()),
             starts,
             counts,
             order,
@@ -261,15 +264,14 @@ impl History {
     /// What each batch of rays contributes to a linear functional of the bins' energies.
     pub fn batch_sums(&self, weights: &[f32], absorption: &[f64], functional: &[f64]) -> Vec<f64> {
         let (powers, stride) = self.powers(absorption);
-        let batches = usize::from(PathSet::BATCHES);
         // The last place is for exact paths, which do not scatter.
-        let mut parts = vec![0.0; batches + 1];
+        let mut parts = vec![0.0; usize::from(PathSet::BATCHES) + 1];
         for (bin, factor) in functional.iter().enumerate().filter(|(_, f)| **f != 0.0) {
             for (e, _, batch) in self.paths(bin, weights, &powers, stride) {
                 parts[usize::from(batch)] += factor * e;
             }
         }
-        parts.truncate(batches);
+        parts.truncate(self.batch_count);
         parts
     }
 

@@ -127,7 +127,7 @@ impl<'a> TableBand<'a> {
         };
         Some(TableReadings {
             predicted: DVector::from_iterator(n, read.iter().map(|(value, _)| *value)),
-            parts: (0..PARTS - 1).map(part).collect(),
+            parts: (0..history.batch_count).map(part).collect(),
             chance,
         })
     }

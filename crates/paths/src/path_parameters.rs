@@ -21,7 +21,6 @@ const DIRECT_S: f64 = 2.5e-3;
 const LARGEST_RELATIVE_ERROR: f64 = 0.5;
 /// Less than this share of the energy is rounding of a difference, not sound.
 const LEAST_SHARE: f64 = 1e-13;
-const BATCHES: usize = PathSet::BATCHES as usize;
 
 /// Parameters of ISO 3382-1 of traced paths, per octave, each with its Monte-Carlo standard error or the reason why there is none.
 ///
@@ -29,7 +28,7 @@ const BATCHES: usize = PathSet::BATCHES as usize;
 /// at the rate of the last quarter; where it would count for more than a tenth of the lowest level of a regression, there is
 /// no decay time ([`NoReading::DynamicRange`]: trace longer).
 ///
-/// Standard errors are by the jackknife over the [`PathSet::BATCHES`] independent batches of rays; exact paths have none. They
+/// Standard errors are by the jackknife over the [independent](PathSet::batch_count) batches of rays; exact paths have none. They
 /// say how well the rays answer the question, not how well the model describes a room: what the materials' tables leave open
 /// is told by [`PathParameters::read_material_errors`].
 #[derive(Clone, Debug, PartialEq)]
@@ -277,7 +276,8 @@ struct Batches {
 impl Batches {
     fn of(paths: &PathSet, energies: &[f32], times_s: &[f64], duration_s: f64) -> Self {
         let steps = steps_in(duration_s);
-        let mut batches = Self { exact: Sums::silent(steps), sampled: vec![Sums::silent(steps); BATCHES] };
+        let sampled = vec![Sums::silent(steps); usize::from(paths.batch_count())];
+        let mut batches = Self { exact: Sums::silent(steps), sampled };
         for (i, (&energy, &time_s)) in energies.iter().zip(times_s).enumerate() {
             let sums = match paths.batch(i) {
                 None => &mut batches.exact,
@@ -291,7 +291,7 @@ impl Batches {
     /// The value from all rays, and the jackknife standard error from leaving out one batch after another (Efron 1982): exact
     /// paths stay, the other batches stand in for the one that is left out.
     fn estimates(&self) -> [Reading; QUANTITIES] {
-        let n = BATCHES as f64;
+        let n = self.sampled.len() as f64;
         let mut sampled = Sums::silent(self.exact.steps.len());
         self.sampled.iter().for_each(|batch| sampled.accumulate(batch, 1.0));
         let with = |rays: &Sums, factor: f64| {

@@ -40,7 +40,7 @@ pub struct Contribution {
     /// Unit vector from the receiver towards where the path comes from.
     pub arrival: [f64; 3],
     /// `None` for a path that was found exactly (direct sound, image sources): it renders as a coherent reflection.
-    /// Else the independent batch of rays (below [`PathSet::BATCHES`]) that it stems from.
+    /// Else the independent batch of rays (below [`PathSet::batch_count`]) that it stems from.
     pub batch: Option<u8>,
 }
 
@@ -82,6 +82,7 @@ pub struct PathSet {
     departures: Vec<u32>,
     arrivals: Vec<u32>,
     batches: Vec<u8>,
+    batch_count: u8,
     /// Ways around edges, by contribution, rising.
     diffractions: Vec<(usize, EdgeDiffraction)>,
 }
@@ -119,6 +120,7 @@ impl PathSet {
             departures: Vec::new(),
             arrivals: Vec::new(),
             batches: Vec::new(),
+            batch_count: Self::BATCHES,
             diffractions: Vec::new(),
         }
     }
@@ -136,6 +138,11 @@ impl PathSet {
     /// Number of materials.
     pub fn materials(&self) -> usize {
         self.materials
+    }
+
+    /// Number of independent batches of rays: [`PathSet::BATCHES`], fewer in [a part of them](PathSet::part_of_rays).
+    pub fn batch_count(&self) -> u8 {
+        self.batch_count
     }
 
     /// Length up to which paths were looked for, in metres.

@@ -10,7 +10,6 @@ use crate::infer::law_search::trial::{Trial, trials};
 use crate::infer::law_search::vault;
 use crate::infer::law_search::visible::visible_from;
 use crate::infer::naming::select;
-use crate::infer::ray_dependence::could_be_chance;
 use crate::infer::search::Search;
 use crate::report::diagnosis::{Diagnosis, FallenLaw, LawSearch, Verdict, VisibleLaw};
 use crate::report::found_laws::{found_law, reason};
@@ -149,7 +148,6 @@ impl Diagnoser {
         cases.extend(more);
         let named = std::mem::take(found);
         weighed.found = select(baseline, cases, task.effects, (&used[..], arrival_fits), named, observer)?;
-        weighed.could_be_chance = could_be_chance(&weighed.search(task.effects), &weighed.found.chosen)?;
         Ok(weighed)
     }
 }

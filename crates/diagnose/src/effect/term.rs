@@ -65,7 +65,7 @@ pub trait DecayTerm: Send + Sync {
     fn variance(&self, _values: &[f64], _view: &BandView<'_>, _variance: &mut [f64]) {}
 
     /// What each batch of rays moves the logarithm of the paths' energy in each bin of one band and pair by, `[bin * batches + batch]`
-    /// ([`PathSet::BATCHES`](sabine_paths::PathSet::BATCHES)), where other paths count with the case than without. Energy that is added
+    /// ([`PathSet::batch_count`](sabine_paths::PathSet::batch_count)), where other paths count with the case than without. Energy that is added
     /// beside the paths needs no word here. `None` where all count as stated.
     fn chance(&self, _values: &[f64], _view: &BandView<'_>) -> Option<Vec<f64>> {
         None

@@ -413,7 +413,7 @@ mod tests {
         let late = search.state(&[1], None).expect("a fit");
         assert_eq!(falls(&late, 1e-30), None);
         // What other rays do not confirm does not speak for it.
-        found.owed_to_rays = vec![(0, RayDependence::new(nats, vec![0.25 * nats; 2], 0.01))];
+        found.owed_to_rays = vec![(0, RayDependence::new(nats, vec![0.0625 * nats; 4], 0.01))];
         let fallen = outweighed(&search, &state, &found, &left(2.0 * balance)).expect("fits");
         assert_eq!(fallen, Some(0));
     }

@@ -114,15 +114,15 @@ mod infinite_ends {
     }
 }
 
-/// Evidence for a cause with other rays.
+/// Evidence for a cause with fewer rays.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct RayDependence {
     /// Evidence of the decays alone beside the other causes that bear on them, in nats.
     pub decay_nats: f64,
-    /// The same with half as many, other rays, once for each draw.
-    pub decay_nats_with_half: Vec<f64>,
-    /// Evidence that rays drawn again would not confirm, in nats, 0 or more: by what these draws say more, or by their scatter.
+    /// The same with a quarter of the rays, once for each quarter.
+    pub decay_nats_of_quarters: Vec<f64>,
+    /// Evidence that rays drawn again would not confirm, in nats, 0 or more: by what the quarters say more, or by their scatter.
     pub owed_nats: f64,
 }
 

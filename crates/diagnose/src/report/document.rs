@@ -177,7 +177,7 @@ mod tests {
                 explanation: "Late.".into(),
                 probability: 0.9,
                 nats: 20.0,
-                rays: Some(RayDependence::new(20.0, vec![19.5, 19.8], 0.01)),
+                rays: Some(RayDependence::new(20.0, vec![19.5, 19.8, 19.2, 19.7], 0.01)),
                 parameters: vec![parameter("latency")],
                 held_out_gain: None,
                 slight: false,

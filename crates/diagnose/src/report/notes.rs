@@ -87,7 +87,7 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
                 "fits the positions that it was fitted to, but does not help to predict those left out".to_owned()
             }
             Doubt::Modes => "would explain the lowest octaves alone, where few room modes decide and no simulation is that exact".into(),
-            Doubt::Rays => "owes too much of its evidence to the rays that happened to be drawn, as half as many others show: so many rays \
+            Doubt::Rays => "owes too much of its evidence to the rays that happened to be drawn, as quarters of them show: so many rays \
                             do not settle it, try more (`rays`)"
                 .into(),
             Doubt::Misfit => {

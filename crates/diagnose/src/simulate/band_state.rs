@@ -2,6 +2,7 @@
 
 use crate::observe::time_bins::Bins;
 use crate::simulate::modes::Modes;
+#[cfg(test)]
 use sabine_paths::PathSet;
 
 /// Predicted energy of one band in time bins, at the materials of the expansion, and how it changes.
@@ -38,11 +39,13 @@ pub(crate) struct BandState {
     pub correction: Vec<f64>,
     /// What each batch of rays moves the logarithm of the energy by, `[bin * batches + batch]`: modes are made of it.
     pub batch_deviations: Vec<f32>,
+    /// Number of these batches.
+    pub batches: usize,
 }
 
 impl BandState {
-    /// Without any bin; room for so many.
-    pub fn empty(bins: Bins, own_share: f64, count: usize, materials: usize) -> Self {
+    /// Without any bin; room for so many, and so many batches of rays.
+    pub fn empty(bins: Bins, own_share: f64, (count, batches): (usize, usize), materials: usize) -> Self {
         Self {
             bins,
             ln_energy: Vec::with_capacity(count),
@@ -60,7 +63,8 @@ impl BandState {
             monte_carlo: Vec::with_capacity(count),
             modes: Modes::default(),
             correction: Vec::with_capacity(count),
-            batch_deviations: Vec::with_capacity(count * usize::from(PathSet::BATCHES)),
+            batch_deviations: Vec::with_capacity(count * batches),
+            batches,
         }
     }
 
@@ -104,6 +108,7 @@ impl BandState {
             batch_deviations: (0..count * usize::from(PathSet::BATCHES))
                 .map(|i| 0.02 * (1.7 * i as f32).sin())
                 .collect(),
+            batches: usize::from(PathSet::BATCHES),
         }
     }
 }

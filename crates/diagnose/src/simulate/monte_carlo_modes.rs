@@ -7,10 +7,9 @@
 use crate::simulate::band_state::BandState;
 use crate::simulate::modes::Modes;
 use nalgebra::{DMatrix, SymmetricEigen};
-use sabine_paths::PathSet;
 
-/// Directions that are kept, at most.
-const MOST: usize = 8;
+/// Directions that are kept, at most: one for so many batches. The others are known too badly.
+const BATCHES_OF_EACH: usize = 4;
 /// A direction that moves the bins of a response by less than this, as a sum of squares in units of their own variance, is left to
 /// chance.
 const LEAST: f64 = 0.1;
@@ -35,7 +34,7 @@ pub(crate) fn deviations(batches: &[f64], energy: f64) -> impl Iterator<Item = f
 /// Finds the directions of one response in the bins that are compared (below `ends`, by band), and gives each bin's variance what they
 /// leave of the tracer's part.
 pub(crate) fn find(bands: &mut [BandState], ends: &[usize]) {
-    let batches = usize::from(PathSet::BATCHES);
+    let batches = bands.first().map_or(1, |state| state.batches);
     let mut together = DMatrix::<f64>::zeros(batches, batches);
     for (state, &end) in bands.iter().zip(ends) {
         for (bin, own) in state.batch_deviations.chunks_exact(batches).take(end).enumerate() {
@@ -51,7 +50,7 @@ pub(crate) fn find(bands: &mut [BandState], ends: &[usize]) {
     let found = SymmetricEigen::new(together);
     let mut order: Vec<usize> = (0..batches).filter(|&i| found.eigenvalues[i] > LEAST).collect();
     order.sort_by(|&a, &b| found.eigenvalues[b].total_cmp(&found.eigenvalues[a]));
-    order.truncate(MOST);
+    order.truncate(batches / BATCHES_OF_EACH);
     for state in bands {
         let mut moves = Vec::with_capacity(order.len() * state.variance.len());
         for (bin, own) in state.batch_deviations.chunks_exact(batches).enumerate() {
@@ -77,6 +76,7 @@ mod tests {
     use super::*;
     use crate::observe::time_bins::Bins;
     use sabine_acoustics::Bands;
+    use sabine_paths::PathSet;
 
     #[test]
     fn chance_that_all_bins_share_is_one_direction() {

@@ -7,8 +7,7 @@ use sabine_propagate::{ImageSource, PathTracer, PreparedScene, TracerConfig};
 use sabine_scene::{Receiver, Scene, Source};
 use std::sync::Arc;
 
-/// Turns the seed of rays into that of others, fewer and more.
-const OTHER_RAYS: u64 = 0x5EED_0F07_4E25;
+/// Turns the seed of rays into that of others, more of them.
 const MORE_RAYS: u64 = 0x4E25_5EED_0F07;
 /// So many times as many are more. Chance falls to half.
 const TIMES: usize = 4;
@@ -24,15 +23,8 @@ pub trait SceneTracer: Send + Sync {
     /// For a scene that cannot be traced.
     fn prepare(&self, scene: &Scene, duration_s: f64) -> Result<Box<dyn PreparedTracer>, Error>;
 
-    /// A tracer that draws half as many rays, others than this one and than any other `draw` of them: what the evidence for a cause owes to
-    /// rays shows in them. The default has none.
-    fn with_half_the_rays(&self, draw: u64) -> Option<Arc<dyn SceneTracer>> {
-        let _ = draw;
-        None
-    }
-
-    /// A tracer that draws several times as many rays, others than this one: what chance alone names, it does not name again. The default has
-    /// none.
+    /// A tracer that draws several times as many rays, others than this one: what parts of its rays
+    /// ([`PathSet::part_of_rays`]) do not settle is looked for again with that. The default has none.
     fn with_more_rays(&self) -> Option<Arc<dyn SceneTracer>> {
         None
     }
@@ -89,13 +81,6 @@ impl SceneTracer for Rays {
         let prepared = tracer.prepare(scene)?;
         let scene = (!self.config.allow_leaks).then(|| scene.clone());
         Ok(Box::new(PreparedRays { tracer, prepared, scene }))
-    }
-
-    fn with_half_the_rays(&self, draw: u64) -> Option<Arc<dyn SceneTracer>> {
-        let seed = self.config.seed ^ OTHER_RAYS.wrapping_add(draw << 48);
-        Some(Arc::new(Self {
-            config: TracerConfig { rays: self.config.rays.div_ceil(2), seed, ..self.config.clone() },
-        }))
     }
 
     fn with_more_rays(&self) -> Option<Arc<dyn SceneTracer>> {

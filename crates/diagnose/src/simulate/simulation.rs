@@ -81,8 +81,8 @@ pub(crate) struct Simulation {
     /// Which of them the paths meet in the mesh as it is traced.
     met: Arc<MetSurfaces>,
     tracer: Arc<dyn SceneTracer>,
-    prepared: Box<dyn PreparedTracer>,
-    edges: Option<Edges>,
+    prepared: Arc<dyn PreparedTracer>,
+    edges: Option<Arc<Edges>>,
     pub sources: Vec<Source>,
     pub receivers: Vec<Receiver>,
 }
@@ -102,12 +102,12 @@ impl Simulation {
         let traced_until_s = traced_until_s(survey, traced_s);
         let scene = traced_scene(room, survey, &materials)?;
         let source_m = room.sources()[survey.responses[0].source].position_m;
-        let prepared = tracer.prepare(&scene, traced_until_s)?;
+        let prepared: Arc<dyn PreparedTracer> = tracer.prepare(&scene, traced_until_s)?.into();
         prepared.check(source_m)?;
-        let edges = Edges::find(&scene)?;
+        let edges = Edges::find(&scene)?.map(Arc::new);
         let surfaces = Arc::new(Surfaces::of(&scene));
         let places = (room.sources(), room.receivers());
-        let pairs = trace(places, survey, &materials, (&*prepared, edges.as_ref()), observer)?;
+        let pairs = trace(places, survey, &materials, (&*prepared, edges.as_deref()), observer)?;
         let clamped = |m: &Material| {
             m.absorption().values().iter().map(|a| a.clamp(ABSORPTION.0, ABSORPTION.1)).collect()
         };
@@ -269,7 +269,7 @@ impl Simulation {
             traced_s: 0.3,
             traced_until_s: 0.3,
             warmer_k: 0.0,
-            prepared: tracer.prepare(&scene, 0.3)?,
+            prepared: tracer.prepare(&scene, 0.3)?.into(),
             met: Arc::new(MetSurfaces::new(&scene, &Surfaces::of(&scene))?),
             surfaces: Arc::new(Surfaces::of(&scene)),
             tracer,

@@ -5,8 +5,6 @@
 //! averaged with their neighbours along the decay wherever these differ by no more than chance, as Lepski's rule has it (1991): with
 //! many rays nothing is left to average.
 
-use sabine_paths::PathSet;
-
 /// Bins on either side over which energy is averaged, at most.
 const MOST_BINS: usize = 20;
 /// Standard deviations by which the scatter in a window may exceed what chance makes.
@@ -14,8 +12,7 @@ const EXCESS_SD: f64 = 2.0;
 
 /// Energies of the batches of rays, `[bin * batches + batch]`, averaged along the decay. The same weights serve all batches: their scatter
 /// remains that of what is averaged.
-pub(crate) fn smoothed(sampled: &[f64]) -> Vec<f64> {
-    let batches = usize::from(PathSet::BATCHES);
+pub(crate) fn smoothed(sampled: &[f64], batches: usize) -> Vec<f64> {
     let bins = sampled.len() / batches;
     let of = |bin: usize| &sampled[bin * batches..(bin + 1) * batches];
     let sums: Vec<f64> = (0..bins).map(|bin| of(bin).iter().sum()).collect();
@@ -82,6 +79,7 @@ mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};
     use rand_pcg::Pcg64Mcg;
+    use sabine_paths::PathSet;
 
     const BATCHES: usize = PathSet::BATCHES as usize;
 
@@ -106,12 +104,12 @@ mod tests {
     fn chance_is_averaged_away_and_what_is_real_stays() {
         let plain = |bin: usize| (-0.15 * bin as f64).exp();
         let noisy = decay(1.0, plain);
-        let (before, after) = (error(&noisy, plain), error(&smoothed(&noisy), plain));
+        let (before, after) = (error(&noisy, plain), error(&smoothed(&noisy, BATCHES), plain));
         assert!(after < 0.5 * before, "{before} {after}");
         // A flutter of every sixth bin that far exceeds chance.
         let flutter = |bin: usize| plain(bin) * if bin.is_multiple_of(6) { 2.0 } else { 1.0 };
         let clear = decay(0.1, flutter);
-        let (before, after) = (error(&clear, flutter), error(&smoothed(&clear), flutter));
+        let (before, after) = (error(&clear, flutter), error(&smoothed(&clear, BATCHES), flutter));
         assert!(after < 1.1 * before && after < 0.03, "{before} {after}");
     }
 }

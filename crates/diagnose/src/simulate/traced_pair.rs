@@ -14,6 +14,7 @@ use crate::simulate::path_chances;
 use rayon::prelude::*;
 use sabine_acoustics::{Air, Bands, Error, Material};
 use sabine_paths::{Conditions, PathSet};
+use std::collections::BTreeSet;
 
 /// What the model itself may be off by, as a share of a bin's energy: a single early pulse is never predicted better.
 const MODEL_SD: f64 = 0.07;
@@ -84,6 +85,29 @@ impl TracedPair {
         let direct_s = f64::from(direct.unwrap_or(shortest)) / speed_m_s;
         let chances = path_chances::of(&paths, stated, &air, direct_s * speed_m_s)?;
         paths.thin(&chances, paths.len() as u64)?;
+        Self::of_paths(paths, diffracted, (air, direct_s), stated)
+    }
+
+    /// What [so many fewer rays](PathSet::part_of_rays) predict.
+    pub fn part_of_rays(&self, part: u8, parts: u8, stated: &[Material]) -> Result<Self, Error> {
+        let paths = self.paths.part_of_rays(part, parts)?;
+        Self::of_paths(paths, self.diffracted.clone(), (self.air, self.direct_s), stated)
+    }
+
+    /// How many of so many [parts of the rays](PathSet::part_of_rays) found paths: none where no rays were drawn.
+    pub fn parts_with_paths(&self, parts: u8) -> u8 {
+        let batches = (0..self.paths.len()).filter_map(|i| self.paths.batch(i));
+        let found: BTreeSet<u8> = batches.map(|batch| batch % parts).collect();
+        found.len() as u8
+    }
+
+    fn of_paths(
+        paths: PathSet,
+        diffracted: Option<PathSet>,
+        (air, direct_s): (Air, f64),
+        stated: &[Material],
+    ) -> Result<Self, Error> {
+        let speed_m_s = air.speed_of_sound_m_s();
         let materials = paths.materials();
         let counts = paths.hit_counts();
         let mut hits = Vec::with_capacity(paths.len() * materials);

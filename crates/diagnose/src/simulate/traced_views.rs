@@ -245,7 +245,7 @@ impl<'a> TracedPairView<'a> {
         let energies = || all.iter().map(|e| e.max(floor));
         let chance: Vec<f64> =
             energies().enumerate().flat_map(|(bin, e)| deviations(expected.batches(bin), e)).collect();
-        let batches = usize::from(PathSet::BATCHES);
+        let batches = usize::from(self.pair.paths().batch_count());
         ExpectedBins {
             ln_energy: energies().map(f64::ln).collect(),
             variance: chance.chunks_exact(batches).map(|own| own.iter().map(|d| d * d).sum()).collect(),

@@ -33,7 +33,7 @@ impl PathSet {
     /// Adds a path from source to receiver that somebody else's tracer reports.
     ///
     /// # Errors
-    /// [`Error::Index`] if one of its chains does not exist or its batch is not below [`PathSet::BATCHES`];
+    /// [`Error::Index`] if one of its chains does not exist or its batch is not below [`PathSet::batch_count`];
     /// [`Error::OutOfRange`] for a length or a weight that is not finite, or a negative length.
     pub fn try_push(&mut self, contribution: Contribution) -> Result<(), Error> {
         for chain in [contribution.chain, contribution.tail] {
@@ -42,8 +42,8 @@ impl PathSet {
                 return Err(Error::Index { what: "chain", index, count });
             }
         }
-        if let Some(batch) = contribution.batch.filter(|&batch| batch >= Self::BATCHES) {
-            let (index, count) = (usize::from(batch), usize::from(Self::BATCHES));
+        if let Some(batch) = contribution.batch.filter(|&batch| batch >= self.batch_count) {
+            let (index, count) = (usize::from(batch), usize::from(self.batch_count));
             return Err(Error::Index { what: "batch", index, count });
         }
         OutOfRange::check("length (m)", contribution.length_m, 0.0, f64::MAX, "finite and not negative")?;
@@ -83,13 +83,14 @@ impl PathSet {
     /// that has any contribution so far, or else of the other.
     ///
     /// # Panics
-    /// If the sets have different numbers of materials.
+    /// If the sets have different numbers of materials or, both holding paths, of batches.
     pub fn append(&mut self, other: &PathSet) {
         assert_eq!(self.materials, other.materials, "paths of different scenes");
         let before = self.len();
         if before == 0 {
-            self.axes = other.axes;
+            (self.axes, self.batch_count) = (other.axes, other.batch_count);
         }
+        assert!(other.is_empty() || self.batch_count == other.batch_count, "paths of unlike batches");
         self.diffractions.extend(other.diffractions.iter().map(|(i, d)| (before + i, d.clone())));
         let offset = self.parents.len() as u32 - 1;
         let shifted = |chain: u32| if chain == Self::DIRECT { chain } else { chain + offset };
@@ -111,7 +112,7 @@ impl PathSet {
     /// its energy; exact paths stay behind, for they can be found again.
     ///
     /// # Panics
-    /// If the sets have different numbers of materials.
+    /// As [`PathSet::append`].
     pub fn append_displaced(
         &mut self,
         other: &PathSet,
@@ -135,7 +136,7 @@ impl PathSet {
     /// Appends the exact paths of another set between the same surfaces.
     ///
     /// # Panics
-    /// If the sets have different numbers of materials.
+    /// As [`PathSet::append`].
     pub fn append_exact(&mut self, other: &PathSet) {
         let mut exact = other.clone();
         let kept: Vec<bool> = exact.batches.iter().map(|&batch| batch == EXACT).collect();

@@ -99,7 +99,7 @@ impl PathSet {
         OutOfRange::check("bin width (s)", bin_s, 1e-6, 10.0, "between 1 us and 10 s")?;
         let speed = conditions.air.speed_of_sound_m_s();
         let bins = (self.max_length_m / speed / bin_s).ceil() as usize;
-        let batches = usize::from(Self::BATCHES);
+        let batches = usize::from(self.batch_count);
         let mut energy = Vec::with_capacity(bins * bands.len());
         let mut standard_error = Vec::with_capacity(bins * bands.len());
         let delays_s = self.delays_s(conditions)?;

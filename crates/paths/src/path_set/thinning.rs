@@ -1,7 +1,7 @@
 //! Fewer contributions that stand for all.
 
-use super::PathSet;
-use sabine_acoustics::Error;
+use super::{EXACT, PathSet};
+use sabine_acoustics::{Error, OutOfRange};
 
 impl PathSet {
     /// Keeps each contribution with a chance of its own and lets it carry one over that chance: on average energies stay as they are,
@@ -34,6 +34,34 @@ impl PathSet {
         }
         self.retain(&kept);
         Ok(())
+    }
+
+    /// What fewer rays would have found: of `parts` equal parts of the batches that one alone (from 0 on), its contributions `parts` times as
+    /// strong; exact ones stay as they are. The parts are independent of each other, and their mean is the whole: how far what is made of
+    /// them scatters says what the whole owes to chance. [`PathSet::batch_count`] falls, and standard errors become as much less certain.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] unless the batches can be shared out in `parts` parts of two and more; [`Error::Index`] unless there is that part.
+    pub fn part_of_rays(&self, part: u8, parts: u8) -> Result<Self, Error> {
+        if parts == 0 || !self.batch_count.is_multiple_of(parts) || self.batch_count / parts < 2 {
+            let range = "a divisor of the number of batches that leaves two and more in each part";
+            return Err(OutOfRange { field: "parts of rays", value: f64::from(parts), range }.into());
+        }
+        if part >= parts {
+            let (index, count) = (usize::from(part), usize::from(parts));
+            return Err(Error::Index { what: "part of rays", index, count });
+        }
+        let mut alone = self.clone();
+        let kept: Vec<bool> = self.batches.iter().map(|&b| b == EXACT || b % parts == part).collect();
+        alone.retain(&kept);
+        alone.batch_count = self.batch_count / parts;
+        for (batch, log_weight) in alone.batches.iter_mut().zip(&mut alone.log_weights) {
+            if *batch != EXACT {
+                *batch /= parts;
+                *log_weight += f32::from(parts).ln();
+            }
+        }
+        Ok(alone)
     }
 
     /// Keeps the marked contributions, and the chains that they need.
@@ -106,7 +134,7 @@ mod tests {
     use super::*;
     use crate::conditions::Conditions;
     use crate::path_set::{Contribution, Reflection};
-    use sabine_acoustics::{Air, Bands, Material};
+    use sabine_acoustics::{Air, Bands, EnergyResponse, Material};
 
     const UP: [f64; 3] = [0.0, 0.0, 1.0];
 
@@ -160,6 +188,36 @@ mod tests {
             assert!(mean.abs() < 4.0 * standard_error, "{absorption}: {mean} +- {standard_error}");
             assert!(standard_error < 0.02, "{standard_error}");
         }
+    }
+
+    #[test]
+    fn parts_of_the_rays_make_the_whole_and_tell_what_it_owes_to_chance() {
+        let all = many();
+        let parts: Vec<PathSet> = (0..4).map(|part| all.part_of_rays(part, 4).unwrap()).collect();
+        let walls =
+            [0.1, 0.3].map(|a| Material::uniform(Bands::octaves(1000.0, 1000.0).unwrap(), a, 0.3).unwrap());
+        let air = Air::default();
+        let conditions = Conditions::new(&walls, &air);
+        let response = |paths: &PathSet| paths.energy_response(&conditions, 0.01).unwrap();
+        let (whole, each) = (response(&all), parts.iter().map(response).collect::<Vec<_>>());
+        for bin in 0..whole.band(0).len() {
+            let mean = each.iter().map(|part| part.band(0)[bin]).sum::<f64>() / 4.0;
+            assert!((mean - whole.band(0)[bin]).abs() <= 1e-5 * whole.band(0)[bin], "{bin}");
+        }
+        // A quarter of the rays err twice as much: the variance is four times that of all.
+        let squared = |r: &EnergyResponse| r.band_standard_error(0).iter().map(|e| e * e).sum::<f64>();
+        let ratio = each.iter().map(squared).sum::<f64>() / 4.0 / squared(&whole);
+        assert!((3.0..5.0).contains(&ratio), "{ratio}");
+        let exact = |paths: &PathSet| (0..paths.len()).filter(|&i| paths.is_exact(i)).count();
+        assert!(parts.iter().all(|part| exact(part) == exact(&all) && part.batch_count() == 8));
+        let sampled: usize = parts.iter().map(|part| part.len() - exact(part)).sum();
+        assert_eq!(sampled, all.len() - exact(&all));
+        // Parts of a part; none that do not come out even, and none with a single batch.
+        assert_eq!(parts[1].part_of_rays(3, 4).unwrap().batch_count(), 2);
+        for parts in [0, 3, 32, 64] {
+            assert!(matches!(all.part_of_rays(0, parts), Err(Error::OutOfRange { .. })), "{parts}");
+        }
+        assert!(matches!(all.part_of_rays(4, 4), Err(Error::Index { .. })));
     }
 
     #[test]

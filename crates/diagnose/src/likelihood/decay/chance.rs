@@ -8,10 +8,10 @@
 
 use super::{EnergyModel, LN_PER_DB, STEP};
 use crate::likelihood::laplace::Slopes;
+use crate::simulate::band_state::BandState;
 use crate::simulate::reflection_reweighting::HitChanges;
 use crate::simulate::views::BandView;
 use nalgebra::DMatrix;
-use sabine_paths::PathSet;
 
 /// Step of second differences, as a logarithm of energy.
 const BEND_STEP: f64 = 1e-3;
@@ -19,8 +19,6 @@ const BEND_STEP: f64 = 1e-3;
 const SIDE_STEP: f64 = 1e-5;
 /// Variance of a logarithm below which nothing is left to chance.
 const NO_CHANCE: f64 = 1e-12;
-/// Batches of rays.
-const BATCHES: usize = PathSet::BATCHES as usize;
 /// Less than this is nothing, in nats.
 const LEAST_NATS: f64 = 1e-6;
 
@@ -123,8 +121,8 @@ impl EnergyModel<'_> {
         let Some(mixed) = self.mixed_chance(values, at) else {
             return through.iter().map(|t| t * t).collect();
         };
-        let stated = &self.data.states[at.pair][at.band].batch_deviations;
-        let bins = mixed.chunks_exact(BATCHES).zip(stated.chunks_exact(BATCHES)).zip(&through);
+        let BandState { batch_deviations: stated, batches, .. } = &self.data.states[at.pair][at.band];
+        let bins = mixed.chunks_exact(*batches).zip(stated.chunks_exact(*batches)).zip(&through);
         let share = |((mixed, stated), through): ((&[f64], &[f32]), &f64)| {
             let whole: f64 = stated.iter().map(|d| f64::from(d * d)).sum();
             let now: f64 = mixed.iter().map(|d| d * d).sum();
@@ -162,23 +160,24 @@ impl EnergyModel<'_> {
     /// What each batch of rays moves the predicted logarithms of all compared bins of a pair by, `(bin, batch)`, in the order of
     /// [`EnergyModel::expansion`], each bin in units of what costs a nat.
     pub fn chance(&self, values: &[f64], pair: usize) -> DMatrix<f64> {
-        let mut rows = Vec::new();
+        let (mut rows, mut batches) = (Vec::new(), 1);
         for one in self.compared_bands(values, pair, false) {
             let at = one.place(pair);
             let state = &self.data.states[pair][one.band];
+            batches = state.batches;
             let mixed = self.mixed_chance(values, at);
             let mixed =
                 mixed.unwrap_or_else(|| state.batch_deviations.iter().map(|d| f64::from(*d)).collect());
             let through = self.through_paths(values, at);
             for (bin, (through, variance)) in through.iter().zip(&one.variances).enumerate() {
-                let own = &state.batch_deviations[bin * BATCHES..][..BATCHES];
+                let own = &state.batch_deviations[bin * batches..][..batches];
                 let whole: f64 = own.iter().map(|d| f64::from(d * d)).sum();
                 let paid = if whole > NO_CHANCE { state.monte_carlo[bin] / whole } else { 1.0 };
                 let unit = through * (0.5 * paid / (variance * self.data.dispersion[one.band])).sqrt();
-                rows.extend(mixed[bin * BATCHES..][..BATCHES].iter().map(|d| unit * d));
+                rows.extend(mixed[bin * batches..][..batches].iter().map(|d| unit * d));
             }
         }
-        DMatrix::from_row_slice(rows.len() / BATCHES, BATCHES, &rows)
+        DMatrix::from_row_slice(rows.len() / batches, batches, &rows)
     }
 
     /// Logarithm of what is predicted if the paths, those of neighbouring octaves among them, carried more by this logarithm.
@@ -208,11 +207,13 @@ mod tests {
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     use rand_pcg::Pcg64Mcg;
+    use sabine_paths::PathSet;
     use sabine_scene::{Levels, TimeZero};
 
     /// Variance of the logarithm of each prediction by chance.
     const CHANCE: f64 = 0.01;
     const DRAWS: usize = 4000;
+    const BATCHES: usize = PathSet::BATCHES as usize;
 
     /// Neutral values, but for a coupled volume, where the model has one, that is far louder than the paths late in the decay.
     fn loud(model: &EnergyModel<'_>) -> Vec<f64> {

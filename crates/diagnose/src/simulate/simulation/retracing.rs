@@ -1,4 +1,4 @@
-//! Re-tracing after a position, the air, the dimensions or a surface change, and with other rays.
+//! Re-tracing after a position, the air, the dimensions or a surface change; and what fewer rays predict.
 
 use super::Simulation;
 use crate::effect::Nuisance;
@@ -11,11 +11,10 @@ use crate::extend::moved_mesh::{DisplacementError, check_places, displaced_among
 use crate::extend::rigid_motion::RigidMotion;
 use crate::simulate::edges::Edges;
 use crate::simulate::met_surfaces::MetSurfaces;
-use crate::simulate::scene_tracer::SceneTracer;
 use crate::simulate::traced_pair::TracedPair;
-use crate::simulate::traced_room::trace;
 use crate::survey::Survey;
-use sabine_acoustics::{Air, Observer};
+use rayon::prelude::*;
+use sabine_acoustics::Air;
 use std::sync::Arc;
 
 /// How the room differs from the mesh as stated.
@@ -109,26 +108,24 @@ impl Simulation {
             check_places(&self.scene, &resized, &self.sources, &self.receivers)?;
         }
         self.met = Arc::new(MetSurfaces::new(&resized, &self.surfaces)?);
-        self.prepared = self.tracer.prepare(&resized, self.traced_until_s)?;
-        self.edges = Edges::find(&resized)?;
+        self.prepared = self.tracer.prepare(&resized, self.traced_until_s)?.into();
+        self.edges = Edges::find(&resized)?.map(Arc::new);
         self.resized = Some(resized);
         (self.dimensions, self.displaced, self.objects) = (shape.dimensions, shape.displaced, shape.objects);
         (0..self.sources.len()).try_for_each(|source| self.retrace(Nuisance::SourcePosition(source), survey))
     }
 
-    /// The same room as it stands, traced by another tracer; nothing is expanded yet.
-    pub fn traced_by(
-        &self,
-        tracer: &Arc<dyn SceneTracer>,
-        survey: &Survey,
-        observer: &dyn Observer,
-    ) -> Result<Self, Error> {
-        let scene = self.traced_scene().clone();
-        let prepared = tracer.prepare(&scene, self.traced_until_s)?;
-        let edges = Edges::find(&scene)?;
-        let places = (&self.sources[..], &self.receivers[..]);
-        let mut other = Self {
-            pairs: trace(places, survey, &self.materials, (&*prepared, edges.as_ref()), observer)?,
+    /// Whether rays were drawn, and each of so many parts of them found paths wherever they did.
+    pub fn can_be_parted(&self, parts: u8) -> bool {
+        let found: Vec<u8> = self.pairs.iter().map(|pair| pair.parts_with_paths(parts)).collect();
+        found.contains(&parts) && found.iter().all(|&found| found == 0 || found == parts)
+    }
+
+    /// The same room as it stands, as one of `parts` equal parts of the rays predicts it; nothing is expanded yet.
+    pub fn part_of_rays(&self, part: u8, parts: u8) -> Result<Self, Error> {
+        let of_pair = |pair: &TracedPair| pair.part_of_rays(part, parts, &self.materials);
+        Ok(Self {
+            pairs: self.pairs.par_iter().map(of_pair).collect::<Result<_, _>>()?,
             materials: self.materials.clone(),
             absorption: self.absorption.clone(),
             states: Vec::new(),
@@ -147,15 +144,13 @@ impl Simulation {
             objects: self.objects.clone(),
             surfaces: Arc::clone(&self.surfaces),
             met: Arc::clone(&self.met),
-            tracer: Arc::clone(tracer),
-            prepared,
-            edges,
+            tracer: Arc::clone(&self.tracer),
+            prepared: Arc::clone(&self.prepared),
+            edges: self.edges.clone(),
             sources: self.sources.clone(),
             receivers: self.receivers.clone(),
             ..*self
-        };
-        (0..other.pairs.len()).try_for_each(|pair| other.set_air(pair, survey))?;
-        Ok(other)
+        })
     }
 
     /// Traces the pairs of a place again. If the fitted position lies outside the room, the paths from the stated one are kept.
@@ -170,7 +165,7 @@ impl Simulation {
             let ends = (&self.sources[response.source], &self.receivers[response.receiver]);
             if let Ok(paths) = self.prepared.trace(ends.0, ends.1, &response.air) {
                 let places_m = [ends.0.position_m, ends.1.position_m];
-                let diffracted = Edges::paths(self.edges.as_ref(), places_m, paths.max_length_m());
+                let diffracted = Edges::paths(self.edges.as_deref(), places_m, paths.max_length_m());
                 self.pairs[pair] = TracedPair::new(paths, diffracted, response.air, &self.materials)?;
                 self.direct_s[pair] = self.pairs[pair].direct_s;
                 self.set_air(pair, survey)?;

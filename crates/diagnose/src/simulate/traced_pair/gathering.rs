@@ -9,7 +9,6 @@ use crate::simulate::band_state::BandState;
 use crate::simulate::hit_groups;
 use crate::simulate::monte_carlo_modes::deviations;
 use crate::simulate::smoothing::smoothed;
-use sabine_paths::PathSet;
 use std::collections::BTreeMap;
 
 /// Of a bin: energy, time, departure, its products, arrival, its products.
@@ -36,13 +35,13 @@ pub(crate) struct ExpectedEnergy {
     exact: Vec<f64>,
     /// `[bin * batches + batch]`.
     sampled: Vec<f64>,
+    batches: usize,
 }
 
 impl ExpectedEnergy {
     /// Energies of the batches of rays in a bin.
     pub fn batches(&self, bin: usize) -> &[f64] {
-        let batches = usize::from(PathSet::BATCHES);
-        &self.sampled[bin * batches..(bin + 1) * batches]
+        &self.sampled[bin * self.batches..(bin + 1) * self.batches]
     }
 
     /// Number of bins.
@@ -89,7 +88,7 @@ impl TracedPair {
     ) -> ExpectedEnergy {
         let count = bins.count(duration_s);
         let cells = (duration_s / CELL_S).ceil() as usize + 1;
-        let batches = usize::from(PathSet::BATCHES);
+        let batches = usize::from(self.paths.batch_count());
         let mut exact = vec![0.0f64; cells];
         let mut by_batch = vec![0.0f32; cells * batches];
         for (i, (&cell, &e)) in self.cells.iter().zip(energies).enumerate() {
@@ -119,7 +118,7 @@ impl TracedPair {
                 });
             }
         }
-        ExpectedEnergy { exact: sums, sampled: smoothed(&sampled) }
+        ExpectedEnergy { exact: sums, sampled: smoothed(&sampled, batches), batches }
     }
 
     fn gather(&self, energies: &[f32], bins: Bins, pulse: &BandPulse, duration_s: f64) -> Gathered {
@@ -249,7 +248,7 @@ impl Gathered {
     ) -> BandState {
         let count = self.count;
         let floor = NOTHING * (0..count).map(|k| self.sums[k * COLUMNS]).fold(0.0, f64::max).max(1e-30);
-        let mut state = BandState::empty(bins, own_share, count, materials);
+        let mut state = BandState::empty(bins, own_share, (count, expected.batches), materials);
         for bin in 0..count {
             let s = &self.sums[bin * COLUMNS..(bin + 1) * COLUMNS];
             let e = s[0].max(floor);
@@ -276,7 +275,7 @@ impl Gathered {
             state.correction.push((whole / e).ln());
             let own = deviations(expected.batches(bin), whole);
             state.batch_deviations.extend(own.map(|d| d as f32));
-            let own = &state.batch_deviations[bin * usize::from(PathSet::BATCHES)..];
+            let own = &state.batch_deviations[bin * expected.batches..];
             state.monte_carlo.push(own.iter().map(|d| f64::from(d * d)).sum());
             let coherent = bins.centre_s(bin) < COHERENT_BANDWIDTH_TIMES / pulse.bandwidth_hz;
             let model_sd = if coherent { COHERENT_SD } else { MODEL_SD };

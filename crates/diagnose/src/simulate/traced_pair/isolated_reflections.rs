@@ -71,6 +71,7 @@ impl TracedPair {
                 modes: Modes::default(),
                 correction: Vec::new(),
                 batch_deviations: Vec::new(),
+                batches: usize::from(self.paths.batch_count()),
             })
             .collect();
         (isolated_reflections, states)
