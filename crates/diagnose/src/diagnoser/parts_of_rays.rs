@@ -35,3 +35,50 @@ impl Weighed {
         unsettled(&search, &state, &self.found.owed_to_rays)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::Effect;
+    use crate::effects::{CoupledVolume, TransducerResponse};
+    use crate::infer::baseline::Baseline;
+    use crate::infer::candidates::cases;
+    use crate::infer::selection::Selection;
+    use crate::report::diagnosis::RayDependence;
+    use std::sync::Arc;
+
+    #[test]
+    fn what_owes_its_name_to_rays_falls_and_what_stands_is_asked_again_without_it() {
+        let mut baseline = Baseline::of_laboratory(5);
+        // Every recording has 12 dB more in one octave.
+        for measured in &mut baseline.observations.measured {
+            for energy in measured.energies[2].iter_mut().flatten() {
+                *energy *= 16.0;
+            }
+        }
+        let effects: Vec<Box<dyn Effect>> = vec![Box::new(TransducerResponse), Box::new(CoupledVolume)];
+        let cases = cases(&effects, baseline.survey());
+        assert_eq!(cases.len(), 2);
+        assert!(baseline.prepare(&cases).expect("tables").iter().all(|refused| !refused));
+        let mut weighed = Weighed {
+            first_dispersion: baseline.dispersion.clone(),
+            used: baseline.observations.fitted.clone(),
+            baseline,
+            cases,
+            given: Vec::new(),
+            found: Selection::default(),
+            arrival_fits: Arc::default(),
+        };
+        // As if little of what speaks for the first were the rays', and more than speaks for the second.
+        let owing =
+            |owed_nats: f64| RayDependence { owed_nats, ..RayDependence::new(1.0, vec![1.0; 4], 0.01) };
+        weighed.found.chosen = vec![0, 1];
+        weighed.found.owed_to_rays = vec![(0, owing(5.0)), (1, owing(50.0))];
+        assert!(weighed.owes_a_name(2, &()).expect("fits"));
+        assert_eq!(weighed.settled(2, &()).expect("fits"), [1]);
+        assert_eq!(weighed.found.chosen, [0]);
+        let [(0, rays)] = &weighed.found.owed_to_rays[..] else { panic!("{:?}", weighed.found.owed_to_rays) };
+        assert!(rays.decay_nats > 20.0 && rays.owed_nats < 0.5 * rays.decay_nats, "{rays:?}");
+        assert!(!weighed.owes_a_name(2, &()).expect("fits"));
+    }
+}
