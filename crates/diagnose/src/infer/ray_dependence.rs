@@ -25,11 +25,11 @@ impl RayDependence {
     ///
     /// What all rays say beyond what any number would say is the greater of two estimates. One is of the mean: gains by smoothness fall as one
     /// over the number of rays, and more slowly where a few rare ones carry much: as one over its root, it is assumed, so that of what n parts
-    /// say more, all of them still say one part in the root of n less 1 too much (Richardson's extrapolation). The other is of the scatter: the distance of a prediction without the cause from the measurement, along what the cause
-    /// changes, is the root of twice the evidence in units of its standard deviation. All rays predict the mean of what the parts predict: the
-    /// parts tell the standard error of this distance, and evidence counts as far as the limit that it falls below with the probability
-    /// `significance` (Student's t). A part's own unit is at most the root of n as long as that of all: what is farther away than so many
-    /// times the parts are on the mean is no distance at all.
+    /// say more, all of them still say one part in the root of n less 1 too much (Richardson's extrapolation). The other is of the scatter: the
+    /// distance of a prediction without the cause from the measurement, along what the cause changes, is the root of twice the evidence in
+    /// units of its standard deviation. All rays predict the mean of what the parts predict: the parts tell the standard error of this
+    /// distance, and evidence counts as far as the limit that it falls below with the probability `significance` (Student's t). The standard
+    /// deviation of a part is at most the root of n times that of all rays: of the distance, no more than so many times the parts' mean counts.
     pub(crate) fn new(decay_nats: f64, decay_nats_of_quarters: Vec<f64>, significance: f64) -> Self {
         let parts = decay_nats_of_quarters.len() as f64;
         let distance = |nats: f64| (2.0 * nats.max(0.0)).sqrt();
