@@ -455,7 +455,7 @@ impl Weighed {
         observer: &dyn Observer,
     ) -> Result<Confirmation, Error> {
         let started = Instant::now();
-        let fallen = self.settled(effects, observer)?;
+        let fallen = self.drop_owing(effects, observer)?;
         *self.baseline.seconds.entry("search").or_default() += started.elapsed().as_secs_f64();
         let mut found = std::mem::take(&mut self.found);
         let confirmed = confirm(&self.search(effects), &mut found, held, observer);

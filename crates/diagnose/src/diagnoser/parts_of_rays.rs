@@ -8,14 +8,18 @@ use sabine_acoustics::Observer;
 impl Weighed {
     /// Whether something that was found owes its name to the rays that were drawn.
     pub(super) fn owes_a_name(&mut self, effects: usize, observer: &dyn Observer) -> Result<bool, Error> {
-        Ok(self.least_settled(effects, observer)?.is_some())
+        Ok(self.weakest_owing(effects, observer)?.is_some())
     }
 
     /// Takes back what owes its name to the rays, the weakest first, and gives it: what another owes beside it need not be what that owes
     /// alone.
-    pub(super) fn settled(&mut self, effects: usize, observer: &dyn Observer) -> Result<Vec<usize>, Error> {
+    pub(super) fn drop_owing(
+        &mut self,
+        effects: usize,
+        observer: &dyn Observer,
+    ) -> Result<Vec<usize>, Error> {
         let mut fallen = Vec::new();
-        while let Some(weakest) = self.least_settled(effects, observer)? {
+        while let Some(weakest) = self.weakest_owing(effects, observer)? {
             self.found.drop(weakest);
             fallen.push(weakest);
         }
@@ -23,7 +27,7 @@ impl Weighed {
     }
 
     /// What stands least, if it would not with other rays.
-    fn least_settled(&mut self, effects: usize, observer: &dyn Observer) -> Result<Option<usize>, Error> {
+    fn weakest_owing(&mut self, effects: usize, observer: &dyn Observer) -> Result<Option<usize>, Error> {
         let chosen = &self.found.chosen;
         let asked = self.found.owed_to_rays.iter().map(|(candidate, _)| *candidate);
         if !asked.eq(bearing_on_decays(&self.cases, chosen)) {
@@ -75,7 +79,7 @@ mod tests {
         weighed.found.chosen = vec![0, 1];
         weighed.found.owed_to_rays = vec![(0, owing(5.0)), (1, owing(50.0))];
         assert!(weighed.owes_a_name(2, &()).expect("fits"));
-        assert_eq!(weighed.settled(2, &()).expect("fits"), [1]);
+        assert_eq!(weighed.drop_owing(2, &()).expect("fits"), [1]);
         assert_eq!(weighed.found.chosen, [0]);
         let [(0, rays)] = &weighed.found.owed_to_rays[..] else { panic!("{:?}", weighed.found.owed_to_rays) };
         assert!(rays.decay_nats > 20.0 && rays.owed_nats < 0.5 * rays.decay_nats, "{rays:?}");

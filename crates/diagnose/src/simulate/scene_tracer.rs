@@ -24,7 +24,7 @@ pub trait SceneTracer: Send + Sync {
     fn prepare(&self, scene: &Scene, duration_s: f64) -> Result<Box<dyn PreparedTracer>, Error>;
 
     /// A tracer that draws several times as many rays, others than this one: what parts of its rays
-    /// ([`PathSet::part_of_rays`]) do not settle is looked for again with that. The default has none.
+    /// ([`PathSet::part_of_rays`]) do not confirm is looked for again with that. The default has none.
     fn with_more_rays(&self) -> Option<Arc<dyn SceneTracer>> {
         None
     }

@@ -90,7 +90,10 @@ impl PathSet {
         if before == 0 {
             (self.axes, self.batch_count) = (other.axes, other.batch_count);
         }
-        assert!(other.is_empty() || self.batch_count == other.batch_count, "paths of unlike batches");
+        assert!(
+            other.is_empty() || self.batch_count == other.batch_count,
+            "paths of different numbers of batches"
+        );
         self.diffractions.extend(other.diffractions.iter().map(|(i, d)| (before + i, d.clone())));
         let offset = self.parents.len() as u32 - 1;
         let shifted = |chain: u32| if chain == Self::DIRECT { chain } else { chain + offset };
