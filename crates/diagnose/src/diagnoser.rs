@@ -461,7 +461,9 @@ impl Weighed {
         let confirmed = confirm(&self.search(effects), &mut found, held, observer);
         self.found = found;
         let mut confirmed = confirmed?;
-        confirmed.dropped.splice(0..0, fallen.into_iter().map(|candidate| (candidate, Doubt::Rays)));
+        confirmed
+            .dropped
+            .splice(0..0, fallen.into_iter().map(|(candidate, rays)| (candidate, Doubt::Rays(rays))));
         Ok(confirmed)
     }
 }

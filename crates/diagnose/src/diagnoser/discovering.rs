@@ -159,7 +159,7 @@ fn doubted(weighed: &Weighed, confirmed: &Confirmation) -> Vec<FallenLaw> {
         goes_with: weighed.goes_with(*candidate),
         reason: match doubt {
             Doubt::Modes => "octaves below the Schroeder frequency alone speak for it",
-            Doubt::Rays => "other rays do not confirm it",
+            Doubt::Rays(_) => "other rays do not confirm it",
             Doubt::Misfit => "more speaks against what is left than for it",
             Doubt::Elsewhere => "it does not help to predict positions that are left out in turn",
         }

@@ -2,7 +2,7 @@
 
 use super::Weighed;
 use crate::error::Error;
-use crate::infer::ray_dependence::{bearing_on_decays, owed_to_rays, unsettled};
+use crate::infer::ray_dependence::{OwedToRays, bearing_on_decays, owed_to_rays, unsettled};
 use sabine_acoustics::Observer;
 
 impl Weighed {
@@ -17,17 +17,21 @@ impl Weighed {
         &mut self,
         effects: usize,
         observer: &dyn Observer,
-    ) -> Result<Vec<usize>, Error> {
+    ) -> Result<Vec<OwedToRays>, Error> {
         let mut fallen = Vec::new();
         while let Some(weakest) = self.weakest_owing(effects, observer)? {
-            self.found.drop(weakest);
+            self.found.drop(weakest.0);
             fallen.push(weakest);
         }
         Ok(fallen)
     }
 
     /// What stands least, if it would not with other rays.
-    fn weakest_owing(&mut self, effects: usize, observer: &dyn Observer) -> Result<Option<usize>, Error> {
+    fn weakest_owing(
+        &mut self,
+        effects: usize,
+        observer: &dyn Observer,
+    ) -> Result<Option<OwedToRays>, Error> {
         let chosen = &self.found.chosen;
         let asked = self.found.owed_to_rays.iter().map(|(candidate, _)| *candidate);
         if !asked.eq(bearing_on_decays(&self.cases, chosen)) {
@@ -79,7 +83,8 @@ mod tests {
         weighed.found.chosen = vec![0, 1];
         weighed.found.owed_to_rays = vec![(0, owing(5.0)), (1, owing(50.0))];
         assert!(weighed.owes_a_name(2, &()).expect("fits"));
-        assert_eq!(weighed.drop_owing(2, &()).expect("fits"), [1]);
+        let fallen = weighed.drop_owing(2, &()).expect("fits");
+        assert_eq!(fallen, [(1, owing(50.0))]);
         assert_eq!(weighed.found.chosen, [0]);
         let [(0, rays)] = &weighed.found.owed_to_rays[..] else { panic!("{:?}", weighed.found.owed_to_rays) };
         assert!(rays.decay_nats > 20.0 && rays.owed_nats < 0.5 * rays.decay_nats, "{rays:?}");

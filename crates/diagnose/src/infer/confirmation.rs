@@ -11,7 +11,7 @@ use crate::infer::ray_dependence::{owed_nats, unsettled};
 use crate::infer::search::{RIVAL_NATS, Search, State};
 use crate::infer::selection::Selection;
 use crate::likelihood::decay::WarmStart;
-use crate::report::diagnosis::Verdict;
+use crate::report::diagnosis::{RayDependence, Verdict};
 use sabine_acoustics::{Observer, report};
 use web_time::Instant;
 
@@ -30,12 +30,12 @@ const OUTWEIGHS: f64 = 2.0;
 const MAX_DISPERSION: f64 = 100.0;
 
 /// Why a cause for which the data speak is not named.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Doubt {
     /// Only octaves below the Schroeder frequency speak for it.
     Modes,
     /// Other rays do not confirm it.
-    Rays,
+    Rays(RayDependence),
     /// It does not help at positions left out.
     Elsewhere,
     /// More speaks against the fit with it than for it.
@@ -204,8 +204,8 @@ fn doubtful(
     if let Some(worst) = resting_on_modes(search, state)? {
         return Ok(Some((worst, Doubt::Modes)));
     }
-    if let Some(worst) = unsettled(search, state, &found.owed_to_rays)? {
-        return Ok(Some((worst, Doubt::Rays)));
+    if let Some((worst, rays)) = unsettled(search, state, &found.owed_to_rays)? {
+        return Ok(Some((worst, Doubt::Rays(rays))));
     }
     let rests_on_tables = state
         .chosen
@@ -337,7 +337,7 @@ mod tests {
     use crate::hand_made::Tables;
     use crate::infer::candidates::cases;
     use crate::infer::cross_validation::DecayChange;
-    use crate::report::diagnosis::{HeldOutGain, RayDependence};
+    use crate::report::diagnosis::HeldOutGain;
     use sabine_scene::{Levels, TimeZero};
 
     #[test]

@@ -103,19 +103,18 @@ pub(crate) fn unsettled(
     search: &Search<'_>,
     state: &State,
     owed_to_rays: &[OwedToRays],
-) -> Result<Option<usize>, Error> {
-    let mut weakest: Option<(f64, usize)> = None;
-    for (candidate, rays) in
-        owed_to_rays.iter().filter(|(c, rays)| rays.owed_nats > 0.0 && state.chosen.contains(c))
-    {
+) -> Result<Option<OwedToRays>, Error> {
+    let mut weakest: Option<(f64, &OwedToRays)> = None;
+    for owed in owed_to_rays.iter().filter(|(c, rays)| rays.owed_nats > 0.0 && state.chosen.contains(c)) {
+        let (candidate, rays) = owed;
         let rest: Vec<usize> = state.chosen.iter().copied().filter(|c| c != candidate).collect();
         let without = search.state(&rest, Some(state))?;
         let nats = state.log_evidence() - without.log_evidence() - search.price(*candidate) - rays.owed_nats;
         if nats < search.threshold() && weakest.is_none_or(|(least, _)| nats < least) {
-            weakest = Some((nats, *candidate));
+            weakest = Some((nats, owed));
         }
     }
-    Ok(weakest.map(|(_, candidate)| candidate))
+    Ok(weakest.map(|(_, owed)| owed.clone()))
 }
 
 #[cfg(test)]
@@ -148,7 +147,9 @@ mod tests {
         assert!(nats > search.threshold() + 2.0, "{nats}");
         let owed =
             |owed_nats: f64| RayDependence { owed_nats, ..RayDependence::new(nats, vec![nats; 4], 0.01) };
-        let falls = |nats: f64| unsettled(&search, &state, &[(0, owed(nats))]).expect("fits");
+        let falls = |nats: f64| {
+            unsettled(&search, &state, &[(0, owed(nats))]).expect("fits").map(|(candidate, _)| candidate)
+        };
         assert_eq!(falls(nats - search.threshold() + 1.0), Some(0));
         assert_eq!(falls(nats - search.threshold() - 1.0), None);
         // What owes nothing stands as it is, and what is not chosen is not asked.

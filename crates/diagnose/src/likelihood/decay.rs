@@ -7,6 +7,7 @@ mod chance;
 mod drift;
 mod expansion;
 mod fit;
+mod group_sums;
 mod offsets;
 mod pair_likelihood;
 #[cfg(test)]
@@ -14,6 +15,7 @@ mod tests;
 mod variance;
 
 pub(crate) use fit::{WarmStart, fit};
+use group_sums::energies_and_hits;
 use offsets::{BandBins, Directions};
 pub(crate) use offsets::{DRIFTS, unit_drift};
 use pair_likelihood::ComparedBand;
@@ -227,37 +229,18 @@ impl<'a> EnergyModel<'a> {
     ) -> (Vec<f64>, Vec<f64>) {
         let m = self.data.absorption.len();
         let state = &self.data.states[pair][band];
-        let shift: Vec<f64> = (0..m)
-            .map(|k| {
-                ((1.0 - values[self.layout.absorption(k, band)]) / (1.0 - self.data.absorption[k][band])).ln()
-            })
+        let left: Vec<f64> = (0..m).map(|k| 1.0 - values[self.layout.absorption(k, band)]).collect();
+        let ln_kept: Vec<f64> = left
+            .iter()
+            .zip(self.data.absorption)
+            .map(|(left, expanded)| (left / (1.0 - expanded[band])).ln())
             .collect();
-        let moved = shift.iter().any(|s| *s != 0.0);
         let gain = self.gain_db(values, pair) * LN_PER_DB;
-        let mut group_energy = state.group_energy[..state.groups[count]].to_vec();
-        if moved {
-            let mut changes = vec![0.0; group_energy.len()];
-            for (hits, shift) in state.group_hits.iter().zip(&shift) {
-                changes.iter_mut().zip(hits).for_each(|(change, n)| *change += n * shift);
-            }
-            exp_all(&mut changes);
-            group_energy.iter_mut().zip(&changes).for_each(|(e, change)| *e *= change);
+        let (energies, mut slopes) = energies_and_hits(state, count, &ln_kept, sloping);
+        for (hits, energy) in slopes.chunks_exact_mut(m).zip(&energies) {
+            hits.iter_mut().zip(&left).for_each(|(hits, left)| *hits /= -energy * left);
         }
-        let mut ln_energy = Vec::with_capacity(count);
-        let mut slopes = Vec::with_capacity(if sloping { count * m } else { 0 });
-        for bin in 0..count {
-            let groups = state.groups[bin]..state.groups[bin + 1];
-            let energy: f64 = group_energy[groups.clone()].iter().sum();
-            ln_energy.push(energy.ln() + state.correction[bin] + gain);
-            if !sloping {
-                continue;
-            }
-            slopes.extend(state.group_hits.iter().enumerate().map(|(k, hits)| {
-                let own = group_energy[groups.clone()].iter().zip(&hits[groups.clone()]);
-                let mean_hits: f64 = own.map(|(e, n)| e * n).sum();
-                -mean_hits / (energy * (1.0 - values[self.layout.absorption(k, band)]))
-            }));
-        }
+        let ln_energy = energies.iter().zip(&state.correction).map(|(e, c)| e.ln() + c + gain).collect();
         (ln_energy, slopes)
     }
 

@@ -154,8 +154,8 @@ fn notes_on(
         .map(|&c| (search.candidates[c].id, at_bounds(search, state, c)))
         .filter(|(_, parameters)| !parameters.is_empty())
         .collect();
-    let dropped: Vec<(&str, Doubt)> =
-        confirmed.dropped.iter().map(|&(c, doubt)| (search.candidates[c].id, doubt)).collect();
+    let dropped: Vec<(&str, &Doubt)> =
+        confirmed.dropped.iter().map(|(c, doubt)| (search.candidates[*c].id, doubt)).collect();
     let of_decays =
         state.chosen.iter().filter(|&&c| search.candidates[c].case.observable() == Observable::Decay).count();
     let most = of_decays.max(state.chosen.len() - of_decays) >= baseline.config.most_causes;
@@ -190,7 +190,7 @@ fn speaking<'c>(
     candidates: &'c [CandidateScore],
     alternatives: &[String],
 ) -> Vec<&'c str> {
-    let fell = |id: &str| confirmed.dropped.iter().any(|&(c, _)| search.candidates[c].id == id);
+    let fell = |id: &str| confirmed.dropped.iter().any(|(c, _)| search.candidates[*c].id == id);
     let worth = |c: &&CandidateScore| {
         c.nats_beside_causes.is_some_and(|nats| nats >= search.threshold())
             && !alternatives.contains(&c.effect)

@@ -20,7 +20,7 @@ pub(crate) struct Circumstances<'a> {
     /// Causes that a discrepancy without a name beats.
     pub unseated: &'a [String],
     /// Causes for which the data speak and that are not named, and why.
-    pub dropped: &'a [(&'a str, Doubt)],
+    pub dropped: &'a [(&'a str, &'a Doubt)],
     /// Whether as many causes are named as may be, and the effects that the data speak for beside them, or else beside a set.
     pub not_sought: (bool, &'a [&'a str]),
     /// How far single responses drift along their decay where it is much, in dB, and in which octave.
@@ -82,19 +82,7 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
         notes.push("The responses scatter far more than this room would: are they of another room?".into());
     }
     for (id, doubt) in about.dropped {
-        let why = match doubt {
-            Doubt::Elsewhere => {
-                "fits the positions that it was fitted to, but does not help to predict those left out".to_owned()
-            }
-            Doubt::Modes => "would explain the lowest octaves alone, where few room modes decide and no simulation is that exact".into(),
-            Doubt::Rays => "owes too much of its evidence to the rays that happened to be drawn, as quarters of them show: so many rays \
-                            do not settle it, try more (`rays`)"
-                .into(),
-            Doubt::Misfit => {
-                "makes the simulation fail less, but more speaks against what is left than for it (`lack_of_fit`)".into()
-            }
-        };
-        notes.push(format!("{id} {why}: it is not named."));
+        notes.push(format!("{id} {}: it is not named.", why_not(doubt)));
     }
     let (most, more) = about.not_sought;
     if !more.is_empty() {
@@ -115,4 +103,45 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
         ));
     }
     notes
+}
+
+/// Why a cause for which the data speak is not named, to follow its name.
+fn why_not(doubt: &Doubt) -> String {
+    match doubt {
+            Doubt::Elsewhere => {
+                "fits the positions that it was fitted to, but does not help to predict those left out".to_owned()
+            }
+            Doubt::Modes => "would explain the lowest octaves alone, where few room modes decide and no simulation is that exact".into(),
+            Doubt::Rays(rays) => {
+                let quarters: Vec<String> =
+                    rays.decay_nats_of_quarters.iter().map(|nats| format!("{nats:.0}")).collect();
+                format!(
+                    "owes too much of its evidence to the rays that happened to be drawn ({:.0} nats by all of them, {} by each quarter: up to \
+                     {:.0} may be theirs), and so many rays do not settle it, try more (`rays`)",
+                    rays.decay_nats,
+                    quarters.join(", "),
+                    rays.owed_nats
+                )
+            }
+            Doubt::Misfit => {
+                "makes the simulation fail less, but more speaks against what is left than for it (`lack_of_fit`)".into()
+            }
+        }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::diagnosis::RayDependence;
+
+    #[test]
+    fn a_name_that_rays_do_not_confirm_falls_with_its_figures() {
+        let rays =
+            RayDependence { owed_nats: 38.4, ..RayDependence::new(43.2, vec![85.0, 34.1, 0.4, 53.0], 0.01) };
+        let why = why_not(&Doubt::Rays(rays));
+        assert!(
+            why.contains("(43 nats by all of them, 85, 34, 0, 53 by each quarter: up to 38 may be theirs)"),
+            "{why}"
+        );
+    }
 }

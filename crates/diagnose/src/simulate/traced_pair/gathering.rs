@@ -258,7 +258,8 @@ impl Gathered {
             state.departure_products.push(std::array::from_fn(|k| s[5 + k] / e));
             state.arrival.push(std::array::from_fn(|k| s[11 + k] / e));
             state.arrival_products.push(std::array::from_fn(|k| s[14 + k] / e));
-            for row in self.rows[bin].values().filter(|r| r[0] > 0.0) {
+            let rows = self.rows[bin].values().map(Vec::as_slice).filter(|r| r[0] > 0.0).collect();
+            for row in hit_groups::joined(rows) {
                 state.group_energy.push(row[0]);
                 state.group_hits.iter_mut().zip(&row[1..]).for_each(|(all, h)| all.push(h / row[0]));
             }
