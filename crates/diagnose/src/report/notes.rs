@@ -108,25 +108,25 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
 /// Why a cause for which the data speak is not named, to follow its name.
 fn why_not(doubt: &Doubt) -> String {
     match doubt {
-            Doubt::Elsewhere => {
-                "fits the positions that it was fitted to, but does not help to predict those left out".to_owned()
-            }
-            Doubt::Modes => "would explain the lowest octaves alone, where few room modes decide and no simulation is that exact".into(),
-            Doubt::Rays(rays) => {
-                let quarters: Vec<String> =
-                    rays.decay_nats_of_quarters.iter().map(|nats| format!("{nats:.0}")).collect();
-                format!(
-                    "owes too much of its evidence to the rays that happened to be drawn ({:.0} nats by all of them, {} by each quarter: up to \
-                     {:.0} may be theirs), and so many rays do not settle it, try more (`rays`)",
-                    rays.decay_nats,
-                    quarters.join(", "),
-                    rays.owed_nats
-                )
-            }
-            Doubt::Misfit => {
-                "makes the simulation fail less, but more speaks against what is left than for it (`lack_of_fit`)".into()
-            }
+        Doubt::Elsewhere => {
+            "fits the positions that it was fitted to, but does not help to predict those left out".to_owned()
         }
+        Doubt::Modes => "would explain the lowest octaves alone, where few room modes decide and no simulation is that exact".into(),
+        Doubt::Rays(rays) => {
+            let quarters: Vec<String> =
+                rays.decay_nats_of_quarters.iter().map(|nats| format!("{nats:.0}")).collect();
+            format!(
+                "owes too much of its evidence to the rays that happened to be drawn ({:.0} nats by all of them, {} by each quarter: up to \
+                 {:.0} may be theirs), and so many rays do not settle it, try more (`rays`)",
+                rays.decay_nats,
+                quarters.join(", "),
+                rays.owed_nats
+            )
+        }
+        Doubt::Misfit => {
+            "makes the simulation fail less, but more speaks against what is left than for it (`lack_of_fit`)".into()
+        }
+    }
 }
 
 #[cfg(test)]
