@@ -35,7 +35,7 @@ pub(crate) fn group(times_s: &[f32], weights: &[f32], hits: &[f32], materials: u
     groups
 }
 
-/// Joins the groups of a bin, `[energy, energy times hits of each material]` each: slices that share it bring groups that met like numbers.
+/// Joins the groups of a bin, `[energy, energy times hits of each material]` each: slices that share it bring groups of the same hits.
 /// Their sums stay.
 pub(crate) fn joined(rows: Vec<&[f64]>) -> Vec<Vec<f64>> {
     let Some(materials) = rows.first().map(|row| row.len() - 1) else { return Vec::new() };
@@ -54,7 +54,7 @@ pub(crate) fn joined(rows: Vec<&[f64]>) -> Vec<Vec<f64>> {
 }
 
 /// Splits the group that scatters most, at its mean along the material in which it does, until all are alike or there are enough.
-fn split(members: Vec<u32>, weights: &[f32], hits: &[f32], materials: usize, alike: f64) -> Vec<Vec<u32>> {
+fn split(members: Vec<u32>, weights: &[f32], hits: &[f32], materials: usize, most_sd: f64) -> Vec<Vec<u32>> {
     let measured = |part: Vec<u32>| {
         let found = widest(&part, weights, hits, materials);
         (part, found)
@@ -63,7 +63,7 @@ fn split(members: Vec<u32>, weights: &[f32], hits: &[f32], materials: usize, ali
     while parts.len() < MAX_GROUPS {
         let largest =
             parts.iter().enumerate().max_by(|a, b| a.1.1.gain.total_cmp(&b.1.1.gain)).map(|(i, _)| i);
-        let Some(index) = largest.filter(|&i| parts[i].1.variance > alike * alike) else { break };
+        let Some(index) = largest.filter(|&i| parts[i].1.variance > most_sd * most_sd) else { break };
         let (part, HitVariance { material, mean, .. }) = parts.swap_remove(index);
         let (low, high): (Vec<u32>, Vec<u32>) =
             part.into_iter().partition(|&i| f64::from(hits[i as usize * materials + material]) <= mean);
@@ -116,7 +116,7 @@ fn widest(part: &[u32], weights: &[f32], hits: &[f32], materials: usize) -> HitV
 mod tests {
     use super::*;
 
-    /// A bin of a box hears three slices: sums stay, and so does its energy at any absorption that a fit tries before groups are made anew.
+    /// A bin of a box hears three slices: sums stay, and so does its energy at any absorption that a fit tries before groups are made again.
     #[test]
     fn joined_groups_of_three_slices_predict_energy_at_another_absorption() {
         let mut rows: Vec<Vec<f64>> = Vec::new();
