@@ -34,6 +34,8 @@ pub struct Parameter {
     /// Whether the least value is as far as the model claims to go, as a floor of uncertainty is: reaching it does not say that more of
     /// the effect may be there.
     pub has_floor: bool,
+    /// Whether the greatest value is as far as the model claims to go, as a share of the whole is.
+    pub has_ceiling: bool,
     /// A value at which the effect is plain to see: where its signature is compared with those of others.
     pub typical: f64,
     /// The only band that it bears on, where there is one.
@@ -60,6 +62,7 @@ impl Parameter {
             prior_sd,
             bounds,
             has_floor: false,
+            has_ceiling: false,
             typical: neutral,
             band: None,
             receiver: None,
@@ -79,10 +82,17 @@ impl Parameter {
         Self { has_floor: true, ..self }
     }
 
+    /// The same, its greatest value being a ceiling.
+    #[must_use]
+    pub fn with_ceiling(self) -> Self {
+        Self { has_ceiling: true, ..self }
+    }
+
     /// Whether a value lies at an end of the range beyond which more of the effect may be there.
     pub(crate) fn may_go_on(&self, value: f64) -> bool {
         let low = value <= self.bounds.0 && !self.has_floor;
-        (low || value >= self.bounds.1) && value != self.neutral
+        let high = value >= self.bounds.1 && !self.has_ceiling;
+        (low || high) && value != self.neutral
     }
 
     /// The same, for one band alone, whose nominal centre is added to the name.
@@ -183,11 +193,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_floor_is_no_end_of_a_range() {
+    fn a_floor_or_a_ceiling_is_no_end_of_a_range() {
         let open = Parameter::new("share", "", 1.0, 0.5, (0.1, 2.0));
         assert!(open.may_go_on(0.1) && open.may_go_on(2.0) && !open.may_go_on(1.5));
-        let floored = open.with_floor();
+        let floored = open.clone().with_floor();
         assert!(!floored.may_go_on(0.1) && floored.may_go_on(2.0));
+        let closed = open.with_ceiling();
+        assert!(closed.may_go_on(0.1) && !closed.may_go_on(2.0));
         // Nothing is found at the neutral value, wherever it lies.
         assert!(!Parameter::new("level", "dB", -90.0, 30.0, (-90.0, 0.0)).may_go_on(-90.0));
     }

@@ -1,6 +1,7 @@
 //! `coherent_reflections`: reflections keep their phase, and add as pressures rather than as energies.
 
 mod interference;
+mod pressure_sums;
 
 use crate::effect::EffectInfo;
 use crate::effect::next_measurement::NextMeasurement;
@@ -12,8 +13,8 @@ use crate::simulate::views::BandView;
 use crate::survey::Survey;
 use interference::Interference;
 
-/// Most of a bin's spread that may be left to chance where the sum of pressures predicts it, and least.
-const LEFT_TO_CHANCE: (f64, f64) = (0.03, 1.0);
+/// Most of the specular energy whose pressures may add as they should: a few hundredths are left to chance.
+const MOST_OF_PRESSURES: f64 = 0.97;
 
 /// Specular reflections add as pressures of the sign of the source, no longer as energies: whether two that arrive together add or cancel
 /// is then no chance. Walls that are large, flat and hard do so, and image sources as most programs sum them.
@@ -23,10 +24,12 @@ const LEFT_TO_CHANCE: (f64, f64) = (0.03, 1.0);
 /// images whose distances differ by less than a wave length. As the difference hardly depends on the place, it survives errors of places of
 /// a centimetre, far above the Schroeder frequency.
 ///
-/// Two parameters: the share of the sum of pressures, 0 for energies alone and 1 for pressures alone (the exponent of the ratio of the two
-/// in each bin); and how much of the spread that chance would give is left. What the uncertainty of places leaves open is added: sums are
-/// made at several places drawn within it. In a cuboid (six whole faces, each of one material) all images within the compared time count,
-/// up to a million (later bins keep the mean change of the last, and hardly count); in other meshes the exact paths of the tracer, the first 60 ms.
+/// One parameter P: the share of the energy of each specular path whose pressure adds as it should; the rest has any phase. With A the sum
+/// of energies, S that part of it which was not scattered, and C the energy of the sum of pressures, a bin has A - P S + P C, of which
+/// r = (A - P S) / (A - P S + P C) is left to chance; its relative variance is 1 - (1 - r)^2 of what it is for sound of any phase. What the
+/// uncertainty of places leaves open is added: sums are made at several places drawn within it. In a cuboid (six whole faces, each of one
+/// material) all images within the compared time count, up to a million (later bins keep the mean change of the last, and hardly count);
+/// in other meshes the exact paths of the tracer, the first 55 ms.
 ///
 /// Mark: energies of single responses above or below the prediction for many bins together, each response and octave in its own, predictable
 /// way. Mimicked by: `room_modes`, the same thing below the Schroeder frequency in a room of any shape.
@@ -46,11 +49,9 @@ impl Effect for CoherentReflections {
     }
 
     fn cases(&self, _: &Survey) -> Vec<Case> {
-        let parameters = vec![
-            Parameter::new("share_of_pressures", "", 0.0, 0.7, (0.0, 1.2)).typically(1.0),
-            Parameter::new("left_to_chance", "", 1.0, 0.7, LEFT_TO_CHANCE).typically(0.5).with_floor(),
-        ];
-        let starts = vec![vec![0.9, 0.3], vec![0.4, 0.8]];
+        let share = Parameter::new("share_of_pressures", "", 0.0, 0.7, (0.0, MOST_OF_PRESSURES));
+        let parameters = vec![share.typically(0.5).with_ceiling()];
+        let starts = vec![vec![0.7], vec![0.2]];
         vec![
             Case::decay(parameters, *self)
                 .starting(starts)
@@ -75,21 +76,14 @@ impl DecayTerm for CoherentReflections {
     }
 
     fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
-        let Some(table) = view.table::<Interference>() else { return };
-        for (l, change) in ln_energy.iter_mut().zip(&table.change) {
-            *l += values[0] * change;
+        if let Some(table) = view.table::<Interference>() {
+            table.add_change(values[0].clamp(0.0, MOST_OF_PRESSURES), ln_energy);
         }
     }
 
     fn variance(&self, values: &[f64], view: &BandView<'_>, variance: &mut [f64]) {
-        let Some(table) = view.table::<Interference>() else { return };
-        let predicted = values[0].clamp(0.0, 1.0) * (1.0 - values[1]);
-        for (v, open) in variance.iter_mut().zip(&table.open_variance).take(table.summed) {
-            *v = v.min((1.0 - predicted) * *v + predicted * open);
-        }
-        // Of those that were not summed only the mean is known.
-        for (v, open) in variance.iter_mut().zip(&table.open_variance).skip(table.summed) {
-            *v += values[0].clamp(0.0, 1.0) * open;
+        if let Some(table) = view.table::<Interference>() {
+            table.limit_variance(values[0].clamp(0.0, MOST_OF_PRESSURES), variance);
         }
     }
 }

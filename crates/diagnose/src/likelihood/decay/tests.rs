@@ -3,8 +3,8 @@
 use super::*;
 use crate::effect::Effect;
 use crate::effects::{
-    AirAbsorption, AngleDependentAbsorption, BackgroundNoise, CoupledVolume, MissingDiffraction, RoomModes,
-    Scattering, SourceDirectivity, TransducerResponse, Truncation,
+    AirAbsorption, AngleDependentAbsorption, BackgroundNoise, CoherentReflections, CoupledVolume,
+    MissingDiffraction, RoomModes, Scattering, SourceDirectivity, TransducerResponse, Truncation,
 };
 use crate::hand_made::Tables as HandMade;
 use sabine_scene::TimeZero;
@@ -20,10 +20,11 @@ fn somewhere(model: &EnergyModel<'_>) -> Vec<f64> {
 
 #[test]
 fn the_gradient_is_that_of_central_differences() {
-    let effects: [&dyn Effect; 10] = [
+    let effects: [&dyn Effect; 11] = [
         &AirAbsorption,
         &AngleDependentAbsorption,
         &BackgroundNoise,
+        &CoherentReflections,
         &CoupledVolume,
         &MissingDiffraction,
         &RoomModes,
