@@ -131,6 +131,7 @@ impl Extent {
     }
 }
 
+/// Sums what is heard at these places, in all bands.
 fn interferences(
     pair: &TracedPairView<'_>,
     pulses: &[(f64, BandPulse)],

@@ -148,7 +148,8 @@ impl Places {
         }
         let (from, to) = (room.source(source).position_m, room.receiver(receiver).position_m);
         let way: [f64; 3] = std::array::from_fn(|axis| to[axis] - from[axis]);
-        let length = way.iter().map(|x| x * x).sum::<f64>().sqrt();
+        // Two in one place have no direction, and need none.
+        let length = way.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-9);
         Self { moves_m, direct: way.map(|x| (x / length) as f32) }
     }
 
@@ -236,7 +237,7 @@ impl<'a> BandSums<'a> {
         }
     }
 
-    /// `longer_m` by place.
+    /// Adds some paths, longer by so much at each place (`[place][path]`).
     fn add(&mut self, paths: &Portion<'_>, longer_m: &[Vec<f32>]) {
         let lengths_m = &paths.lengths_m;
         let heard: Vec<usize> = (0..lengths_m.len()).filter(|&i| lengths_m[i] < self.end_m).collect();
