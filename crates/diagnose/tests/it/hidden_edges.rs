@@ -4,7 +4,7 @@
 
 use crate::rivals::diagnoser_among;
 use sabine_acoustics::ImpulseResponse;
-use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis};
+use sabine_diagnose::{DiagnoseConfig, Diagnoser, Diagnosis, catalogue};
 use sabine_testkit::{ScreenedConfig, ScreenedRoom};
 
 const ROOM: ScreenedConfig = ScreenedConfig { seed: 7, receivers: 16, screen: true };
@@ -29,14 +29,24 @@ fn diagnoser() -> Diagnoser {
     Diagnoser::new(DiagnoseConfig { rays: 10_000, ..DiagnoseConfig::default() }).unwrap()
 }
 
+fn without_phases() -> Diagnoser {
+    let ids = catalogue().into_iter().map(|effect| effect.id().to_string());
+    diagnoser().with_only(&ids.filter(|id| id != "coherent_reflections").collect::<Vec<_>>()).unwrap()
+}
+
 #[test]
 fn what_bends_around_a_screen_is_found() {
     let room = ScreenedRoom::new(ROOM).unwrap();
-    let found = diagnose(&room, room.responses().unwrap(), &diagnoser());
+    let responses = room.responses().unwrap();
+    let found = diagnose(&room, responses.clone(), &diagnoser());
     // Not alone: what theory leaves of the waves is put down to `scattering` or one surface's absorption with some seeds of rays.
     let cause = &found.causes[0];
     assert_eq!(cause.effect, "edge_diffraction");
     assert!(found.causes[1..].iter().all(|beside| beside.nats < 0.5 * cause.nats), "{:?}", found.causes);
+    // Waves keep their phase, and `coherent_reflections` beside it takes a part of what it gains: it is asked without.
+    let found = diagnose(&room, responses, &without_phases());
+    let cause = &found.causes[0];
+    assert_eq!(cause.effect, "edge_diffraction");
     // Each of the eight groups gains, by chance once in 256; one gains ten times as much as the others, and so the interval is wide.
     let gain = cause.held_out_gain.clone().unwrap();
     assert!(gain.in_every_group && gain.nats_per_bin > 0.1, "{gain:?}");
