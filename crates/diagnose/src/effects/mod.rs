@@ -24,6 +24,7 @@ mod sound_speed;
 mod source_directivity;
 mod surface_absorption;
 mod surface_displacement;
+mod temperature_gradient;
 mod time_zero;
 mod transducer_response;
 mod truncation;
@@ -53,6 +54,7 @@ pub use sound_speed::SoundSpeed;
 pub use source_directivity::SourceDirectivity;
 pub use surface_absorption::SurfaceAbsorption;
 pub use surface_displacement::SurfaceDisplacement;
+pub use temperature_gradient::TemperatureGradient;
 pub use time_zero::TimeZeroOffset;
 pub use transducer_response::TransducerResponse;
 pub use truncation::Truncation;
@@ -89,6 +91,7 @@ pub fn catalogue() -> Vec<Box<dyn Effect>> {
         Box::new(CoherentReflections),
         Box::new(SurfaceDisplacement),
         Box::new(CoordinateShift),
+        Box::new(TemperatureGradient),
     ]
 }
 

@@ -8,7 +8,6 @@ pub(crate) mod expansion;
 mod fit;
 mod peak_origins;
 mod places;
-mod stops;
 mod unassigned_peaks;
 
 use crate::effect::Case;
@@ -18,7 +17,8 @@ use crate::likelihood::parameters::{ArrivalLayout, ModelTerm, ModelTerms};
 use crate::observe::observed_response::{Measured, PEAKS_S};
 use crate::simulate::traced_pair::Arrival;
 use crate::simulate::views::ArrivalView;
-use crate::survey::Survey;
+use crate::survey::path_stops::path_stops;
+use crate::survey::{Survey, SurveyedResponse};
 pub(crate) use fit::fit;
 use peak_origins::PeakOrigins;
 use sabine_scene::TimeZero;
@@ -63,7 +63,7 @@ pub(crate) struct ArrivalModel<'a> {
     assignment: Vec<usize>,
     /// By pair.
     origins: Vec<PeakOrigins>,
-    /// Where each arrival runs ([`stops`]), by pair; none where nothing asks.
+    /// Where each arrival runs ([`path_stops`]), by pair; none where nothing asks.
     stops: Vec<Vec<Vec<[f64; 3]>>>,
     /// Reflections count with this much more than their own width; `None`: only the direct sound counts, and is never misread.
     width_s: Option<f64>,
@@ -82,6 +82,14 @@ pub(crate) struct At<'v> {
 struct Moved {
     surface: usize,
     steps: Vec<[Vec<Mirror>; 2]>,
+}
+
+/// Where all predicted arrivals run, by pair.
+fn stops_of_all(data: &ArrivalData<'_>) -> Vec<Vec<Vec<[f64; 3]>>> {
+    let of_pair = |(response, arrivals): (&SurveyedResponse, &Vec<Arrival>)| {
+        arrivals.iter().map(|a| path_stops(data.survey, response, a.length_m, &a.surfaces)).collect()
+    };
+    data.survey.responses.iter().zip(data.arrivals).map(of_pair).collect()
 }
 
 fn normal(residual: f64, sd: f64) -> f64 {
@@ -110,7 +118,7 @@ impl<'a> ArrivalModel<'a> {
         let ModelTerms { priors, terms, assignment, .. } = all;
         let origins = PeakOrigins::of(data, &assignment, used);
         let may_hide = terms.iter().any(|p| p.case.reflection_term().is_some());
-        let stops = if may_hide { stops::of_all(data) } else { vec![Vec::new(); survey.responses.len()] };
+        let stops = if may_hide { stops_of_all(data) } else { vec![Vec::new(); survey.responses.len()] };
         Self { data, layout, terms, priors, used, assignment, origins, stops, width_s: None }
     }
 
@@ -355,20 +363,21 @@ mod tests {
     use crate::effect::Effect;
     use crate::effects::{
         CoordinateShift, PositionError, RoomDimensions, SamplingClock, SoundSpeed, SurfaceDisplacement,
-        TimeZeroOffset,
+        TemperatureGradient, TimeZeroOffset,
     };
     use crate::hand_made::Tables;
     use sabine_scene::Levels;
 
     #[test]
     fn the_gradient_is_that_of_central_differences() {
-        let effects: [&dyn Effect; 7] = [
+        let effects: [&dyn Effect; 8] = [
             &CoordinateShift,
             &PositionError,
             &RoomDimensions,
             &SamplingClock,
             &SoundSpeed,
             &SurfaceDisplacement,
+            &TemperatureGradient,
             &TimeZeroOffset,
         ];
         for time_zero in [TimeZero::Emission, TimeZero::Common, TimeZero::PerResponse] {

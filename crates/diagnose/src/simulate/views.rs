@@ -4,6 +4,7 @@ use crate::extend::displaced_surface::{DisplacedSurface, Mirror, longer_m, mirro
 use crate::simulate::band_state::BandState;
 use crate::simulate::reflection_reweighting::HitChanges;
 use crate::simulate::tables::Tables;
+use crate::survey::path_stops::path_stops;
 use crate::survey::{Survey, SurveyedResponse};
 
 /// One band of the predicted energy of one source-receiver pair.
@@ -176,6 +177,12 @@ impl ArrivalView<'_> {
     /// meets surfaces so near to their edges that it cannot be followed.
     pub fn surfaces(&self) -> &[usize] {
         self.surfaces
+    }
+
+    /// The places from each of which to the next it goes straight on, in metres: source, reflections, receiver. Empty where the surfaces that it
+    /// meets are not known.
+    pub fn stops(&self) -> Vec<[f64; 3]> {
+        path_stops(self.survey, self.pair(), self.length_m, self.surfaces)
     }
 
     /// Seconds by which it comes later if surfaces (indices into [`Survey::surfaces`]) stand elsewhere: exact for a specular path, whose

@@ -1,5 +1,6 @@
 //! What was measured, as effects see it.
 
+pub(crate) mod path_stops;
 pub(crate) mod planes;
 pub(crate) mod surfaces;
 

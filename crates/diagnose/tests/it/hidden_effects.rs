@@ -53,7 +53,7 @@ pub(crate) fn diagnose_by(diagnoser: &Diagnoser, lab: &Laboratory, hidden: &[Hid
 /// What moves arrival times, and can pass for each other.
 const NEAR_TIMES: [&str; 4] = ["time_zero", "sound_speed", "position_error", "room_dimensions"];
 /// All that moves arrival times.
-pub(crate) const ON_TIMES: [&str; 8] = [
+pub(crate) const ON_TIMES: [&str; 9] = [
     "time_zero",
     "sound_speed",
     "sampling_clock",
@@ -61,6 +61,7 @@ pub(crate) const ON_TIMES: [&str; 8] = [
     "room_dimensions",
     "surface_displacement",
     "coordinate_shift",
+    "temperature_gradient",
     "extra_reflector",
 ];
 /// What bends decays or lifts their ends, the same for all responses.
@@ -137,6 +138,16 @@ fn another_temperature_is_found() {
     let p = &cause.parameters[0];
     // The laboratory jitters places by 5 mm: the interval may miss by little.
     assert!((p.value - lab.air().temperature_c() - 8.0).abs() < 0.8, "{p:?}");
+}
+
+#[test]
+fn air_that_is_warmer_the_higher_it_is_is_found() {
+    let lab = small_lab(514, 6, THREE_OCTAVES_HZ);
+    let hidden = Hidden::TemperatureGradient { k_per_m: 2.5, stated_at_m: 1.0 };
+    let found = diagnose_among(&lab, &[hidden], &ON_TIMES);
+    let cause = only_cause(&found, "temperature_gradient");
+    holds(&cause, "gradient", 2.5);
+    holds(&cause, "stated_at", 1.0);
 }
 
 #[test]

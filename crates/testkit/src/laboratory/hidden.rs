@@ -236,7 +236,7 @@ pub enum Hidden {
         /// Radius of the droplets in micrometres, 0.5 to 100.
         radius_um: f64,
     },
-    /// Outside the catalogue: the air is warmer the higher it is. Travel times alone.
+    /// The air is warmer the higher it is. Travel times alone.
     TemperatureGradient {
         /// Rise of the temperature in K/m, -10 to 10.
         k_per_m: f64,
@@ -318,7 +318,7 @@ pub struct Gap {
 
 impl Hidden {
     /// Identifiers of the catalogue's effects.
-    pub const CATALOGUE: [&'static str; 23] = [
+    pub const CATALOGUE: [&'static str; 24] = [
         "transducer_response",
         "air_absorption",
         "source_directivity",
@@ -342,6 +342,7 @@ impl Hidden {
         "channel_response",
         "surface_displacement",
         "coordinate_shift",
+        "temperature_gradient",
     ];
     /// Names of the effects that no catalogue holds.
     pub const OUTSIDE: [&'static str; 4] = ["gain_drift", "dropouts", "foreign_chirp", "grazing_absorption"];

@@ -70,6 +70,10 @@ fn draw(id: &str, strength: f64, lab: &Laboratory, seed: u64, r: &mut Pcg64Mcg) 
         "coupled_volume" => coupled_volume(r, truth, decay_s, strength),
         "truncation" => truncation(r, truth, decay_s, strength),
         "sound_speed" => Hidden::SoundSpeed { temperature_offset_k: 8.0 * strength * sign(r) },
+        "temperature_gradient" => Hidden::TemperatureGradient {
+            k_per_m: strength * sign(r) * (2.0 + unit(r)),
+            stated_at_m: 1.0 + 0.5 * unit(r),
+        },
         "sampling_clock" => Hidden::SamplingClock { ppm: 900.0 * strength * sign(r) },
         "room_dimensions" => {
             let mut axes = [0, 1, 2];

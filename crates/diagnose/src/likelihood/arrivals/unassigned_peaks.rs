@@ -1,10 +1,11 @@
 //! Reflections that the mesh does not have: what effects add, where peaks point, and the fit from there.
 
+use super::edges;
 use super::places::longer_m;
 use super::{
     ADDED_HEIGHT_SD_DB, ArrivalData, ArrivalModel, At, REFLECTION_SD_S, SEEN_SHARE, WIDTHS_S, at_fit, normal,
+    stops_of_all,
 };
-use super::{edges, stops};
 use crate::effect::{Case, FittedCase, Nuisance, ReflectionTerm};
 use crate::error::Error;
 use crate::extend::model_change::ModelChange;
@@ -115,7 +116,7 @@ impl<'a> ArrivalModel<'a> {
     /// Peaks with the length of their way and the probability that nothing predicted explains them.
     fn strays(&self, values: &[f64]) -> UnassignedPeaks<'a> {
         let at = self.at(values, false);
-        let stops = stops::of_all(self.data);
+        let stops = stops_of_all(self.data);
         let mut paths = Vec::new();
         let peaks = (0..self.assignment.len())
             .map(|pair| {

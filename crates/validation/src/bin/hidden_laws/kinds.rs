@@ -53,7 +53,7 @@ pub const KINDS: [Kind; 10] = [
         id: "temperature_gradient",
         targets: &["delay"],
         covariates: &["mean_height_m", "least_height_m", "source_z_m", "receiver_z_m"],
-        catalogue: &["sound_speed"],
+        catalogue: &["temperature_gradient", "sound_speed"],
         edge: Edge::None,
     },
     Kind { id: "fog", targets: LEVEL, covariates: TIMES, catalogue: &["air_absorption"], edge: Edge::From },

@@ -1,40 +1,35 @@
 //! Where predicted specular paths run.
 
-use super::ArrivalData;
-use crate::simulate::traced_pair::Arrival;
-use crate::survey::planes::dot;
-use crate::survey::surfaces::{minus, mirrored_in};
-use crate::survey::{Survey, SurveyedResponse};
+use super::planes::dot;
+use super::surfaces::{minus, mirrored_in};
+use super::{Survey, SurveyedResponse};
 
 /// A path whose images are farther off than this, in metres, is not that of its surfaces.
 const OFF_M: f64 = 0.05;
 
-/// Those of all predicted arrivals, by pair.
-pub(super) fn of_all(data: &ArrivalData<'_>) -> Vec<Vec<Vec<[f64; 3]>>> {
-    let of_pair = |(response, arrivals): (&SurveyedResponse, &Vec<Arrival>)| {
-        arrivals.iter().map(|arrival| stops(data.survey, response, arrival)).collect()
-    };
-    data.survey.responses.iter().zip(data.arrivals).map(of_pair).collect()
-}
-
 /// The places from each of which to the next a path goes straight on: source, reflections, receiver. Empty where the surfaces that it meets are
 /// not known.
-fn stops(survey: &Survey, response: &SurveyedResponse, arrival: &Arrival) -> Vec<[f64; 3]> {
+pub(crate) fn path_stops(
+    survey: &Survey,
+    response: &SurveyedResponse,
+    length_m: f64,
+    surfaces: &[usize],
+) -> Vec<[f64; 3]> {
     let source = survey.sources[response.source].position_m;
     let receiver = survey.receivers[response.receiver].position_m;
     let plane = |surface: &usize| (survey.surfaces[*surface].axes[0], survey.surfaces[*surface].centre_m);
     let mut images = vec![source];
-    for surface in &arrival.surfaces {
+    for surface in surfaces {
         let (normal, point) = plane(surface);
         images.push(mirrored_in(images[images.len() - 1], normal, point));
     }
     let far = |a: [f64; 3], b: [f64; 3]| dot(minus(a, b), minus(a, b)).sqrt();
-    if (far(images[images.len() - 1], receiver) - arrival.length_m).abs() > OFF_M {
+    if (far(images[images.len() - 1], receiver) - length_m).abs() > OFF_M {
         return Vec::new();
     }
     // From the receiver back, each place is where the line to the image behind the surface meets it.
     let mut found = vec![receiver];
-    for (surface, image) in arrival.surfaces.iter().zip(&images[1..]).rev() {
+    for (surface, image) in surfaces.iter().zip(&images[1..]).rev() {
         let (normal, point) = plane(surface);
         let place = found[found.len() - 1];
         let (before, behind) = (dot(normal, minus(place, point)), dot(normal, minus(*image, point)));
@@ -61,7 +56,7 @@ mod tests {
         let mut followed = 0;
         for (response, arrivals) in tables.survey.responses.iter().zip(&tables.arrivals) {
             for arrival in arrivals {
-                let found = stops(&tables.survey, response, arrival);
+                let found = path_stops(&tables.survey, response, arrival.length_m, &arrival.surfaces);
                 if found.is_empty() {
                     continue;
                 }
