@@ -4,14 +4,17 @@ use super::{Diagnoser, Prepared, Task, Weighed};
 use crate::effect::Effect;
 use crate::effects::UnknownLaw;
 use crate::error::Error;
+use crate::infer::candidates::CatalogueCase;
 use crate::infer::confirmation::{Confirmation, Doubt, confirm};
+use crate::infer::law_search::rival::closest;
 use crate::infer::law_search::shortlist::shortlist;
-use crate::infer::law_search::trial::{Trial, trials};
+use crate::infer::law_search::trial::{Fault, Trial, trials};
 use crate::infer::law_search::vault;
 use crate::infer::law_search::visible::visible_from;
 use crate::infer::naming::select;
 use crate::infer::search::Search;
-use crate::report::diagnosis::{Diagnosis, FallenLaw, LawSearch, Verdict, VisibleLaw};
+use crate::report::composition::words_that_decide;
+use crate::report::diagnosis::{Cause, Diagnosis, FallenLaw, LawSearch, Verdict, VisibleLaw};
 use crate::report::found_laws::{found_law, reason};
 use sabine_acoustics::Observer;
 use sabine_scene::MeasuredRoom;
@@ -69,6 +72,14 @@ impl Diagnoser {
             confirmed = weighed.confirmed_without(&fallen, confirmed, (held, effects), observer)?;
         }
         told.fallen.extend(doubted(&weighed, &confirmed));
+        let elsewhere = confirmed.dropped.iter().filter(|(_, doubt)| matches!(doubt, Doubt::Elsewhere));
+        // What chance makes as good, or other rays do not confirm, is no rival of a name.
+        let as_probable: Vec<usize> = fallen
+            .iter()
+            .filter(|trial| trial.fault() != Some(Fault::Chance))
+            .map(|trial| trial.candidate)
+            .chain(elsewhere.map(|(candidate, _)| *candidate).filter(|&c| is_law(&weighed.cases[c].id)))
+            .collect();
         let still = laws_among(&weighed, &confirmed.state.chosen);
         if still.is_empty() {
             let visible = visible_from(&weighed.search(effects), &confirmed.state)?;
@@ -76,14 +87,15 @@ impl Diagnoser {
             told.visible = visible.into_iter().map(one).collect();
         }
         let mut diagnosis = if still.is_empty() && !vault.is_empty() {
-            match plain {
+            let plain = match plain {
                 Some(plain) => plain,
                 None => {
                     let task = self.without_search(room, held);
                     let (weighed, confirmed) = self.found(&task, observer)?;
                     self.composed(&weighed, confirmed, task.effects, observer)?
                 }
-            }
+            };
+            weighed.beside_fallen(plain, &as_probable, &self.effects)?
         } else {
             let state = confirmed.state.clone();
             let mut diagnosis = self.composed(&weighed, confirmed, effects, observer)?;
@@ -177,6 +189,42 @@ impl Weighed {
     /// What decays go with under a law among the candidates, in words.
     fn goes_with(&self, candidate: usize) -> String {
         self.cases[candidate].case.subject.clone().unwrap_or_default()
+    }
+
+    /// An answer without laws, ambiguous where one of these laws, which did not stand, explains as much in the place of a cause of decays that was
+    /// named: the same data do not say more for the name.
+    fn beside_fallen(
+        &mut self,
+        mut plain: Diagnosis,
+        laws: &[usize],
+        effects: &[Box<dyn Effect>],
+    ) -> Result<Diagnosis, Error> {
+        let is_named = |own: &CatalogueCase, cause: &Cause| {
+            own.formula.is_none() && own.id == cause.effect && own.case.subject == cause.subject
+        };
+        let place = |cause: &Cause| self.cases.iter().position(|own| is_named(own, cause));
+        let named: Option<Vec<usize>> = plain.causes.iter().map(place).collect();
+        let Some(named) = named.filter(|_| !laws.is_empty() && plain.verdict == Verdict::Explained) else {
+            return Ok(plain);
+        };
+        self.baseline.prepare_rest(&self.cases)?;
+        if let Some(rival) = closest(&self.search(effects.len()), &named, laws)? {
+            // The last cause stands for the set.
+            let cause = plain.causes.remove(rival.place);
+            plain.verdict = Verdict::Ambiguous;
+            plain.alternatives = vec![cause.effect.clone(), UnknownLaw.id().into_owned()];
+            plain.would_decide = words_that_decide(effects, &plain.alternatives);
+            let about = cause.subject.as_ref().map_or_else(String::new, |subject| format!(" ({subject})"));
+            plain.notes.push(format!(
+                "{}{about} is not the only explanation: in its place a law that did not stand has {:.1} nats {} ({}).",
+                cause.effect,
+                rival.nats.abs(),
+                if rival.nats < 0.0 { "less" } else { "more" },
+                self.goes_with(rival.law),
+            ));
+            plain.causes.push(cause);
+        }
+        Ok(plain)
     }
 
     /// What stands without some laws.

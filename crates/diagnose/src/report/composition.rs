@@ -253,7 +253,7 @@ fn without(search: &Search<'_>, state: &State, candidate: usize) -> Result<f64, 
 }
 
 /// What would tell each two of the alternatives apart.
-fn words_that_decide(effects: &[Box<dyn Effect>], alternatives: &[String]) -> Vec<String> {
+pub(crate) fn words_that_decide(effects: &[Box<dyn Effect>], alternatives: &[String]) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     for (i, a) in alternatives.iter().enumerate() {
         for b in &alternatives[i + 1..] {

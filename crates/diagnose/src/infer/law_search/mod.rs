@@ -8,6 +8,7 @@ mod features;
 mod law_screen;
 mod null_model;
 pub(crate) mod plot;
+pub(crate) mod rival;
 mod screen;
 pub(crate) mod shortlist;
 pub(crate) mod trial;

@@ -21,6 +21,8 @@ pub enum Outcome {
     RightLaw,
     /// Laws, none of which is right.
     WrongLaw,
+    /// A set of a cause and a law that did not stand, the law being right.
+    InSet,
     /// No law, but the effect of the catalogue that is the truth, alone or in a set of alternatives.
     Catalogue,
     /// No law, and other effects of the catalogue.
@@ -60,6 +62,11 @@ fn is_right(law: &FoundLaw, kind: &Kind, surface: Option<&str>) -> bool {
         && speaks_of(&law.formula, kind.covariates)
 }
 
+/// Whether what a law goes with, in words, is of the kind that is hidden.
+fn tells(words: &str, kind: &Kind, surface: Option<&str>) -> bool {
+    speaks_of(words, kind.covariates) && surface.is_none_or(|surface| speaks_of(words, &[surface]))
+}
+
 /// Judges a diagnosis of a room of a kind.
 ///
 /// # Errors
@@ -81,14 +88,20 @@ pub fn judge(
         None => contents.cause == Some(cause.effect.as_str()),
     };
     let named: Vec<&Cause> = found.causes.iter().filter(|cause| cause.effect != SEARCHED).collect();
+    let mut fallen = found.law_search.iter().flat_map(|search| &search.fallen);
+    let law_in_set = hidden.is_some()
+        && found.verdict == Verdict::Ambiguous
+        && found.alternatives.iter().any(|id| id == SEARCHED)
+        && fallen.any(|law| tells(&law.goes_with, kind, surface));
     // The last cause of a set stands for all of it.
     let in_set = |cause: &Cause| {
         found.verdict == Verdict::Ambiguous
             && found.causes.last() == Some(cause)
-            && found.alternatives.iter().any(|id| match hidden {
-                Some(_) => kind.catalogue.contains(&id.as_str()),
-                None => contents.cause == Some(id.as_str()),
-            })
+            && (law_in_set
+                || found.alternatives.iter().any(|id| match hidden {
+                    Some(_) => kind.catalogue.contains(&id.as_str()),
+                    None => contents.cause == Some(id.as_str()),
+                }))
     };
     let excused = |cause: &Cause| contents.hidden.len() > 1 && NUISANCES.contains(&cause.effect.as_str());
     let holds = named.iter().any(|cause| is_true(cause) || in_set(cause));
@@ -97,6 +110,7 @@ pub fn judge(
     let outcome = match found.verdict {
         _ if right.is_some() => Outcome::RightLaw,
         _ if wrong_laws > 0 => Outcome::WrongLaw,
+        _ if law_in_set => Outcome::InSet,
         _ if holds => Outcome::Catalogue,
         _ if false_names > 0 => Outcome::WrongName,
         Verdict::Unexplained => Outcome::Unexplained,
@@ -108,8 +122,7 @@ pub fn judge(
     };
     let misfit_is_right = hidden.map(|_| {
         found.lack_of_fit.tests.iter().filter(|test| test.p_value < TELLING_P).any(|test| {
-            let text = format!("{} {}", test.name, test.subject.as_deref().unwrap_or_default());
-            speaks_of(&text, kind.covariates) && surface.is_none_or(|surface| speaks_of(&text, &[surface]))
+            tells(&format!("{} {}", test.name, test.subject.as_deref().unwrap_or_default()), kind, surface)
         })
     });
     Ok(Judgement { outcome, false_laws: wrong_laws, false_names, misfit_is_right, agreement })

@@ -150,7 +150,7 @@ fn is_named(trial: &Trial) -> bool {
 /// Whether what is said is true: the law, or that something is wrong, or what the misfit goes with.
 fn says_something_true(trial: &Trial) -> bool {
     is_named(trial)
-        || trial.outcome == Outcome::Unexplained
+        || matches!(trial.outcome, Outcome::Unexplained | Outcome::InSet)
         || trial.outcome == Outcome::Adequate && trial.misfit_is_right == Some(true)
 }
 
@@ -223,6 +223,9 @@ fn shares_of_laws(laws: &[&Trial]) {
     let is = |outcome: Outcome| laws.iter().map(move |t| t.outcome == outcome);
     share("right law", is(Outcome::RightLaw));
     share("named by the catalogue", is(Outcome::Catalogue));
+    if is(Outcome::InSet).any(|found| found) {
+        share("a set of a cause and the right law", is(Outcome::InSet));
+    }
     share("`unexplained`", is(Outcome::Unexplained));
     share("one of these: something true is said", laws.iter().map(|t| says_something_true(t)));
     share("wrong law", is(Outcome::WrongLaw));
