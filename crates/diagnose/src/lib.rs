@@ -122,8 +122,8 @@ pub use plan::outcome::{Chosen, Decision, EffectSize, LookAlikes, Plan, Weighing
 pub use plan::planner::Planner;
 pub use report::diagnosis::{
     CandidateScore, Cause, DecayCurves, Diagnosis, FallenLaw, FitTest, FittedMaterial, FoundLaw, HeldOut,
-    HeldOutGain, Isolability, LackOfFit, LawPoint, LawSearch, RayDependence, ResidualCell, Verdict,
-    VisibleLaw,
+    HeldOutGain, Isolability, LackOfFit, LawPoint, LawSearch, MovedReflection, RayDependence, ResidualCell,
+    Verdict, VisibleLaw,
 };
 pub use simulate::scene_tracer::{EachScene, PreparedTracer, SceneTracer};
 pub use simulate::tables::{Tables, Unprepared};

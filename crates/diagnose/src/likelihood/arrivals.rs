@@ -17,11 +17,12 @@ use crate::likelihood::parameters::{ArrivalLayout, ModelTerm, ModelTerms};
 use crate::observe::observed_response::{Measured, PEAKS_S};
 use crate::simulate::traced_pair::Arrival;
 use crate::simulate::views::ArrivalView;
-use crate::survey::path_stops::path_stops;
+use crate::survey::path_stops::{path_stops, stops_over};
 use crate::survey::{Survey, SurveyedResponse};
 pub(crate) use fit::fit;
 use peak_origins::PeakOrigins;
 use sabine_scene::TimeZero;
+use std::ops::Range;
 
 /// How well the time of a direct sound can be read at [`READ_HZ`]: a third of a sample. Slower recordings are read worse.
 const DIRECT_SD_S: f64 = 2.5e-5;
@@ -235,6 +236,40 @@ impl<'a> ArrivalModel<'a> {
             }
         }
         found
+    }
+
+    /// When the predicted arrivals of a pair come, in seconds of the file that holds it.
+    pub fn times_s(&self, values: &[f64], pair: usize) -> Vec<f64> {
+        let at = self.at(values, false);
+        self.data.arrivals[pair].iter().map(|arrival| self.time_s(&at, pair, arrival)).collect()
+    }
+
+    /// Where one of them runs under fitted values, between places and over surfaces as these were found: source, reflections, receiver. Empty
+    /// where that is not known.
+    pub fn stops(&self, values: &[f64], pair: usize, arrival: &Arrival) -> Vec<[f64; 3]> {
+        let (survey, response) = (self.data.survey, &self.data.survey.responses[pair]);
+        let mirrors = self.at(values, false).mirrors;
+        let plane = |surface: &usize| {
+            let moved = mirrors.iter().rfind(|(moved, _)| moved == surface);
+            let own = &survey.surfaces[*surface];
+            moved.map_or((own.axes[0], own.centre_m), |(_, plane)| *plane)
+        };
+        if path_stops(survey, response, arrival.length_m, &arrival.surfaces).is_empty() {
+            return Vec::new();
+        }
+        let moved = |place: [f64; 3], by: Range<usize>| -> [f64; 3] {
+            std::array::from_fn(|k| place[k] + values[by.start + k])
+        };
+        let ends = [
+            moved(survey.sources[response.source].position_m, self.layout.source(response.source)),
+            moved(survey.receivers[response.receiver].position_m, self.layout.receiver(response.receiver)),
+        ];
+        stops_over(ends, &arrival.surfaces.iter().map(plane).collect::<Vec<_>>())
+    }
+
+    /// What is compared with a pair.
+    pub fn compared_with(&self, pair: usize) -> (usize, &Measured) {
+        (self.assignment[pair], &self.data.measured[self.assignment[pair]])
     }
 
     /// The same, for tests of effects.

@@ -17,6 +17,7 @@ use crate::report::diagnosis::{
     CandidateScore, Cause, Diagnosis, FitTest, FittedMaterial, HeldOutGain, LackOfFit, Verdict,
 };
 use crate::report::found_parameters::{at_bounds, parameters};
+use crate::report::moved_reflections::moved_reflections;
 use crate::report::notes::{Circumstances, notes};
 use crate::report::recording_order;
 use crate::report::residual_map::residual_map;
@@ -96,6 +97,7 @@ pub(crate) fn compose(
         bands: baseline.survey().bands,
         residuals,
         decays,
+        moved_reflections: moved_reflections(search, base, state),
         common_gain_db: common_gain.map(|index| state.energy.values[index]),
         notes,
         model,

@@ -349,6 +349,24 @@ pub struct DecayCurves {
     pub held_out: bool,
 }
 
+/// A predicted reflection that named causes bring to a peak of a response to which none comes without them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct MovedReflection {
+    /// The response that shows the peak.
+    pub response: String,
+    /// Number of surfaces that it is known to meet.
+    pub order: usize,
+    /// Where it runs as found: source, places of reflection, receiver, in metres; empty where that is not known.
+    pub stops_m: Vec<[f64; 3]>,
+    /// When it comes in the file without the causes, in ms.
+    pub stated_ms: f64,
+    /// The same under the causes.
+    pub found_ms: f64,
+    /// The peak.
+    pub measured_ms: f64,
+}
+
 /// What is wrong, why, and what mending it gains.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
@@ -381,6 +399,8 @@ pub struct Diagnosis {
     pub residuals: Vec<ResidualCell>,
     /// Decay curves at held-out positions, or at all where none could be held out.
     pub decays: Vec<DecayCurves>,
+    /// Reflections that causes of arrival times bring to peaks, the farthest moved first.
+    pub moved_reflections: Vec<MovedReflection>,
     /// Gain of the recording over the simulation, in dB, where the room file leaves it open.
     pub common_gain_db: Option<f64>,
     /// What must be said besides.

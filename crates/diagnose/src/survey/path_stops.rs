@@ -1,6 +1,6 @@
 //! Where predicted specular paths run.
 
-use super::planes::dot;
+use super::planes::{apart_m, dot};
 use super::surfaces::{minus, mirrored_in};
 use super::{Survey, SurveyedResponse};
 
@@ -15,22 +15,25 @@ pub(crate) fn path_stops(
     length_m: f64,
     surfaces: &[usize],
 ) -> Vec<[f64; 3]> {
-    let source = survey.sources[response.source].position_m;
-    let receiver = survey.receivers[response.receiver].position_m;
+    let ends = [survey.sources[response.source].position_m, survey.receivers[response.receiver].position_m];
     let plane = |surface: &usize| (survey.surfaces[*surface].axes[0], survey.surfaces[*surface].centre_m);
+    let found = stops_over(ends, &surfaces.iter().map(plane).collect::<Vec<_>>());
+    let legs = found.windows(2).map(|leg| apart_m(leg[0], leg[1]));
+    if (legs.sum::<f64>() - length_m).abs() > OFF_M { Vec::new() } else { found }
+}
+
+/// The same of a path that is mirrored in planes (unit normal and a point), from the source on; empty where it does not meet them.
+pub(crate) fn stops_over(
+    [source, receiver]: [[f64; 3]; 2],
+    planes: &[([f64; 3], [f64; 3])],
+) -> Vec<[f64; 3]> {
     let mut images = vec![source];
-    for surface in surfaces {
-        let (normal, point) = plane(surface);
-        images.push(mirrored_in(images[images.len() - 1], normal, point));
-    }
-    let far = |a: [f64; 3], b: [f64; 3]| dot(minus(a, b), minus(a, b)).sqrt();
-    if (far(images[images.len() - 1], receiver) - length_m).abs() > OFF_M {
-        return Vec::new();
+    for (normal, point) in planes {
+        images.push(mirrored_in(images[images.len() - 1], *normal, *point));
     }
     // From the receiver back, each place is where the line to the image behind the surface meets it.
     let mut found = vec![receiver];
-    for (surface, image) in surfaces.iter().zip(&images[1..]).rev() {
-        let (normal, point) = plane(surface);
+    for (&(normal, point), image) in planes.iter().zip(&images[1..]).rev() {
         let place = found[found.len() - 1];
         let (before, behind) = (dot(normal, minus(place, point)), dot(normal, minus(*image, point)));
         let share = before / (before - behind);

@@ -2,7 +2,7 @@
 
 use crate::outline::{Point, key, outlines};
 use crate::page::escape;
-use sabine::diagnose::{ExtendedModel, ExtendedRoom};
+use sabine::diagnose::{ExtendedModel, ExtendedRoom, MovedReflection};
 use sabine::scene::MeasuredRoom;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -21,10 +21,13 @@ const MOVED_M: f64 = 0.002;
 const BESIDE_M: f64 = 1e-4;
 /// Most lines of each kind that are drawn, the longest: a scan has more than a page holds, and a person sees.
 const MOST_LINES: usize = 2000;
+/// Most reflections whose paths are drawn: of more, one path would lie on another.
+const MOST_PATHS: usize = 24;
 /// Lines of the mesh as stated, as it is found, and of what it does not have there.
 const STATED: &str = "stroke=\"var(--ink)\" stroke-width=\"1\"";
 const GONE: &str = "stroke=\"var(--ink)\" stroke-width=\"1\" stroke-dasharray=\"3 4\" opacity=\"0.6\"";
 const FOUND: &str = "stroke=\"#d55e00\" stroke-width=\"2.5\"";
+const PATH: &str = "stroke=\"#0072b2\" stroke-width=\"1\" opacity=\"0.8\"";
 const ADDED: &str = "fill=\"#d55e00\" fill-opacity=\"0.3\"";
 
 /// Whether what was found has a place in the room.
@@ -91,9 +94,11 @@ impl Placed<'_> {
     }
 }
 
-/// The drawing as one `<svg>` element for a page, whose inks it takes.
-pub fn svg(room: &MeasuredRoom, found: &ExtendedRoom) -> String {
+/// The drawing as one `<svg>` element for a page, whose inks it takes, with the paths of single reflections among those that came where causes put them.
+pub fn svg(room: &MeasuredRoom, found: &ExtendedRoom, moved: &[MovedReflection]) -> String {
     let (lines, placed) = (Lines::of(room, found), all_placed(room, found));
+    let single = moved.iter().filter(|one| one.order == 1).take(MOST_PATHS);
+    let paths: Vec<&[Point]> = single.map(|one| &one.stops_m[..]).collect();
     let [stated, now] = [room.scene(), &found.scene].map(sabine::scene::Scene::bounds_m);
     let low: Point = std::array::from_fn(|k| stated[0][k].min(now[0][k]));
     let size: Point = std::array::from_fn(|k| stated[1][k].max(now[1][k]) - low[k]);
@@ -107,13 +112,15 @@ pub fn svg(room: &MeasuredRoom, found: &ExtendedRoom) -> String {
         view("from the right", [1, 2], 3.0 * MARGIN + x, upper - MARGIN),
         view("from above", [0, 1], MARGIN, lower - MARGIN),
     ];
-    let keys = keys(&lines, &placed);
+    let keys = keys(&lines, &placed, !paths.is_empty());
     let height = lower + LINE * (keys.len() as f64 + 1.5);
     let mut text = format!(
         "<svg class=\"chart\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH:.0} {height:.0}\" font-family=\"sans-serif\" font-size=\"13\" role=\"img\" aria-label=\"The room as stated and as found\">"
     );
     for view in &views {
         draw(&mut text, view, &lines, &placed);
+        let legs = paths.iter().flat_map(|stops| stops.windows(2));
+        legs.for_each(|leg| view.line(&mut text, [leg[0], leg[1]], PATH));
     }
     let (left, top) = (MARGIN, lower + 6.0);
     let _ = write!(
@@ -245,7 +252,7 @@ fn draw(text: &mut String, view: &View, lines: &Lines, placed: &[Placed<'_>]) {
 }
 
 /// Marks of the legend with their words: only of what is drawn.
-fn keys(lines: &Lines, placed: &[Placed<'_>]) -> Vec<(String, &'static str)> {
+fn keys(lines: &Lines, placed: &[Placed<'_>], has_paths: bool) -> Vec<(String, &'static str)> {
     let line = |look: &str| format!("<line x1=\"0\" y1=\"0\" x2=\"24\" y2=\"0\" {look}/>");
     let sheet = format!("<rect x=\"2\" y=\"-6\" width=\"20\" height=\"12\" {ADDED}/>");
     let of =
@@ -257,6 +264,7 @@ fn keys(lines: &Lines, placed: &[Placed<'_>]) -> Vec<(String, &'static str)> {
         (moves, line(GONE), "the mesh as stated, where it stands elsewhere"),
         (!lines.found.is_empty() && moves, line(FOUND), "the mesh as found"),
         (!lines.added.is_empty(), sheet, "what the mesh lacks: a surface, an object; or a hole"),
+        (has_paths, line(PATH), "reflections that were measured where the room as found has them"),
         (placed.iter().any(Placed::is_moved), line(FOUND), "from where it is stated to where it was found"),
         (placed.iter().any(|p| p.axis.is_some()), line(FOUND), "axis of a directional source or microphone"),
     ]
@@ -272,6 +280,7 @@ mod tests {
     use crate::demo::Demo;
     use crate::room::read_room;
     use sabine::diagnose::{BoxObject, Dimensions, ModelCause, ModelChange, RigidMotion, ThinPanel};
+    use serde_json::json;
 
     #[test]
     fn places_that_moved_together_are_drawn_where_they_are() {
@@ -281,7 +290,7 @@ mod tests {
         model.centres_hz = room.bands().iter_hz().collect();
         let motion = RigidMotion::new([0.05, -0.05, 0.02], 1.0, room.sources()[0].position_m);
         model.causes.push(ModelCause::new("coordinate_shift", vec![ModelChange::CoordinateShift(motion)]));
-        let drawn = svg(&room, &model.room(&room).unwrap());
+        let drawn = svg(&room, &model.room(&room).unwrap(), &[]);
         assert!(has_a_place(&model) && drawn.contains("from where it is stated"));
         // Each place twice, in three views.
         let (sources, receivers) = (room.sources().len(), room.receivers().len());
@@ -299,7 +308,7 @@ mod tests {
         let material = room.scene().materials()[0].name.clone();
         let object = BoxObject::new([x + 0.4, y + 0.4, z], [0.4, 0.4, 0.3], 0.0, material);
         model.causes.push(ModelCause::new("missing_object", vec![ModelChange::Object(object)]));
-        let drawn = svg(&room, &model.room(&room).unwrap());
+        let drawn = svg(&room, &model.room(&room).unwrap(), &[]);
         assert!(has_a_place(&model) && drawn.contains("what the mesh lacks"));
         // Two triangles on each of six sides, in three views.
         assert_eq!(drawn.matches("<polygon").count(), 36);
@@ -321,7 +330,7 @@ mod tests {
             "a",
             vec![ModelChange::Position { id: source.id.clone(), position_m: there }],
         ));
-        let unaltered = svg(&room, &model.room(&room).unwrap());
+        let unaltered = svg(&room, &model.room(&room).unwrap(), &[]);
         assert!(has_a_place(&model) && unaltered.contains("from where it is stated"));
         assert!(!unaltered.contains("<polygon") && !unaltered.contains("the mesh as found"));
 
@@ -330,7 +339,7 @@ mod tests {
         model
             .causes
             .push(ModelCause::new("b", vec![ModelChange::Panel(panel), ModelChange::Dimensions(size)]));
-        let drawn = svg(&room, &model.room(&room).unwrap());
+        let drawn = svg(&room, &model.room(&room).unwrap(), &[]);
         // Two triangles in each of three views.
         assert_eq!(drawn.matches("<polygon").count(), 6);
         let lines = (0..=MOST_LINES).map(|i| [[0.0; 3], [i as f64, 0.0, 0.0]]).collect();
@@ -339,6 +348,17 @@ mod tests {
         assert!(is_along([[0.0; 3], [1.0, 0.0, 0.0]], [[1.5, 0.0, 0.0], [0.2, 0.0, 0.0]]));
         assert!(!is_along([[0.0; 3], [1.0, 0.0, 0.0]], [[1.5, 0.0, 0.0], [1.2, 0.0, 0.0]]));
         assert!(!is_along([[0.0; 3], [1.0, 0.0, 0.0]], [[0.0; 3], [1.0, 0.01, 0.0]]));
+        assert!(!drawn.contains("reflections that were measured"));
+        let [low, high] = [low, high].map(|corner| corner.to_vec());
+        let moved = |order: usize| -> MovedReflection {
+            let text = json!({ "response": "a", "order": order, "stops_m": [there, low, high], "stated_ms": 1.0, "found_ms": 2.0, "measured_ms": 2.0 });
+            serde_json::from_value(text).unwrap()
+        };
+        let found = model.room(&room).unwrap();
+        let paths = svg(&room, &found, &[moved(1), moved(2)]);
+        // Two legs of one path in three views, and its mark in the legend.
+        assert_eq!(paths.matches(PATH).count(), 7);
+        assert!(paths.contains("reflections that were measured"));
         for part in ["the mesh as stated", "the mesh as found", "what the mesh lacks", &source.id] {
             assert!(drawn.contains(part), "{part}");
         }

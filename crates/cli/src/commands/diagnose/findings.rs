@@ -2,7 +2,7 @@
 
 use sabine::diagnose::{
     CandidateScore, Cause, DecayCurves, Diagnosis, FittedMaterial, FoundLaw, HeldOut, Isolability, LackOfFit,
-    LawSearch, ResidualCell, Verdict,
+    LawSearch, MovedReflection, ResidualCell, Verdict,
 };
 use serde::{Deserialize, Serialize};
 
@@ -31,6 +31,8 @@ pub struct Findings {
     pub held_out: Option<HeldOut>,
     pub residuals: Vec<ResidualCell>,
     pub decays: Vec<DecayCurves>,
+    #[serde(default)]
+    pub moved_reflections: Vec<MovedReflection>,
     pub common_gain_db: Option<f64>,
     pub notes: Vec<String>,
     pub seconds: Vec<(String, f64)>,
@@ -63,6 +65,7 @@ impl Findings {
             held_out: diagnosis.held_out,
             residuals: diagnosis.residuals,
             decays: diagnosis.decays,
+            moved_reflections: diagnosis.moved_reflections,
             common_gain_db: diagnosis.common_gain_db,
             notes: diagnosis.notes,
             seconds: diagnosis.seconds,

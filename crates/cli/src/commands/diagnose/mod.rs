@@ -154,7 +154,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let json = findings::json(&diagnosis, &name, responses, receivers, threshold_nats)?;
     out.write("diagnosis.json", json.as_bytes())?;
     let drawn = found.as_ref().ok().filter(|_| drawing::has_a_place(&diagnosis.model));
-    let drawing = drawn.map(|found| drawing::svg(&room, found));
+    let drawing = drawn.map(|found| drawing::svg(&room, found, &diagnosis.moved_reflections));
     let findings = Findings::new(diagnosis, name, responses, receivers, threshold_nats);
     out.write("report.html", report::html(&findings, drawing.as_deref())?.as_bytes())?;
     out.write("extended_model.toml", model.as_bytes())?;

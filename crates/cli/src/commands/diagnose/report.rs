@@ -26,6 +26,9 @@ const WORTH_SAYING_NATS: f64 = 0.5;
 /// 1.645 standard errors either side: a 90 % interval.
 const NORMAL_90: f64 = 1.645;
 
+/// Rows of the table of reflections, at most.
+const MOST_ROWS: usize = 12;
+
 /// The report as one HTML file, with a drawing of the room where what was found has a place.
 pub fn html(findings: &Findings, drawing: Option<&str>) -> Result<String> {
     let mut page = Page::new("What the simulation gets wrong");
@@ -55,6 +58,7 @@ pub fn html(findings: &Findings, drawing: Option<&str>) -> Result<String> {
         page.markup(drawing);
         page.paragraph("The mesh as found is in extended_mesh.obj, in metres and z up, and with its materials in extended_mesh.glb (glTF).");
     }
+    reflections(&mut page, findings);
     held_out::section(&mut page, findings);
     residuals(&mut page, findings)?;
     evidence(&mut page, findings);
@@ -66,6 +70,32 @@ pub fn html(findings: &Findings, drawing: Option<&str>) -> Result<String> {
     times.extend(findings.seconds.iter().map(|(stage, s)| vec![stage.clone(), format!("{s:.2}")]));
     page.table(&times);
     Ok(page.html())
+}
+
+/// Reflections that came where the causes put them, as a person finds them in the files.
+fn reflections(page: &mut Page, findings: &Findings) {
+    let all = &findings.moved_reflections;
+    if all.is_empty() {
+        return;
+    }
+    page.heading("Reflections that tell it");
+    page.paragraph(
+        "At these times the files have a peak to which no reflection of the room as stated comes, and one of the room as found does. Places and latency are fitted in both; the farthest moved come first.",
+    );
+    let mut rows = vec![
+        ["Response", "Reflections", "As stated, ms", "As found, ms", "Measured, ms"]
+            .map(str::to_owned)
+            .to_vec(),
+    ];
+    rows.extend(all.iter().take(MOST_ROWS).map(|one| {
+        let order = if one.order > 0 { one.order.to_string() } else { "not known".to_owned() };
+        let times = [one.stated_ms, one.found_ms, one.measured_ms].map(|ms| format!("{ms:.2}"));
+        [one.response.clone(), order].into_iter().chain(times).collect()
+    }));
+    page.table(&rows);
+    if all.len() > MOST_ROWS {
+        page.paragraph(&format!("{} more are in diagnosis.json.", all.len() - MOST_ROWS));
+    }
 }
 
 fn next_measurements(page: &mut Page, findings: &Findings) {

@@ -61,6 +61,18 @@ fn what_a_cause_may_concern_as_well_is_told() {
 }
 
 #[test]
+fn reflections_that_tell_a_cause_are_listed_the_farthest_moved_first() {
+    let one = |i: usize| json!({ "response": format!("s-<r{i}>"), "order": i % 2, "stops_m": [], "stated_ms": 10.0, "found_ms": 11.234, "measured_ms": 11.25 });
+    let all: Vec<Value> = (0..14).map(one).collect();
+    let page = html(&findings("explained", &json!({ "moved_reflections": all })), None).unwrap();
+    assert!(page.contains("Reflections that tell it") && page.contains("2 more are in diagnosis.json."));
+    assert!(
+        page.contains("<td>s-&lt;r0&gt;</td><td>not known</td><td>10.00</td><td>11.23</td><td>11.25</td>")
+    );
+    assert!(!html(&findings("explained", &json!({})), None).unwrap().contains("Reflections that tell it"));
+}
+
+#[test]
 fn each_verdict_says_what_it_means() {
     let page = html(&findings("adequate", &json!({ "causes": [] })), None).unwrap();
     assert!(page.contains("The simulation explains this measurement.") && !page.contains("What was found"));
