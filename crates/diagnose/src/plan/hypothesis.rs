@@ -64,12 +64,12 @@ impl OpenQuestion {
             Some((last, sure)) => (Some(last.clone()), sure.to_vec()),
             None => (None, Vec::new()),
         };
-        let others = ranked.iter().filter(|r| !causes.iter().any(|c| c.effect == r.effect));
-        let others: Vec<Hypothesis> = if alternatives.is_empty() {
-            others.cloned().collect()
-        } else {
-            others.filter(|r| alternatives.contains(&r.effect)).cloned().collect()
-        };
+        let is_other = |r: &&Hypothesis| !causes.iter().any(|c| c.effect == r.effect);
+        let others: Vec<Hypothesis> = ranked.iter().filter(is_other).cloned().collect();
+        let in_set: Vec<Hypothesis> =
+            others.iter().filter(|r| alternatives.contains(&r.effect)).cloned().collect();
+        // No measurement is planned for a law that did not stand: where it is all of the set, the strongest others are asked about.
+        let others = if in_set.is_empty() { others } else { in_set };
         let leading = last.into_iter().chain(others).take(Self::MAX_LEADING).collect();
         Self { sure, leading }
     }
@@ -176,6 +176,9 @@ mod tests {
         let ranked = [a.clone(), b.clone(), c.clone(), d.clone()];
         let found = OpenQuestion::of_diagnosis(&[d.clone(), b.clone()], &["b".into(), "c".into()], &ranked);
         assert_eq!(found, OpenQuestion { sure: vec![d.clone()], leading: vec![b.clone(), c.clone()] });
+        let with_law = ["b".into(), "unknown_law".into()];
+        let beside_law = OpenQuestion::of_diagnosis(std::slice::from_ref(&b), &with_law, &ranked);
+        assert_eq!(beside_law, OpenQuestion::of_diagnosis(std::slice::from_ref(&b), &[], &ranked));
         let found = OpenQuestion::of_diagnosis(std::slice::from_ref(&b), &[], &ranked);
         assert_eq!(found.leading, [b, a.clone(), c.clone()]);
         let found = OpenQuestion::of_diagnosis(&[], &[], &ranked[2..]);
