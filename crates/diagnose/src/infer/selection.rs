@@ -58,7 +58,7 @@ pub(crate) struct Open {
     pub others: bool,
 }
 
-pub(crate) fn is_of_decays(cases: &[CatalogueCase], candidate: usize) -> bool {
+pub(super) fn is_of_decays(cases: &[CatalogueCase], candidate: usize) -> bool {
     cases[candidate].case.observable() == Observable::Decay
 }
 

@@ -1,6 +1,7 @@
 //! Reflections that causes of arrival times bring to peaks of the responses.
 
-use crate::effect::Observable;
+use crate::effect::{Effect, Observable};
+use crate::effects::{CoordinateShift, RoomDimensions};
 use crate::infer::search::{Search, State};
 use crate::likelihood::arrivals::at_fit;
 use crate::report::diagnosis::MovedReflection;
@@ -19,6 +20,11 @@ pub(crate) fn moved_reflections(search: &Search<'_>, base: &State, state: &State
     if cases.is_empty() {
         return Vec::new();
     }
+    // Walls and places that move all together are not in the mirrors and offsets of the fit: where paths run between them is not told.
+    let moves_all = |&c: &usize| {
+        [CoordinateShift.id(), RoomDimensions.id()].iter().any(|id| id == search.candidates[c].id)
+    };
+    let is_followed = !state.chosen.iter().any(moves_all);
     let (without, with) = (at_fit(&data, &[], &search.used), at_fit(&data, &cases, &search.used));
     let mut found: Vec<MovedReflection> = Vec::new();
     for (pair, arrivals) in baseline.simulation.arrivals.iter().enumerate().filter(|(p, _)| search.used[*p]) {
@@ -35,7 +41,11 @@ pub(crate) fn moved_reflections(search: &Search<'_>, base: &State, state: &State
             Some(MovedReflection {
                 response: survey.responses[response].name.clone(),
                 order: arrivals[i].surfaces.len(),
-                stops_m: with.stops(&state.arrivals.values, pair, &arrivals[i]),
+                stops_m: if is_followed {
+                    with.stops(&state.arrivals.values, pair, &arrivals[i])
+                } else {
+                    Vec::new()
+                },
                 stated_ms: 1e3 * stated_s[i],
                 found_ms: 1e3 * found_s[i],
                 measured_ms: 1e3 * peak_s,

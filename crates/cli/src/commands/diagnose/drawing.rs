@@ -23,7 +23,7 @@ const BESIDE_M: f64 = 1e-4;
 const MOST_LINES: usize = 2000;
 /// Most reflections whose paths are drawn: of more, one path would lie on another.
 const MOST_PATHS: usize = 24;
-/// Lines of the mesh as stated, as it is found, and of what it does not have there.
+/// Lines of the mesh as stated, as it is found, of reflections, and of what it does not have there.
 const STATED: &str = "stroke=\"var(--ink)\" stroke-width=\"1\"";
 const GONE: &str = "stroke=\"var(--ink)\" stroke-width=\"1\" stroke-dasharray=\"3 4\" opacity=\"0.6\"";
 const FOUND: &str = "stroke=\"#d55e00\" stroke-width=\"2.5\"";
@@ -97,7 +97,7 @@ impl Placed<'_> {
 /// The drawing as one `<svg>` element for a page, whose inks it takes, with the paths of single reflections among those that came where causes put them.
 pub fn svg(room: &MeasuredRoom, found: &ExtendedRoom, moved: &[MovedReflection]) -> String {
     let (lines, placed) = (Lines::of(room, found), all_placed(room, found));
-    let single = moved.iter().filter(|one| one.order == 1).take(MOST_PATHS);
+    let single = moved.iter().filter(|one| one.order == 1 && !one.stops_m.is_empty()).take(MOST_PATHS);
     let paths: Vec<&[Point]> = single.map(|one| &one.stops_m[..]).collect();
     let [stated, now] = [room.scene(), &found.scene].map(sabine::scene::Scene::bounds_m);
     let low: Point = std::array::from_fn(|k| stated[0][k].min(now[0][k]));
