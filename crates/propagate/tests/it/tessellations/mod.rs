@@ -140,7 +140,7 @@ pub struct PlainSearch {
 /// What a ray meets.
 pub struct Met {
     pub distance: f64,
-    /// Least distance of the point from the edges of its triangle, in metres: negative outside.
+    /// As [`PlainSearch::depth_m`] says.
     pub depth_m: f64,
     pub triangle: usize,
     pub cosine: f64,
@@ -165,18 +165,24 @@ impl PlainSearch {
         dot(*normal, minus(point, *a)).abs()
     }
 
+    /// Least distance of a point of its plane from the edges of a triangle, in metres: negative outside.
+    pub fn depth_m(&self, triangle: usize, point: Vec3) -> f64 {
+        let ([a, b, c], normal) = &self.triangles[triangle];
+        let depth = |p: &Vec3, q: &Vec3| dot(cross(*normal, unit(minus(*q, *p))), minus(point, *p));
+        depth(a, b).min(depth(b, c)).min(depth(c, a))
+    }
+
     /// Everything that a ray meets, or passes no farther from than a micrometre.
     pub fn all(&self, origin: Vec3, direction: Vec3) -> Vec<Met> {
         let mut met = Vec::new();
-        for (triangle, ([a, b, c], normal)) in self.triangles.iter().enumerate() {
+        for (triangle, ([a, ..], normal)) in self.triangles.iter().enumerate() {
             let cosine = dot(*normal, direction);
             let distance = dot(*normal, minus(*a, origin)) / cosine;
             if cosine.abs() < 1e-9 || distance.is_nan() || distance <= 0.0 {
                 continue;
             }
             let point: Vec3 = std::array::from_fn(|k| origin[k] + distance * direction[k]);
-            let depth = |p: &Vec3, q: &Vec3| dot(cross(*normal, unit(minus(*q, *p))), minus(point, *p));
-            let depth_m = depth(a, b).min(depth(b, c)).min(depth(c, a));
+            let depth_m = self.depth_m(triangle, point);
             if depth_m > -1e-6 {
                 met.push(Met { distance, depth_m, triangle, cosine: cosine.abs() });
             }
