@@ -35,8 +35,11 @@ impl Grammar {
     pub fn of(survey: &Survey) -> Self {
         let covariates = covariates(survey);
         let band_laws = BandLaw::all(survey.bands().len());
+        // What changes the gain of a recording does so in all octaves.
+        let of_waves = [(BandLaw::Same, 1.0)];
         let of_covariate = |(covariate, own): (usize, &Covariate)| {
             let share = own.share;
+            let band_laws = if own.cycle_s().is_some() { &of_waves[..] } else { &band_laws };
             let one = move |&(bands, of_bands): &(BandLaw, f64)| Formula {
                 covariate,
                 bands,
@@ -155,6 +158,13 @@ fn words(covariate: &Covariate, law: BandLaw, bands: Bands, fitted: &[LawParamet
         let and = if amplitude.is_empty() { "loses" } else { ", and" };
         format!("{and} {:.1} dB {} more from octave to octave", p.value, interval(p))
     });
+    if let Some(cycle_s) = covariate.cycle_s() {
+        let LawParameter { value, low, high, .. } = fitted[0];
+        // Less than nothing is half a cycle later.
+        let [low, high] = if value < 0.0 { [-high, -low] } else { [low, high] };
+        let size = format!("{:.1} dB [{low:.1}, {high:.1}]", value.abs());
+        return format!("The gain of the recording swells and sinks by {size}, once in {cycle_s:.2} s.");
+    }
     let place = law.words(bands);
     format!("{one} {amplitude}{slope} where {} is 1, and in proportion elsewhere{place}.", covariate.text())
 }

@@ -92,14 +92,22 @@ pub(crate) fn trials(
         let cases = search.cases_of(&rest, Observable::Decay);
         let family = Family { grammar: &grammar, features: &features, from_band: 0, shams: true };
         let screen = LawScreen::of(search.baseline, family, &cases, &without.energy, &search.used);
-        let others = screen.not_told_from(formula).into_iter().take(MAX_LISTED);
+        let others =
+            screen.not_told_from(formula).into_iter().map(|f| grammar.subject(&grammar.formulas[f], survey));
+        // Waves of one cycle have one name, wherever they begin.
+        let mut not_told_from: Vec<String> = Vec::new();
+        for other in others {
+            if not_told_from.len() < MAX_LISTED && !not_told_from.contains(&other) {
+                not_told_from.push(other);
+            }
+        }
         let ln_prior = grammar.formulas[formula].ln_prior;
         found.push(Trial {
             candidate,
             nats: state.energy.log_evidence - without.energy.log_evidence + ln_prior,
             family_p: screen.family_p(formula),
             sham: best_sham(search, (&grammar, &features, &screen), &cases, &without)?,
-            not_told_from: others.map(|f| grammar.subject(&grammar.formulas[f], survey)).collect(),
+            not_told_from,
             vault_gain_nats: None,
         });
     }

@@ -30,9 +30,17 @@ pub(crate) fn visible_from(search: &Search<'_>, state: &State) -> Result<Vec<(St
         let db = PLAIN_D_PRIME * screen.sd_db(formula);
         (db < BEYOND_DB).then_some(db)
     };
-    let words = |formula: usize| grammar.covariates[grammar.formulas[formula].covariate].words();
-    let mut found: Vec<(String, Option<f64>)> = plain.map(|f| (words(f), from_db(f))).collect();
     let place = |db: Option<f64>| db.unwrap_or(f64::INFINITY);
+    let mut found: Vec<(String, Option<f64>)> = Vec::new();
+    for formula in plain {
+        let (words, db) = (grammar.covariates[grammar.formulas[formula].covariate].words(), from_db(formula));
+        // Waves of one cycle have one name: where they begin is known only once one is found.
+        match found.iter_mut().find(|(known, _)| *known == words) {
+            Some((_, most)) if place(db) > place(*most) => *most = db,
+            Some(_) => {}
+            None => found.push((words, db)),
+        }
+    }
     found.sort_by(|a, b| place(a.1).total_cmp(&place(b.1)));
     Ok(found)
 }
