@@ -59,7 +59,7 @@ pub use time_zero::TimeZeroOffset;
 pub use transducer_response::TransducerResponse;
 pub use truncation::Truncation;
 pub use unknown_law::UnknownLaw;
-pub(crate) use unknown_law::{BandLaw, Covariate, Formula, Grammar};
+pub(crate) use unknown_law::{BandLaw, Covariate, Formula, Grammar, Wave};
 
 use crate::effect::Effect;
 

@@ -198,7 +198,8 @@ pub struct FoundLaw {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct LawPoint {
-    /// What the law goes with: the mean over the paths of the bins, by energy; over all their meetings, for a law of reflections.
+    /// What the law goes with: the mean over the paths of the bins, by energy; over all their meetings, for a law of reflections; seconds
+    /// since the emission, where a gain swells and sinks along the recording.
     pub covariate: f64,
     /// Measured over predicted energy in dB, the law left out and all else as fitted beside it.
     pub left_db: f64,

@@ -91,6 +91,8 @@ fn rows(law: &FoundLaw) -> Vec<Vec<String>> {
 fn goes_with(law: &FoundLaw) -> &'static str {
     if law.formula.contains("recording_order") {
         "Number in the order of the recordings, from 0"
+    } else if law.formula.contains("sin(w * file_time_s") {
+        "Time since the emission (s)"
     } else {
         "What the law goes with (mean over the paths of a bin)"
     }

@@ -1,12 +1,12 @@
 //! What a law may go with.
 
+use super::wave::{WAVE, Wave};
 use crate::survey::{LEAST_RECORDINGS, Survey};
 use sabine_paths::laws::{Law, LawError, LawParameter, LawTarget};
 use sabine_scene::Levels;
-use std::f64::consts::{PI, TAU};
 
 /// A number in a covariate: name, value and unit.
-type Scale = (&'static str, f64, &'static str);
+pub(super) type Scale = (&'static str, f64, &'static str);
 
 /// A pure number by name, and lengths and times in it.
 #[derive(Clone, Copy, Debug)]
@@ -18,7 +18,7 @@ pub(crate) struct Form {
     meaning: &'static str,
 }
 
-const fn form(name: &'static str, text: &'static str) -> Form {
+pub(super) const fn form(name: &'static str, text: &'static str) -> Form {
     scaled(name, text, &[])
 }
 
@@ -89,13 +89,6 @@ pub(crate) const OF_ORDER: [Form; 2] = [
         meaning: ", 0 in the first recording and nearly 1 from the middle on",
     },
 ];
-/// A course along the recording that swells and sinks: a sum of few says any. `w` is what goes on in a second, `p` where it begins, both in radians.
-const WAVE: Form = form("wave", "sin(w * file_time_s + p)");
-/// Half cycles within the time for which a recording sounds, at most. What is compared ends before that.
-const MOST_HALF_CYCLES: usize = 10;
-/// Where a wave begins, in radians: a sine and a cosine first, and what is made of both. At worst a wave begins an eighth of half a cycle from the
-/// next of these: its cosine with it is 0.92.
-const BEGINNINGS: [f64; 4] = [0.0, 0.5 * PI, 0.25 * PI, 0.75 * PI];
 /// Shares of the probability beforehand: reflections, single quantities of paths, products of two, recordings.
 const SHARES: [f64; 4] = [0.4, 0.3, 0.1, 0.2];
 
@@ -107,6 +100,8 @@ pub(crate) struct Covariate {
     pub forms: Vec<Form>,
     /// Numbers in it that are those of the room.
     scales: Vec<Scale>,
+    /// What it is as a course along the recording, if it is one.
+    pub wave: Option<Wave>,
     /// Whether it may add as well as take: not where paths meet it a hundred times.
     pub both_signs: bool,
     /// Its share of the probability beforehand; the shares of all sum to one.
@@ -126,6 +121,7 @@ pub(crate) fn covariates(survey: &Survey) -> Vec<Covariate> {
             surface: surface.clone(),
             forms: vec![form],
             scales: Vec::new(),
+            wave: None,
             both_signs: false,
             share: of_reflections,
         })
@@ -135,6 +131,7 @@ pub(crate) fn covariates(survey: &Survey) -> Vec<Covariate> {
         surface: None,
         forms,
         scales: Vec::new(),
+        wave: None,
         both_signs: true,
         share,
     };
@@ -146,33 +143,20 @@ pub(crate) fn covariates(survey: &Survey) -> Vec<Covariate> {
     all.extend(PRODUCTS.iter().map(product));
     let order = order_of_recordings(survey);
     let of_order = if order.is_some() { &OF_ORDER[..] } else { &[] };
-    let cycles_s = cycles_s(survey);
-    let share = each(3, OF_RECORDINGS.len() + of_order.len() + usize::from(!cycles_s.is_empty()));
+    let waves = Wave::all(survey);
+    let share = each(3, OF_RECORDINGS.len() + of_order.len() + usize::from(!waves.is_empty()));
     all.extend(OF_RECORDINGS.iter().map(|f| plain(LawTarget::Recorder, vec![*f], share)));
     let scales = order.map_or_else(Vec::new, Vec::from);
     all.extend(of_order.iter().map(|f| {
         let of_recordings = plain(LawTarget::Recorder, vec![*f], share);
         Covariate { scales: scales.clone(), ..of_recordings }
     }));
-    let waves: Vec<(f64, f64)> =
-        cycles_s.iter().flat_map(|&cycle_s| BEGINNINGS.map(|begins| (cycle_s, begins))).collect();
-    all.extend(waves.iter().map(|&(cycle_s, begins)| Covariate {
-        scales: vec![("w", TAU / cycle_s, "rad/s"), ("p", begins, "rad")],
+    all.extend(waves.iter().map(|wave| Covariate {
+        scales: wave.scales().to_vec(),
+        wave: Some(*wave),
         ..plain(LawTarget::Recorder, vec![WAVE], share / waves.len() as f64)
     }));
     all
-}
-
-/// Cycles of the waves, in seconds: the time for which most recordings sound holds so many halves of each.
-fn cycles_s(survey: &Survey) -> Vec<f64> {
-    let mut sounds_s: Vec<f64> =
-        survey.responses().iter().map(|r| r.sounds_until_s).filter(|s| *s > 0.0).collect();
-    if sounds_s.is_empty() {
-        return Vec::new();
-    }
-    sounds_s.sort_by(f64::total_cmp);
-    let usual_s = sounds_s[sounds_s.len() / 2];
-    (1..=MOST_HALF_CYCLES).map(|halves| 2.0 * usual_s / halves as f64).collect()
 }
 
 /// The first of the recordings and what lies between it and the last, where the order of all is stated and levels mean something.
@@ -195,17 +179,6 @@ impl Covariate {
         Self { forms: vec![form], ..self.clone() }
     }
 
-    /// Its cycle in seconds, if it is a wave.
-    pub fn cycle_s(&self) -> Option<f64> {
-        self.scales.iter().find(|(name, ..)| *name == "w").map(|(_, in_a_second, _)| TAU / in_a_second)
-    }
-
-    /// What a wave has of the sine and of the cosine of its cycle.
-    pub fn of_sine_and_cosine(&self) -> Option<[f64; 2]> {
-        let begins = self.scales.iter().find(|(name, ..)| *name == "p")?.1;
-        Some([begins.cos(), begins.sin()])
-    }
-
     /// Whether it asks where paths go or come from.
     pub fn has_direction(&self) -> bool {
         let ends = ["departure", "arrival"];
@@ -225,10 +198,7 @@ impl Covariate {
         let surface = self.surface.as_deref();
         let letters = surface.unwrap_or_default().chars().filter(char::is_ascii_alphanumeric).take(40);
         let mut name = self.forms.iter().map(|form| form.name).collect::<Vec<_>>().join("_");
-        if let (Some(cycle_s), Some([sine, cosine])) = (self.cycle_s(), self.of_sine_and_cosine()) {
-            let begins_deg = cosine.atan2(sine).to_degrees();
-            name = format!("{name}_{:.0}_ms_{begins_deg:.0}_deg", 1000.0 * cycle_s);
-        }
+        name.extend(self.wave.map(Wave::id));
         let id: String = name.chars().chain(surface.map(|_| '_')).chain(letters).collect();
         Law::new(id, self.target, surface, &formula, parameters.into_iter().chain(own))
     }
@@ -246,9 +216,7 @@ impl Covariate {
             None => "the level of paths goes".to_owned(),
         };
         let mut meaning: String = self.forms.iter().map(|form| form.meaning).collect();
-        if let Some(cycle_s) = self.cycle_s() {
-            meaning = format!(", a cycle of {cycle_s:.2} s");
-        }
+        meaning.extend(self.wave.map(|wave| format!(", a cycle of {:.2} s", wave.cycle_s())));
         format!("{what} with {}{meaning}", self.text())
     }
 }

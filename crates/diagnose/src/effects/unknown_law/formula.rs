@@ -2,6 +2,7 @@
 
 use super::band_law::{BandLaw, BandTerm};
 use super::covariate::{Covariate, covariates};
+use super::wave::{FittedWave, Wave};
 use crate::effect::{Case, DecayTerm, FittedCase, Parameter, Stage};
 use crate::effects::law_effect::tabulated_law::TabulatedLaw;
 use crate::extend::model_change::ModelChange;
@@ -13,7 +14,7 @@ use sabine_acoustics::Bands;
 use sabine_paths::laws::{Law, LawError, LawParameter, LawTarget};
 
 /// Logarithm of energy in one decibel.
-const LN_PER_DB: f64 = std::f64::consts::LN_10 / 10.0;
+pub(super) const LN_PER_DB: f64 = std::f64::consts::LN_10 / 10.0;
 
 /// A covariate (index) and how its amplitude goes with the octave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +40,7 @@ impl Grammar {
         let of_waves = [(BandLaw::Same, 1.0)];
         let of_covariate = |(covariate, own): (usize, &Covariate)| {
             let share = own.share;
-            let band_laws = if own.cycle_s().is_some() { &of_waves[..] } else { &band_laws };
+            let band_laws = if own.wave.is_some() { &of_waves[..] } else { &band_laws };
             let one = move |&(bands, of_bands): &(BandLaw, f64)| Formula {
                 covariate,
                 bands,
@@ -60,6 +61,9 @@ impl Grammar {
     /// A formula as a case.
     pub fn case(&self, formula: &Formula, survey: &Survey) -> Result<Case, LawError> {
         let covariate = &self.covariates[formula.covariate];
+        if let Some(wave) = covariate.wave {
+            return Ok(self.wave_case(formula, wave, survey));
+        }
         let amplitude = self.amplitude(formula, survey);
         let law = TabulatedLaw::new(covariate.unit_law()?, 0, amplitude.range_db);
         let found = found(covariate.clone(), formula.bands, survey.bands());
@@ -75,6 +79,26 @@ impl Grammar {
             .at(stage)
             .starting(starts)
             .changing(changes))
+    }
+
+    /// A wave as a case: its cycle and its beginning are fitted with its amplitude.
+    fn wave_case(&self, formula: &Formula, wave: Wave, survey: &Survey) -> Case {
+        let mut parameters = self.parameters(formula, survey);
+        let begin: Vec<f64> = wave.parameters().iter().map(|p| p.neutral).collect();
+        let starts = starts(&parameters).into_iter().map(|own| [own, begin.clone()].concat()).collect();
+        parameters.extend(wave.parameters());
+        let changes = move |fitted: &FittedCase<'_>| {
+            let parameter = |(i, unit): (usize, &'static str)| {
+                LawParameter::new(fitted.values()[i], fitted.interval(i), unit)
+            };
+            let law = wave.law([(0, "dB"), (1, "rad/s"), (2, "rad")].map(parameter));
+            law.map_or_else(|_| Vec::new(), |law| vec![ModelChange::Law(Box::new(law))])
+        };
+        Case::decay(parameters, FittedWave)
+            .about(self.subject(formula, survey))
+            .at(self.stage(formula))
+            .starting(starts)
+            .changing(changes)
     }
 
     /// A formula with these numbers for its covariate, `[pair][band][bin]`: one for each bin in the place of one for each path.
@@ -158,13 +182,6 @@ fn words(covariate: &Covariate, law: BandLaw, bands: Bands, fitted: &[LawParamet
         let and = if amplitude.is_empty() { "loses" } else { ", and" };
         format!("{and} {:.1} dB {} more from octave to octave", p.value, interval(p))
     });
-    if let Some(cycle_s) = covariate.cycle_s() {
-        let LawParameter { value, low, high, .. } = fitted[0];
-        // Less than nothing is half a cycle later.
-        let [low, high] = if value < 0.0 { [-high, -low] } else { [low, high] };
-        let size = format!("{:.1} dB [{low:.1}, {high:.1}]", value.abs());
-        return format!("The gain of the recording swells and sinks by {size}, once in {cycle_s:.2} s.");
-    }
     let place = law.words(bands);
     format!("{one} {amplitude}{slope} where {} is 1, and in proportion elsewhere{place}.", covariate.text())
 }
@@ -247,7 +264,11 @@ mod tests {
         let grammar = Grammar::of(&survey);
         for formula in &grammar.formulas {
             let case = grammar.case(formula, &survey).unwrap();
-            let fitted: Vec<f64> = case.parameters.iter().map(|p| 0.3 * p.bounds.1).collect();
+            let terms = formula.bands.terms(&survey);
+            // Those of a wave behind its amplitude stay as they are.
+            let value =
+                |(i, p): (usize, &Parameter)| if i < terms.len() { 0.3 * p.bounds.1 } else { p.neutral };
+            let fitted: Vec<f64> = case.parameters.iter().enumerate().map(value).collect();
             let changes = case.model_changes(&FittedCase::of_values(&survey, &fitted));
             let [ModelChange::Law(law)] = changes.as_slice() else { panic!("{changes:?}") };
             let covariate = &grammar.covariates[formula.covariate];
@@ -256,7 +277,6 @@ mod tests {
                 other => Some(0.4 + 0.01 * other.len() as f64),
             };
             let unit = covariate.unit_law().unwrap().value(variable).unwrap();
-            let terms = formula.bands.terms(&survey);
             for (band, hz) in survey.bands().iter_hz().enumerate() {
                 let sum: f64 = terms.iter().zip(&fitted).map(|(t, x)| t.shares[band] * x).sum();
                 let expected = unit * sum.clamp(covariate.least_db(), crate::effects::unknown_law::MOST_DB);

@@ -3,10 +3,12 @@
 mod band_law;
 mod covariate;
 mod formula;
+mod wave;
 
 pub(crate) use band_law::BandLaw;
 pub(crate) use covariate::Covariate;
 pub(crate) use formula::{Formula, Grammar};
+pub(crate) use wave::Wave;
 
 use crate::effect::next_measurement::NextMeasurement;
 use crate::effect::{Case, Effect, EffectInfo};

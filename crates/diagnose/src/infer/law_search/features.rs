@@ -1,7 +1,7 @@
 //! What each covariate is in each bin: the change of a bin's energy with the coefficient of a law is the energy-weighted mean of what the
 //! law takes from its paths. All are gathered in one pass, so that formulas cost nothing more.
 
-use crate::effects::{Covariate, Grammar};
+use crate::effects::{Covariate, Grammar, Wave};
 use crate::error::Error;
 use crate::infer::baseline::Baseline;
 use crate::simulate::traced_pair::class_sums::ClassedPaths;
@@ -108,7 +108,7 @@ fn of_pair(
     let count = grammar.covariates.iter().take_while(|c| c.target == LawTarget::Reflection).count();
     let (of_reflections, others) = grammar.covariates.split_at(count);
     let (others, waves) =
-        others.split_at(others.iter().position(|c| c.cycle_s().is_some()).unwrap_or(others.len()));
+        others.split_at(others.iter().position(|c| c.wave.is_some()).unwrap_or(others.len()));
     let mut numbers = of_surfaces(pair, of_reflections)?;
     // A product is that of its forms.
     let mut forms: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
@@ -129,12 +129,13 @@ fn of_pair(
     }
     // Each column as a sum of numbers of paths: waves of one cycle are made of its sine and its cosine.
     let mut made_of: Vec<Vec<(usize, f64)>> = (0..numbers.len()).map(|n| vec![(n, 1.0)]).collect();
-    for of_cycle in waves.chunk_by(|a, b| a.cycle_s() == b.cycle_s()) {
+    let cycle_s = |wave: &Covariate| wave.wave.map(Wave::cycle_s);
+    for of_cycle in waves.chunk_by(|a, b| cycle_s(a) == cycle_s(b)) {
         let [sine, cosine] = [numbers.len(), numbers.len() + 1];
         for wave in of_cycle.iter().take(2) {
             numbers.push(quantities.taken(wave, None)?.into_iter().map(|x| x as f32).collect());
         }
-        let shares = of_cycle.iter().filter_map(Covariate::of_sine_and_cosine);
+        let shares = of_cycle.iter().filter_map(|w| w.wave).map(Wave::of_sine_and_cosine);
         made_of.extend(shares.map(|[of_sine, of_cosine]| vec![(sine, of_sine), (cosine, of_cosine)]));
     }
     for &covariate in turned {
@@ -248,7 +249,7 @@ mod tests {
             let size = most(&mut expected.iter().copied());
             let off = most(&mut found.iter().zip(&expected).map(|(x, y)| x - y));
             assert!(off < 1e-3 * size + 5e-4, "{}: off by {off}, {size} at most", covariate.words());
-            waves += usize::from(covariate.cycle_s().is_some() && size > 0.3);
+            waves += usize::from(covariate.wave.is_some() && size > 0.3);
         }
         assert_eq!(waves, 40);
     }

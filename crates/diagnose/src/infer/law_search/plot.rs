@@ -53,7 +53,12 @@ pub(crate) fn points(
             if strength(band) < LEAST_SHARE * most {
                 continue;
             }
-            let x = features.of(pair, band, formula.covariate, count);
+            let x = if grammar.covariates[formula.covariate].wave.is_some() {
+                // The course of a gain is drawn over time.
+                data.states[pair][band].time_s[..count].iter().map(|t| data.direct_s[pair] + t).collect()
+            } else {
+                features.of(pair, band, formula.covariate, count)
+            };
             let [with, without] =
                 [&state.energy.values, &without].map(|values| model.predicted(values, pair, band, count));
             for r in residuals.iter().filter(|r| r.band == band && r.bin < count) {

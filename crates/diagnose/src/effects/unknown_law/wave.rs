@@ -1,0 +1,167 @@
+//! Courses along a recording: a gain that swells and sinks. A sum of few waves says any course.
+
+use super::covariate::{Form, Scale, form};
+use crate::effect::{DecayTerm, Parameter};
+use crate::simulate::views::BandView;
+use crate::survey::Survey;
+use sabine_paths::laws::{Law, LawError, LawParameter, LawTarget};
+use std::f64::consts::{PI, TAU};
+
+/// `w` is what goes on in a second, `p` where it begins.
+pub(super) const WAVE: Form = form("wave", "sin(w * file_time_s + p)");
+/// Half cycles within the time for which a recording sounds, at most. What is compared ends before that.
+const MOST_HALF_CYCLES: usize = 10;
+/// Where a wave begins, in radians: a sine and a cosine first, and what is made of both.
+const BEGINNINGS: [f64; 4] = [0.0, 0.5 * PI, 0.25 * PI, 0.75 * PI];
+/// How far a fit may go from a wave towards the next, in steps between them.
+const REACH: f64 = 0.6;
+
+/// One of the waves that are screened; a fit moves its cycle and its beginning, not farther than half of the way to the next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Wave {
+    rad_per_s: f64,
+    begins_rad: f64,
+    /// What the next wave has more in a second.
+    step_rad_per_s: f64,
+}
+
+impl Wave {
+    /// All of a room, those of one cycle together: the time for which most recordings sound holds whole numbers of half cycles.
+    pub fn all(survey: &Survey) -> Vec<Self> {
+        let mut sounds_s: Vec<f64> =
+            survey.responses().iter().map(|r| r.sounds_until_s).filter(|s| *s > 0.0).collect();
+        sounds_s.sort_by(f64::total_cmp);
+        let Some(usual_s) = sounds_s.get(sounds_s.len() / 2) else { return Vec::new() };
+        let step_rad_per_s = PI / usual_s;
+        let of_cycle = |halves: usize| {
+            let rad_per_s = halves as f64 * step_rad_per_s;
+            BEGINNINGS.map(|begins_rad| Self { rad_per_s, begins_rad, step_rad_per_s })
+        };
+        (1..=MOST_HALF_CYCLES).flat_map(of_cycle).collect()
+    }
+
+    pub fn cycle_s(self) -> f64 {
+        TAU / self.rad_per_s
+    }
+
+    /// What it has of the sine and of the cosine of its cycle.
+    pub fn of_sine_and_cosine(self) -> [f64; 2] {
+        [self.begins_rad.cos(), self.begins_rad.sin()]
+    }
+
+    /// Its numbers in a formula.
+    pub(super) fn scales(self) -> [Scale; 2] {
+        [("w", self.rad_per_s, "rad/s"), ("p", self.begins_rad, "rad")]
+    }
+
+    /// What tells its law from those of other waves.
+    pub(super) fn id(self) -> String {
+        format!("_{:.0}_ms_{:.0}_deg", 1000.0 * self.cycle_s(), self.begins_rad.to_degrees())
+    }
+
+    /// Parameters of its fit behind the amplitude. Beforehand they are anywhere between this wave and the next.
+    pub(super) fn parameters(self) -> [Parameter; 2] {
+        let about = |name, unit, middle: f64, step: f64| {
+            let (reach, even_sd) = (REACH * step, step / 12f64.sqrt());
+            Parameter::new(name, unit, middle, even_sd, (middle - reach, middle + reach))
+                .with_floor()
+                .with_ceiling()
+        };
+        let step_rad = PI / BEGINNINGS.len() as f64;
+        [
+            about("in_a_second", "rad/s", self.rad_per_s, self.step_rad_per_s),
+            about("begins", "rad", self.begins_rad, step_rad),
+        ]
+    }
+
+    /// The law of fitted parameters: amplitude, what goes on in a second, beginning.
+    pub(super) fn law(self, [a, w, p]: [LawParameter; 3]) -> Result<Law, LawError> {
+        // Less than nothing is half a cycle later.
+        let [low, high] = if a.value < 0.0 { [-a.high, -a.low] } else { [a.low, a.high] };
+        let size = format!("{:.1} dB [{low:.1}, {high:.1}]", a.value.abs());
+        let cycle = format!("{:.2} s [{:.2}, {:.2}]", TAU / w.value, TAU / w.high, TAU / w.low);
+        let words = format!("The gain of the recording swells and sinks by {size}, once in {cycle}.");
+        let formula = format!("-a * {}", WAVE.text);
+        let (id, own) = (format!("{}{}", WAVE.name, self.id()), [("a", a), ("w", w), ("p", p)]);
+        Ok(Law::new(id, LawTarget::Recorder, None, &formula, own)?.with_words(words))
+    }
+}
+
+/// A wave whose amplitude, cycle and beginning are fitted.
+pub(super) struct FittedWave;
+
+impl DecayTerm for FittedWave {
+    fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+        let taken = -super::formula::LN_PER_DB * values[0];
+        for (bin, l) in ln_energy.iter_mut().enumerate() {
+            *l += taken * (values[1] * view.time_s(bin) + values[2]).sin();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)] // a panic is how a test fails
+    use super::*;
+    use crate::effects::Grammar;
+    use crate::infer::baseline::Baseline;
+    use crate::likelihood::decay::EnergyModel;
+    use sabine_paths::laws::BoundLaws;
+
+    #[test]
+    fn the_sine_and_the_cosine_of_each_cycle_make_its_waves() {
+        let baseline = Baseline::of_laboratory(32);
+        let waves = Wave::all(baseline.survey());
+        assert_eq!(waves.len(), 4 * MOST_HALF_CYCLES);
+        for of_cycle in waves.chunks(4) {
+            assert!(of_cycle.iter().all(|wave| wave.cycle_s() == of_cycle[0].cycle_s()));
+            let at = |wave: &Wave, time_s: f64| (TAU * time_s / wave.cycle_s() + wave.begins_rad).sin();
+            for time_s in [0.0, 0.13, 0.61] {
+                let own = of_cycle.iter().map(|wave| {
+                    let [sine, cosine] = wave.of_sine_and_cosine();
+                    (sine * at(&of_cycle[0], time_s) + cosine * at(&of_cycle[1], time_s) - at(wave, time_s))
+                        .abs()
+                });
+                assert!(own.fold(0.0, f64::max) < 1e-12);
+            }
+        }
+    }
+
+    /// What is fitted, against energies of all paths under the law that is then rendered.
+    #[test]
+    fn what_a_fit_does_to_each_bin_is_what_its_law_does_to_the_paths() {
+        let baseline = Baseline::of_laboratory(32);
+        let (survey, data) = (baseline.survey(), baseline.energy_data());
+        let grammar = Grammar::of(survey);
+        let used = vec![true; baseline.pairs()];
+        let plain = EnergyModel::new(&data, &[], &used);
+        let room = baseline.room_view().unwrap();
+        let (pair, band) = (1, 3);
+        let count = data.ends[pair][band];
+        for wave in Wave::all(survey).into_iter().step_by(7) {
+            let formula =
+                grammar.formulas.iter().find(|f| grammar.covariates[f.covariate].wave == Some(wave));
+            let case = grammar.case(formula.unwrap(), survey).unwrap();
+            let found = [2.0, 1.02 * wave.rad_per_s, wave.begins_rad + 0.1];
+            let cases = [&case];
+            let model = EnergyModel::new(&data, &cases, &used);
+            let mut values = model.start(None);
+            values[model.first_of(0)..model.first_of(0) + 3].copy_from_slice(&found);
+            let before = plain.predicted(&plain.start(None), pair, band, count);
+            let after = model.predicted(&values, pair, band, count);
+            let parameter = |(x, unit): (f64, &'static str)| LawParameter::new(x, [x; 2], unit);
+            let law =
+                wave.law([(found[0], "dB"), (found[1], "rad/s"), (found[2], "rad")].map(parameter)).unwrap();
+            let bound = BoundLaws::new(std::slice::from_ref(&law), &room.pair(pair).law_site()).unwrap();
+            let paths =
+                room.pair(pair).ln_changes(band, &room.pair(pair).energies_under(&bound).unwrap()[band]);
+            let mut most = 0.0f64;
+            for (bin, expected) in paths.iter().take(count).enumerate() {
+                let change = after[bin] - before[bin];
+                assert!((change - expected).abs() < 0.02, "{}: {bin}: {change} {expected}", law.words());
+                most = most.max(change.abs());
+            }
+            assert!(most > 0.1, "{most}");
+        }
+    }
+}
