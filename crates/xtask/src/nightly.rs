@@ -17,9 +17,9 @@ const INSTALL: &str = "set -e; root=$PWD/target/nightly_install; \
     cargo install --path crates/cli --root \"$root\" --locked --quiet; \
     empty=$(mktemp -d); cd \"$empty\"; \"$root/bin/sabine\" match; test -s out/match/report.html; rm -r \"$empty\"";
 
-/// Every test, those of the diagnosis among the whole catalogue.
-const EVERY_TEST: &str =
-    "SABINE_WHOLE_CATALOGUE=1 cargo test --workspace --release --no-fail-fast -- --include-ignored";
+/// Every test, those of the diagnosis among the whole catalogue, and property tests with other cases than the gate's and the night's before.
+const EVERY_TEST: &str = "export SABINE_WHOLE_CATALOGUE=1 PROPTEST_RNG_SEED=$(date +%s); \
+    echo \"PROPTEST_RNG_SEED=$PROPTEST_RNG_SEED\"; cargo test --workspace --release --no-fail-fast -- --include-ignored";
 
 /// The last release is the newest tag `v*`; before the first one there is nothing to be compatible with.
 const COMPATIBLE: &str =

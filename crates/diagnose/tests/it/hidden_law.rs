@@ -160,6 +160,31 @@ fn levels_that_go_with_the_order_of_recording_are_a_law() {
     assert!(found.model.room(&room).is_ok());
 }
 
+/// The gain of the recorder swells and sinks: how fast, when and by how much is found.
+#[test]
+fn a_gain_that_swells_and_sinks_along_the_recordings_is_a_law() {
+    let (depth_db, period_s, phase_rad) = (3.0, 0.31, 0.4f64);
+    let hidden = Hidden::GainDrift { depth_db, period_s, phase_rad };
+    let bands = Bands::octaves(500.0, 1000.0).unwrap();
+    let (_folder, room) = room(LabConfig { bands, receivers: 6, ..in_few_octaves() }, &[hidden]);
+    let diagnoser = diagnoser(Vec::new(), 1000).unwrap().discovering_if_needed();
+    let found = diagnoser.diagnose(&room, &[], &()).unwrap();
+    let [law] = found.laws.as_slice() else { panic!("{:?} {:?}", found.causes, found.law_search) };
+    assert!(law.target == "recorder" && found.verdict == Verdict::Law, "{law:?}");
+    // A constant is a gain, and what falls evenly may be absorption: of the course itself, single moments are asked.
+    let own = found.model.causes[0].law().unwrap();
+    let at = |time_s: f64| own.value(|name| (name == "file_time_s").then_some(time_s)).unwrap();
+    let hidden_db = |time_s: f64| depth_db * (std::f64::consts::TAU * time_s / period_s + phase_rad).sin();
+    for quarter in 0..3 {
+        let times = [0.0, 0.5].map(|half| {
+            period_s * (0.25 + half + 0.25 * f64::from(quarter) - phase_rad / std::f64::consts::TAU)
+        });
+        let [swing, expected] = [at(times[1]) - at(times[0]), hidden_db(times[1]) - hidden_db(times[0])];
+        assert!((swing - expected).abs() < 1.5, "{quarter}: {swing} {expected} {own:?}");
+    }
+    assert!(found.model.room(&room).is_ok());
+}
+
 #[test]
 fn where_no_law_is_at_work_none_is_named() {
     let bands = Bands::octaves(500.0, 2000.0).unwrap();

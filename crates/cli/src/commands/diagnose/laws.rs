@@ -154,6 +154,7 @@ mod tests {
             chart(&law).unwrap().x_label
         };
         assert!(label("a * log2(1 + recording_order)").contains("order of the recordings"));
+        assert!(label("-a * sin(w * file_time_s + p)").contains("Time"));
         assert!(label("a * length_m").contains("mean over the paths"));
     }
 }
