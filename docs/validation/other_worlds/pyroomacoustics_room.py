@@ -34,8 +34,10 @@ MATERIALS = {
     "ceiling": "board",
 }
 SHAPES = {"brick": [0, 0, 0, 0, 0, 0], "plaster": [3, 1, 0, -1, -1, 0], "carpet": [-4, -2, 0, 2, 3, 4], "board": [2, 1, 0, 0, 1, 1]}
-EFFECTS = ["null", "position", "surface", "temperature", "latency", "gain", "wall", "warming"]
+EFFECTS = ["null", "position", "surface", "temperature", "latency", "gain", "wall", "warming", "swell", "agc"]
 WARMING_DB = 6.0  # by which a loudspeaker that has warmed up is quieter, in the end
+SWELL_DB = 3.0  # by which a gain that swells and sinks goes up and down
+AGC_DB = 9.0  # by which an automatic gain control that a loud first sound has turned down comes up again
 BEFORE_M = 0.35  # a displaced wall stays this far from all places
 
 
@@ -172,6 +174,19 @@ def warming_db(order):
     return -20 * np.log10(1 + (10 ** (WARMING_DB / 20) - 1) * warmed)
 
 
+def gain_course(effect, seed):
+    """What the recorder's gain does over the file, in dB at times in s; None if it stays. Drawn apart: rooms stay what they were."""
+    random = np.random.default_rng([seed, 2])
+    if effect == "swell":
+        period_s, phase = random.uniform(0.2, 0.5), random.uniform(0, 2 * np.pi)
+        course = lambda t: SWELL_DB * np.sin(2 * np.pi * t / period_s + phase)
+        return course, {"swell_db": SWELL_DB, "period_s": period_s, "phase_rad": phase}
+    if effect == "agc":
+        release_s = random.uniform(0.1, 0.3)
+        return lambda t: -AGC_DB * np.exp(-t / release_s), {"agc_db": AGC_DB, "release_s": release_s}
+    return None, {}
+
+
 def eyring_s(prism, absorption):
     """Longest reverberation time of the octaves, without air."""
     total = sum(area for _, _, area in prism.faces())
@@ -227,6 +242,8 @@ def recorded(responses, recorder, random):
     late = int(round(recorder["latency_s"] * RATE_HZ))
     gains = 10 ** ((recorder["gain_db"] + random.normal(0, GAIN_SD_DB, len(responses))) / 20)
     kept = [gain * np.concatenate([np.zeros(late), response]) for gain, response in zip(gains, responses)]
+    if recorder.get("course"):
+        kept = [response * 10 ** (recorder["course"](np.arange(len(response)) / RATE_HZ) / 20) for response in kept]
     power = np.mean([np.mean(response**2) for response in kept])
     noise = 10 ** (NOISE_DB / 20) * np.sqrt(power)
     return [response + noise * random.normal(size=len(response)) for response in kept]
@@ -299,6 +316,8 @@ def main():
     if arguments.effect == "warming":
         recorder["gain_db"] = recorder["gain_db"] + warming_db(order)
         hidden = {"warming_db": WARMING_DB, "recorded_at": order.tolist()}
+    course, of_course = gain_course(arguments.effect, arguments.seed)
+    recorder, hidden = {**recorder, "course": course}, {**hidden, **of_course}
     # Nobody knows tables and places exactly: the file is off, the truth is what was drawn.
     stated = {name: np.clip(table + random.normal(0, TABLE_SD, 6), 0.01, 0.95) for name, table in absorption.items()}
     stated_places = [place + random.normal(0, PLACE_SD_M, 3) for place in places]
