@@ -216,7 +216,10 @@ impl Covariate {
             None => "the level of paths goes".to_owned(),
         };
         let mut meaning: String = self.forms.iter().map(|form| form.meaning).collect();
-        meaning.extend(self.wave.map(|wave| format!(", a cycle of {:.2} s", wave.cycle_s())));
+        meaning.extend(self.wave.map(|wave| {
+            let [shortest, longest] = wave.cycles_s();
+            format!(", a cycle of {shortest:.2} to {longest:.2} s")
+        }));
         format!("{what} with {}{meaning}", self.text())
     }
 }

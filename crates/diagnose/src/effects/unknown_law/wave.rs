@@ -40,8 +40,14 @@ impl Wave {
         (1..=MOST_HALF_CYCLES).flat_map(of_cycle).collect()
     }
 
+    /// Seconds from one beginning to the next.
     pub fn cycle_s(self) -> f64 {
         TAU / self.rad_per_s
+    }
+
+    /// The cycles that a fit may find, in seconds: the shortest and the longest.
+    pub(super) fn cycles_s(self) -> [f64; 2] {
+        [REACH, -REACH].map(|steps| TAU / (self.rad_per_s + steps * self.step_rad_per_s))
     }
 
     /// What it has of the sine and of the cosine of its cycle.
