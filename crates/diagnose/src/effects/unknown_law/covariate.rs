@@ -217,8 +217,8 @@ impl Covariate {
         };
         let mut meaning: String = self.forms.iter().map(|form| form.meaning).collect();
         meaning.extend(self.wave.map(|wave| {
-            let [shortest, longest] = wave.cycles_s();
-            format!(", a cycle of {shortest:.2} to {longest:.2} s")
+            let [shortest, longest] = wave.periods_s();
+            format!(", a period of {shortest:.2} to {longest:.2} s")
         }));
         format!("{what} with {}{meaning}", self.text())
     }

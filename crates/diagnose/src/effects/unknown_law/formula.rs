@@ -81,7 +81,7 @@ impl Grammar {
             .changing(changes))
     }
 
-    /// A wave as a case: its cycle and its beginning are fitted with its amplitude.
+    /// A wave as a case: its period and its phase are fitted with its amplitude.
     fn wave_case(&self, formula: &Formula, wave: Wave, survey: &Survey) -> Case {
         let mut parameters = self.parameters(formula, survey);
         let begin: Vec<f64> = wave.parameters().iter().map(|p| p.neutral).collect();

@@ -7,62 +7,61 @@ use crate::survey::Survey;
 use sabine_paths::laws::{Law, LawError, LawParameter, LawTarget};
 use std::f64::consts::{PI, TAU};
 
-/// `w` is what goes on in a second, `p` where it begins.
+/// `w` is its angular frequency, `p` its phase.
 pub(super) const WAVE: Form = form("wave", "sin(w * file_time_s + p)");
-/// Half cycles within the time for which a recording sounds, at most. What is compared ends before that.
-const MOST_HALF_CYCLES: usize = 10;
-/// Where a wave begins, in radians: a sine and a cosine first, and what is made of both.
-const BEGINNINGS: [f64; 4] = [0.0, 0.5 * PI, 0.25 * PI, 0.75 * PI];
+/// Half periods within the time for which a recording sounds, at most. What is compared ends before that.
+const MOST_HALF_PERIODS: usize = 10;
+/// Phases in radians: a sine and a cosine first, and what is made of both.
+const PHASES: [f64; 4] = [0.0, 0.5 * PI, 0.25 * PI, 0.75 * PI];
 /// How far a fit may go from a wave towards the next, in steps between them.
 const REACH: f64 = 0.6;
 
-/// One of the waves that are screened; a fit moves its cycle and its beginning, not farther than half of the way to the next.
+/// One of the waves that are screened; a fit moves its period and its phase, by a little more than half of the way to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Wave {
     rad_per_s: f64,
-    begins_rad: f64,
-    /// What the next wave has more in a second.
+    phase_rad: f64,
+    /// By how much the angular frequency of the next wave is higher.
     step_rad_per_s: f64,
 }
 
 impl Wave {
-    /// All of a room, those of one cycle together: the time for which most recordings sound holds whole numbers of half cycles.
+    /// All of a room, those of one period together: the time for which most recordings sound holds whole numbers of half periods.
     pub fn all(survey: &Survey) -> Vec<Self> {
         let mut sounds_s: Vec<f64> =
             survey.responses().iter().map(|r| r.sounds_until_s).filter(|s| *s > 0.0).collect();
         sounds_s.sort_by(f64::total_cmp);
         let Some(usual_s) = sounds_s.get(sounds_s.len() / 2) else { return Vec::new() };
         let step_rad_per_s = PI / usual_s;
-        let of_cycle = |halves: usize| {
+        let of_period = |halves: usize| {
             let rad_per_s = halves as f64 * step_rad_per_s;
-            BEGINNINGS.map(|begins_rad| Self { rad_per_s, begins_rad, step_rad_per_s })
+            PHASES.map(|phase_rad| Self { rad_per_s, phase_rad, step_rad_per_s })
         };
-        (1..=MOST_HALF_CYCLES).flat_map(of_cycle).collect()
+        (1..=MOST_HALF_PERIODS).flat_map(of_period).collect()
     }
 
-    /// Seconds from one beginning to the next.
-    pub fn cycle_s(self) -> f64 {
+    pub fn period_s(self) -> f64 {
         TAU / self.rad_per_s
     }
 
-    /// The cycles that a fit may find, in seconds: the shortest and the longest.
-    pub(super) fn cycles_s(self) -> [f64; 2] {
+    /// The periods that a fit may find, in seconds: the shortest and the longest.
+    pub(super) fn periods_s(self) -> [f64; 2] {
         [REACH, -REACH].map(|steps| TAU / (self.rad_per_s + steps * self.step_rad_per_s))
     }
 
-    /// What it has of the sine and of the cosine of its cycle.
+    /// What it has of the sine and of the cosine of its period.
     pub fn of_sine_and_cosine(self) -> [f64; 2] {
-        [self.begins_rad.cos(), self.begins_rad.sin()]
+        [self.phase_rad.cos(), self.phase_rad.sin()]
     }
 
     /// Its numbers in a formula.
     pub(super) fn scales(self) -> [Scale; 2] {
-        [("w", self.rad_per_s, "rad/s"), ("p", self.begins_rad, "rad")]
+        [("w", self.rad_per_s, "rad/s"), ("p", self.phase_rad, "rad")]
     }
 
     /// What tells its law from those of other waves.
     pub(super) fn id(self) -> String {
-        format!("_{:.0}_ms_{:.0}_deg", 1000.0 * self.cycle_s(), self.begins_rad.to_degrees())
+        format!("_{:.0}_ms_{:.0}_deg", 1000.0 * self.period_s(), self.phase_rad.to_degrees())
     }
 
     /// Parameters of its fit behind the amplitude. Beforehand they are anywhere between this wave and the next.
@@ -73,27 +72,27 @@ impl Wave {
                 .with_floor()
                 .with_ceiling()
         };
-        let step_rad = PI / BEGINNINGS.len() as f64;
+        let step_rad = PI / PHASES.len() as f64;
         [
-            about("in_a_second", "rad/s", self.rad_per_s, self.step_rad_per_s),
-            about("begins", "rad", self.begins_rad, step_rad),
+            about("angular_frequency", "rad/s", self.rad_per_s, self.step_rad_per_s),
+            about("phase", "rad", self.phase_rad, step_rad),
         ]
     }
 
-    /// The law of fitted parameters: amplitude, what goes on in a second, beginning.
+    /// The law of fitted parameters: amplitude, angular frequency, phase.
     pub(super) fn law(self, [a, w, p]: [LawParameter; 3]) -> Result<Law, LawError> {
-        // Less than nothing is half a cycle later.
+        // Less than nothing is half a period later.
         let [low, high] = if a.value < 0.0 { [-a.high, -a.low] } else { [a.low, a.high] };
         let size = format!("{:.1} dB [{low:.1}, {high:.1}]", a.value.abs());
-        let cycle = format!("{:.2} s [{:.2}, {:.2}]", TAU / w.value, TAU / w.high, TAU / w.low);
-        let words = format!("The gain of the recording swells and sinks by {size}, once in {cycle}.");
+        let period = format!("{:.2} s [{:.2}, {:.2}]", TAU / w.value, TAU / w.high, TAU / w.low);
+        let words = format!("The gain of the recording swells and sinks by {size}, once in {period}.");
         let formula = format!("-a * {}", WAVE.text);
         let (id, own) = (format!("{}{}", WAVE.name, self.id()), [("a", a), ("w", w), ("p", p)]);
         Ok(Law::new(id, LawTarget::Recorder, None, &formula, own)?.with_words(words))
     }
 }
 
-/// A wave whose amplitude, cycle and beginning are fitted.
+/// A wave whose amplitude, period and phase are fitted.
 pub(super) struct FittedWave;
 
 impl DecayTerm for FittedWave {
@@ -115,17 +114,17 @@ mod tests {
     use sabine_paths::laws::BoundLaws;
 
     #[test]
-    fn the_sine_and_the_cosine_of_each_cycle_make_its_waves() {
+    fn the_sine_and_the_cosine_of_each_period_make_its_waves() {
         let baseline = Baseline::of_laboratory(32);
         let waves = Wave::all(baseline.survey());
-        assert_eq!(waves.len(), 4 * MOST_HALF_CYCLES);
-        for of_cycle in waves.chunks(4) {
-            assert!(of_cycle.iter().all(|wave| wave.cycle_s() == of_cycle[0].cycle_s()));
-            let at = |wave: &Wave, time_s: f64| (TAU * time_s / wave.cycle_s() + wave.begins_rad).sin();
+        assert_eq!(waves.len(), 4 * MOST_HALF_PERIODS);
+        for of_period in waves.chunks(4) {
+            assert!(of_period.iter().all(|wave| wave.period_s() == of_period[0].period_s()));
+            let at = |wave: &Wave, time_s: f64| (TAU * time_s / wave.period_s() + wave.phase_rad).sin();
             for time_s in [0.0, 0.13, 0.61] {
-                let own = of_cycle.iter().map(|wave| {
+                let own = of_period.iter().map(|wave| {
                     let [sine, cosine] = wave.of_sine_and_cosine();
-                    (sine * at(&of_cycle[0], time_s) + cosine * at(&of_cycle[1], time_s) - at(wave, time_s))
+                    (sine * at(&of_period[0], time_s) + cosine * at(&of_period[1], time_s) - at(wave, time_s))
                         .abs()
                 });
                 assert!(own.fold(0.0, f64::max) < 1e-12);
@@ -148,7 +147,7 @@ mod tests {
             let formula =
                 grammar.formulas.iter().find(|f| grammar.covariates[f.covariate].wave == Some(wave));
             let case = grammar.case(formula.unwrap(), survey).unwrap();
-            let found = [2.0, 1.02 * wave.rad_per_s, wave.begins_rad + 0.1];
+            let found = [2.0, 1.02 * wave.rad_per_s, wave.phase_rad + 0.1];
             let cases = [&case];
             let model = EnergyModel::new(&data, &cases, &used);
             let mut values = model.start(None);

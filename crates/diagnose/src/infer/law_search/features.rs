@@ -127,15 +127,15 @@ fn of_pair(
         }
         numbers.push(product.into_iter().map(|x| x as f32).collect());
     }
-    // Each column as a sum of numbers of paths: waves of one cycle are made of its sine and its cosine.
+    // Each column as a sum of numbers of paths: waves of one period are made of its sine and its cosine.
     let mut made_of: Vec<Vec<(usize, f64)>> = (0..numbers.len()).map(|n| vec![(n, 1.0)]).collect();
-    let cycle_s = |wave: &Covariate| wave.wave.map(Wave::cycle_s);
-    for of_cycle in waves.chunk_by(|a, b| cycle_s(a) == cycle_s(b)) {
+    let period_s = |wave: &Covariate| wave.wave.map(Wave::period_s);
+    for of_period in waves.chunk_by(|a, b| period_s(a) == period_s(b)) {
         let [sine, cosine] = [numbers.len(), numbers.len() + 1];
-        for wave in of_cycle.iter().take(2) {
+        for wave in of_period.iter().take(2) {
             numbers.push(quantities.taken(wave, None)?.into_iter().map(|x| x as f32).collect());
         }
-        let shares = of_cycle.iter().filter_map(|w| w.wave).map(Wave::of_sine_and_cosine);
+        let shares = of_period.iter().filter_map(|w| w.wave).map(Wave::of_sine_and_cosine);
         made_of.extend(shares.map(|[of_sine, of_cosine]| vec![(sine, of_sine), (cosine, of_cosine)]));
     }
     for &covariate in turned {

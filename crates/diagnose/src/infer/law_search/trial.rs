@@ -94,7 +94,7 @@ pub(crate) fn trials(
         let screen = LawScreen::of(search.baseline, family, &cases, &without.energy, &search.used);
         let others =
             screen.not_told_from(formula).into_iter().map(|f| grammar.subject(&grammar.formulas[f], survey));
-        // Waves of one cycle have one name, wherever they begin.
+        // Waves of one period have one name, whatever their phase.
         let mut not_told_from: Vec<String> = Vec::new();
         for other in others {
             if not_told_from.len() < MAX_LISTED && !not_told_from.contains(&other) {

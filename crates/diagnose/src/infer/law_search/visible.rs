@@ -34,7 +34,7 @@ pub(crate) fn visible_from(search: &Search<'_>, state: &State) -> Result<Vec<(St
     let mut found: Vec<(String, Option<f64>)> = Vec::new();
     for formula in plain {
         let (words, db) = (grammar.covariates[grammar.formulas[formula].covariate].words(), from_db(formula));
-        // Waves of one cycle have one name: where they begin is known only once one is found.
+        // Waves of one period have one name: their phase is known only once one is found.
         match found.iter_mut().find(|(known, _)| *known == words) {
             Some((_, most)) if place(db) > place(*most) => *most = db,
             Some(_) => {}
