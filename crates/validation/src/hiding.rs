@@ -52,7 +52,9 @@ pub fn named(found: &Diagnosis) -> Vec<&str> {
 #[must_use]
 pub fn answer(found: &Diagnosis) -> String {
     match found.verdict {
-        Verdict::Explained | Verdict::Unconfirmed | Verdict::Law => named(found).join(" + "),
+        Verdict::Explained | Verdict::Incomplete | Verdict::Unconfirmed | Verdict::Law => {
+            named(found).join(" + ")
+        }
         Verdict::Ambiguous => {
             // The last cause stands for the set.
             let sure = found.causes.iter().rev().skip(1).map(|c| c.effect.clone());

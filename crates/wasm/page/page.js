@@ -297,6 +297,7 @@ function diagnose() {
 const VERDICTS = {
   adequate: "The simulation explains the measurement within its expected spread.",
   explained: "A cause is named.",
+  incomplete: "A cause is named, and it does not explain everything.",
   unconfirmed: "A cause is named that fits the one place measured; a second place would confirm it or not.",
   law: "A law that no catalogue lists is named.",
   ambiguous: "Several causes explain the misfit equally well.",

@@ -144,7 +144,7 @@ fn a_survey_is_the_room_that_a_folder_would_hold() {
     }
     let found = survey.diagnose(&spec, &()).unwrap();
     assert!(
-        ["adequate", "explained", "unconfirmed", "ambiguous", "unexplained"]
+        ["adequate", "explained", "incomplete", "unconfirmed", "ambiguous", "unexplained"]
             .iter()
             .any(|v| found["verdict"] == *v),
         "{found}"

@@ -47,7 +47,9 @@ fn checked(out: &Path) -> Value {
     );
     let json: Value = serde_json::from_slice(&std::fs::read(out.join("diagnosis.json")).unwrap()).unwrap();
     let verdict = json["verdict"].as_str().unwrap();
-    assert!(["adequate", "explained", "unconfirmed", "ambiguous", "unexplained"].contains(&verdict));
+    assert!(
+        ["adequate", "explained", "incomplete", "unconfirmed", "ambiguous", "unexplained"].contains(&verdict)
+    );
     assert!(is_between(&json["lack_of_fit"]["p_value"], 0.0, 1.0));
     let catalogue = catalogue();
     let known = |id: &Value| catalogue.iter().any(|e| id.as_str() == Some(&*e.id()));

@@ -24,6 +24,11 @@ fn is_law(id: &str) -> bool {
     id == UnknownLaw.id()
 }
 
+/// Whether causes are named, each by one name that positions left out confirm.
+fn is_named(verdict: Verdict) -> bool {
+    matches!(verdict, Verdict::Explained | Verdict::Incomplete)
+}
+
 impl Diagnoser {
     /// Whether it looks for laws.
     pub(super) fn looks_for_laws(&self) -> bool {
@@ -109,7 +114,7 @@ impl Diagnoser {
             }
             diagnosis
         };
-        if !diagnosis.laws.is_empty() && diagnosis.verdict == Verdict::Explained {
+        if !diagnosis.laws.is_empty() && is_named(diagnosis.verdict) {
             diagnosis.verdict = Verdict::Law;
         }
         diagnosis.notes.extend(notes(&told, !diagnosis.laws.is_empty()));
@@ -199,12 +204,12 @@ impl Weighed {
         laws: &[usize],
         effects: &[Box<dyn Effect>],
     ) -> Result<Diagnosis, Error> {
-        let is_named = |own: &CatalogueCase, cause: &Cause| {
+        let is_of = |own: &CatalogueCase, cause: &Cause| {
             own.formula.is_none() && own.id == cause.effect && own.case.subject == cause.subject
         };
-        let place = |cause: &Cause| self.cases.iter().position(|own| is_named(own, cause));
+        let place = |cause: &Cause| self.cases.iter().position(|own| is_of(own, cause));
         let named: Option<Vec<usize>> = plain.causes.iter().map(place).collect();
-        let Some(named) = named.filter(|_| !laws.is_empty() && plain.verdict == Verdict::Explained) else {
+        let Some(named) = named.filter(|_| !laws.is_empty() && is_named(plain.verdict)) else {
             return Ok(plain);
         };
         self.baseline.prepare_rest(&self.cases)?;

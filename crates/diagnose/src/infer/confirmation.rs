@@ -63,15 +63,17 @@ pub(crate) struct Confirmation {
 }
 
 impl Confirmation {
-    /// Whether a law is worth a search, which holds where the baseline meets the data well enough for a name to be trusted: no cause stands
-    /// and chance is no explanation; or causes stand and a formula would explain the decays as well as all of them, or what they leave, and
-    /// by chance none would. `significance` and `naming_nats` are those of the configuration.
+    /// Whether a law is worth a search, which holds where the baseline meets the data well enough for a name to be trusted: chance does not
+    /// explain what is left, whether causes stand or none; or a formula would explain the decays as well as all causes that stand, or what they
+    /// leave, and by chance none would. `significance` and `naming_nats` are those of the configuration.
     pub fn calls_for_laws(&self, significance: f64, naming_nats: f64) -> bool {
         if self.hopeless {
             return false;
         }
-        if self.state.chosen.is_empty() {
-            return self.verdict == Verdict::Unexplained;
+        match self.verdict {
+            Verdict::Adequate => return false,
+            Verdict::Unexplained | Verdict::Incomplete => return true,
+            _ => {}
         }
         let by_causes = self.state.energy.log_evidence - self.base.energy.log_evidence;
         let formulas = [self.lack_before.formula, self.lack_after.formula];
@@ -145,6 +147,8 @@ pub(crate) fn confirm(
         && state.chosen.iter().any(|&c| is_of_decays_alone(&search.candidates[c]))
     {
         Verdict::Unconfirmed
+    } else if lack_after.as_ref().is_some_and(|lack| lack.p_value < config.significance) {
+        Verdict::Incomplete
     } else {
         Verdict::Explained
     };

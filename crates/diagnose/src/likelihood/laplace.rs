@@ -98,6 +98,14 @@ impl<'a> Priors<'a> {
     }
 }
 
+/// The inverse of the covariance of a model's parameters beforehand.
+pub(crate) fn known_beforehand(model: &dyn Model) -> DMatrix<f64> {
+    let known = Priors::of(model);
+    let mut inverse = DMatrix::zeros(known.each.len(), known.each.len());
+    known.add_to(&mut inverse);
+    inverse
+}
+
 /// Derivatives of a log-likelihood: its gradient, and the expected curvature (Fisher information).
 pub(crate) struct Slopes {
     pub gradient: DVector<f64>,

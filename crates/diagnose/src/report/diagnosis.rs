@@ -13,8 +13,10 @@ use std::fmt;
 pub enum Verdict {
     /// The simulation explains the measurement within its expected spread.
     Adequate,
-    /// One or more causes are named.
+    /// One or more causes are named, and what they leave is no more than chance leaves.
     Explained,
+    /// One or more causes are named, and chance does not explain what they leave: something else acts as well, or in the place of one of them.
+    Incomplete,
     /// Causes are named that nothing confirms: one place was measured, and what bears on decays everywhere is confirmed at positions left out.
     Unconfirmed,
     /// A law that no catalogue lists is named, by itself or beside causes that are listed; see [`Diagnosis::laws`].
@@ -30,6 +32,7 @@ impl fmt::Display for Verdict {
         f.write_str(match self {
             Self::Adequate => "adequate",
             Self::Explained => "explained",
+            Self::Incomplete => "incomplete",
             Self::Unconfirmed => "unconfirmed",
             Self::Law => "law",
             Self::Ambiguous => "ambiguous",

@@ -60,8 +60,8 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
     if !about.converged {
         notes.push("A fit had not come to rest after its last step: take its figures with caution.".into());
     }
-    if matches!(about.verdict, Verdict::Explained | Verdict::Unconfirmed) && about.misfit_left {
-        notes.push("A significant misfit is left that none of the named causes explains.".into());
+    if matches!(about.verdict, Verdict::Incomplete | Verdict::Unconfirmed) && about.misfit_left {
+        notes.push("A significant misfit is left that none of the named causes explains: one of them may stand in for what is missing.".into());
     }
     if let Some((rms_db, largest)) = &about.levels {
         notes.push(format!(

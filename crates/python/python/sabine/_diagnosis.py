@@ -27,7 +27,7 @@ class Diagnosis:
 
     @property
     def verdict(self) -> str:
-        """The answer in one word: ``adequate``, ``explained``, ``unconfirmed``, ``law``, ``ambiguous`` or ``unexplained``."""
+        """The answer in one word: ``adequate``, ``explained``, ``incomplete``, ``unconfirmed``, ``law``, ``ambiguous`` or ``unexplained``."""
         return self.data["verdict"]
 
     @property

@@ -7,7 +7,7 @@ use std::fmt::Write;
 pub const STYLE: &str = "<style>:root{--a:#0072b2;--b:#d55e00;--c:#009e73}\
 @media (prefers-color-scheme:dark){:root{--a:#4da3dc;--b:#ff8a3c;--c:#2fc79a}}\
 .verdict{border-left:6px solid var(--a);background:var(--soft);padding:.7rem 1rem;margin:.8rem 0}.verdict strong{font-size:1.25rem;line-height:1.3;display:block;margin-bottom:.3rem}\
-.verdict.explained,.verdict.law{border-color:var(--b)}.verdict.ambiguous,.verdict.unconfirmed,.verdict.unexplained{border-color:#b8860b}.verdict.adequate{border-color:var(--c)}\
+.verdict.explained,.verdict.law{border-color:var(--b)}.verdict.ambiguous,.verdict.incomplete,.verdict.unconfirmed,.verdict.unexplained{border-color:#b8860b}.verdict.adequate{border-color:var(--c)}\
 svg.map{width:100%;height:auto;display:block}svg.map text{font:16px system-ui,sans-serif;fill:currentColor}\
 .bars{max-width:46rem}.bar{margin:.35rem 0}.bar>span{font-size:.92rem}.bar>div{display:flex;align-items:center;gap:.6rem}\
 .track{position:relative;flex:1;height:.85rem;background:var(--soft);min-width:0}.track>i{position:absolute;left:0;top:0;bottom:0}\

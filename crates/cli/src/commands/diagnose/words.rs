@@ -59,6 +59,7 @@ pub fn headline(findings: &Findings) -> String {
     match findings.verdict {
         Verdict::Adequate => "The simulation explains this measurement.".to_owned(),
         Verdict::Explained => format!("Found: {}.", names.join("; ")),
+        Verdict::Incomplete => format!("Found, but not everything is explained: {}.", names.join("; ")),
         Verdict::Unconfirmed => {
             format!("Found at the one place measured, not confirmed: {}.", names.join("; "))
         }
@@ -95,7 +96,7 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
             "What is left between simulation and measurement is no more than chance leaves in such a measurement ({}). Nothing needs to be added.",
             p_value(fit.p_value)
         )),
-        Verdict::Explained | Verdict::Unconfirmed | Verdict::Law => {
+        Verdict::Explained | Verdict::Incomplete | Verdict::Unconfirmed | Verdict::Law => {
             told.push(if fit.p_value < UNLIKELY {
                 format!("Chance does not explain what was measured ({}).", p_value(fit.p_value))
             } else {
@@ -110,7 +111,7 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
                 "With that in the model, what is left is no more than chance.".to_owned()
             } else {
                 format!(
-                    "With that in the model the fit is better, but not everything is explained ({}).",
+                    "With that in the model the fit is better, but not everything is explained ({}): what is named may stand in for what is missing.",
                     p_value(fit.p_value_explained)
                 )
             });
@@ -170,12 +171,8 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
     if !failed.is_empty() && fit.p_value_explained < UNLIKELY {
         told.push(format!("What chance does not explain: {}.", failed.join("; ")));
     }
-    if let (
-        Verdict::Unexplained | Verdict::Ambiguous | Verdict::Explained | Verdict::Unconfirmed | Verdict::Law,
-        Some(place),
-    ) = (findings.verdict, worst_place(findings, findings.verdict == Verdict::Unexplained))
-    {
-        told.push(place);
+    if findings.verdict != Verdict::Adequate {
+        told.extend(worst_place(findings, findings.verdict == Verdict::Unexplained));
     }
     told
 }

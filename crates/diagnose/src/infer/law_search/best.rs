@@ -51,7 +51,7 @@ impl Formulas {
         let survey = baseline.survey();
         let Self { grammar, features, from_band } = self;
         let family = Family { grammar, features, from_band: *from_band, shams: false };
-        let screen = LawScreen::of(baseline, family, cases, fit, used);
+        let screen = LawScreen::of(baseline, family, cases, fit, used)?;
         let mut best: Option<(usize, f64)> = None;
         for (formula, promised) in screen.best(FITTED) {
             if best.is_some_and(|(_, nats)| nats > promised) {

@@ -3,13 +3,14 @@
 use super::columns::{Column, Sham, ShamPlaces, columns};
 use super::family::{by_chance, largest, tail};
 use super::features::Features;
-use super::null_model::NullModel;
+use super::null_model::{NullModel, Rows};
 use super::screen::{ReadyTerm, Screen, ScreenPair, ScreenTerm};
 use crate::effect::Case;
 use crate::effects::{Formula, Grammar};
+use crate::error::Error;
 use crate::infer::baseline::Baseline;
 use crate::likelihood::decay::EnergyModel;
-use crate::likelihood::laplace::{LaplaceFit, Model};
+use crate::likelihood::laplace::{LaplaceFit, known_beforehand};
 use crate::survey::Survey;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -80,7 +81,7 @@ impl<'a> LawScreen<'a> {
         cases: &[&Case],
         fit: &LaplaceFit,
         used: &[bool],
-    ) -> Self {
+    ) -> Result<Self, Error> {
         let (data, survey) = (baseline.energy_data(), baseline.survey());
         let model = EnergyModel::new(&data, cases, used);
         let bands = survey.bands().len();
@@ -108,16 +109,14 @@ impl<'a> LawScreen<'a> {
                 }
                 first += count;
             }
-            let counts = rows.iter().map(|(_, count)| *count).collect();
-            let place = (survey.responses()[pair].receiver, counts);
-            (ScreenPair { pulls: model.pulls(&fit.values, pair), expansion, x }, place)
+            let rows = Rows { receiver: survey.responses()[pair].receiver, of_bands: rows };
+            (ScreenPair { pulls: model.pulls(&fit.values, pair), expansion, x }, rows)
         };
-        let (screened, places): (Vec<ScreenPair>, Vec<(usize, Vec<usize>)>) =
-            pairs.par_iter().map(one).unzip();
-        let null = NullModel::of(&screened, &places, model.priors().iter().map(|p| p.sd).collect());
-        let screen = Screen::new(bands, screened, &fit.covariance);
+        let (screened, rows): (Vec<ScreenPair>, Vec<Rows>) = pairs.par_iter().map(one).unzip();
+        let null = NullModel::of(&screened, &rows, known_beforehand(&model))?;
+        let screen = Screen::new(bands, screened, null.covariance());
         let (terms, shams) = terms(grammar, survey, &screen, &all);
-        Self { grammar, screen, null, terms, shams, places: sham_places, from_band, seed }
+        Ok(Self { grammar, screen, null, terms, shams, places: sham_places, from_band, seed })
     }
 
     /// Evidence of a formula (by its place), times its probability beforehand, in nats.
@@ -266,7 +265,9 @@ fn terms(
 mod tests {
     use super::*;
     use crate::config::DiagnoseConfig;
+    use crate::effect::{DecayTerm, Parameter};
     use crate::hand_made::Tables;
+    use crate::simulate::views::BandView;
     use sabine_scene::{Levels, TimeZero};
 
     #[test]
@@ -279,7 +280,7 @@ mod tests {
         let (fit, _) = baseline.fit_energy(&[], &used, None).expect("a fit");
         let screens = [0, 1].map(|from_band| {
             let family = Family { grammar: &grammar, features: &features, from_band, shams: from_band == 0 };
-            LawScreen::of(&baseline, family, &[], &fit, &used)
+            LawScreen::of(&baseline, family, &[], &fit, &used).expect("a screen")
         });
         assert!(screens[1].shams.is_empty() && !screens[0].shams.is_empty());
         let acting_in = |shares: [f64; 2]| {
@@ -295,5 +296,45 @@ mod tests {
         assert!(beyond_prior(&screens[1], lower).abs() < 1e-9);
         assert!(beyond_prior(&screens[0], upper).abs() > 0.1);
         assert!((screens[0].nats(upper) - screens[1].nats(upper)).abs() < 1e-9);
+    }
+
+    /// It takes what a formula takes, and bins scatter the less the more that is.
+    struct Steadier {
+        /// `[pair][band][bin]`.
+        covariate: Vec<Vec<Vec<f64>>>,
+    }
+
+    impl DecayTerm for Steadier {
+        fn apply(&self, values: &[f64], view: &BandView<'_>, ln_energy: &mut [f64]) {
+            let own = &self.covariate[view.pair][view.band()];
+            ln_energy.iter_mut().zip(own).for_each(|(l, own)| *l -= LN_PER_DB * own * values[0]);
+        }
+
+        fn variance(&self, values: &[f64], _: &BandView<'_>, variance: &mut [f64]) {
+            variance.iter_mut().for_each(|v| *v *= (-values[0]).exp());
+        }
+    }
+
+    /// How bins scatter tells what a cause amounts to, and no column of the screen knows of that.
+    #[test]
+    fn what_a_fit_leaves_open_makes_no_law() {
+        for levels in [Levels::Common, Levels::PerResponse] {
+            let baseline = Tables::new(levels, TimeZero::Emission).baseline(DiagnoseConfig::default());
+            let grammar = Grammar::of(baseline.survey());
+            let features = Features::by_hand(&grammar, (3, 2, 14));
+            let formula = grammar.formulas.iter().find(|f| grammar.covariates[f.covariate].both_signs);
+            let column = formula.expect("a formula").covariate;
+            let of_pair = |pair| (0..2).map(|band| features.of(pair, band, column, 14)).collect();
+            let parameter = Parameter::new("x", "dB", 0.0, 5.0, (-20.0, 20.0));
+            let case = Case::decay(vec![parameter], Steadier { covariate: (0..3).map(of_pair).collect() });
+            let used = [true; 3];
+            let (fit, _) = baseline.fit_energy(&[&case], &used, None).expect("a fit");
+            let family = Family { grammar: &grammar, features: &features, from_band: 0, shams: false };
+            let mut screen = LawScreen::of(&baseline, family, &[&case], &fit, &used).expect("a screen");
+            screen.null = screen.null.without_random_effects();
+            let most = screen.drawn().into_iter().fold(f64::NEG_INFINITY, f64::max);
+            // Half the greatest square of 399 times some 400 normal deviates, less what a formula costs.
+            assert!(most < 14.0, "{levels:?}: {most}");
+        }
     }
 }

@@ -34,7 +34,7 @@ pub(crate) fn shortlist(
         .filter(|case| case.observable().concerns(Observable::Decay))
         .collect();
     let family = Family { grammar: &grammar, features: &features, from_band: 0, shams: false };
-    let screen = LawScreen::of(baseline, family, &of_decays, &state.energy, used);
+    let screen = LawScreen::of(baseline, family, &of_decays, &state.energy, used)?;
     let classes = screen.classes(MAX_FITTED);
     let best = classes.first().map_or(0.0, |class| class.nats);
     let known = |formula: &Formula| cases.iter().any(|own| own.formula.as_ref() == Some(formula));

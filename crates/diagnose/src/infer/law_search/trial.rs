@@ -91,7 +91,7 @@ pub(crate) fn trials(
         let without = search.state(&rest, Some(state))?;
         let cases = search.cases_of(&rest, Observable::Decay);
         let family = Family { grammar: &grammar, features: &features, from_band: 0, shams: true };
-        let screen = LawScreen::of(search.baseline, family, &cases, &without.energy, &search.used);
+        let screen = LawScreen::of(search.baseline, family, &cases, &without.energy, &search.used)?;
         let others =
             screen.not_told_from(formula).into_iter().map(|f| grammar.subject(&grammar.formulas[f], survey));
         // Waves of one period have one name, whatever their phase.

@@ -21,7 +21,7 @@ pub(crate) fn visible_from(search: &Search<'_>, state: &State) -> Result<Vec<(St
     let features = Features::gather(baseline, &grammar)?;
     let cases = search.cases_of(&state.chosen, Observable::Decay);
     let family = Family { grammar: &grammar, features: &features, from_band: 0, shams: false };
-    let screen = LawScreen::of(baseline, family, &cases, &state.energy, &search.used);
+    let screen = LawScreen::of(baseline, family, &cases, &state.energy, &search.used)?;
     let plain = (0..grammar.formulas.len()).filter(|&f| {
         let formula = &grammar.formulas[f];
         formula.bands == BandLaw::Same && grammar.covariates[formula.covariate].forms.len() == 1

@@ -108,7 +108,7 @@ fn concluded(
     folder: &Path,
 ) -> Result<Option<String>, AnyError> {
     let one = |found: &Diagnosis| match (&found.verdict, &named(found)[..]) {
-        (Verdict::Explained, [name]) => Some((*name).to_owned()),
+        (Verdict::Explained | Verdict::Incomplete, [name]) => Some((*name).to_owned()),
         _ => None,
     };
     match extra {

@@ -195,7 +195,7 @@ fn outcome(found: &Diagnosis, hidden: &[Hidden], positive_reflections: bool) -> 
         Verdict::Adequate => Outcome::Missed,
         Verdict::Unexplained if outside => Outcome::Right,
         Verdict::Unexplained => Outcome::Unnamed,
-        Verdict::Explained | Verdict::Law if named == truth => Outcome::Right,
+        Verdict::Explained | Verdict::Incomplete | Verdict::Law if named == truth => Outcome::Right,
         Verdict::Ambiguous
             if truth.iter().all(|t| named.contains(t) || found.alternatives.iter().any(|a| a == t))
                 && !truth.is_empty() =>
@@ -203,7 +203,11 @@ fn outcome(found: &Diagnosis, hidden: &[Hidden], positive_reflections: bool) -> 
             Outcome::Set
         }
         _ if !truth.is_empty() && truth.iter().all(|t| named.contains(t)) => Outcome::Extra,
-        Verdict::Explained | Verdict::Law if named.iter().all(|n| truth.contains(n)) => Outcome::Part,
+        Verdict::Explained | Verdict::Incomplete | Verdict::Law
+            if named.iter().all(|n| truth.contains(n)) =>
+        {
+            Outcome::Part
+        }
         _ => Outcome::Wrong,
     }
 }

@@ -243,7 +243,7 @@ impl Task {
 
 fn answer(found: &Diagnosis) -> String {
     match found.verdict {
-        Verdict::Explained => {
+        Verdict::Explained | Verdict::Incomplete => {
             let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
             named.join(" + ")
         }
