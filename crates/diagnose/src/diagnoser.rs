@@ -137,8 +137,8 @@ impl Diagnoser {
     }
 
     /// As [`discovering`](Self::discovering), but only where the rest of the diagnosis asks for it, and six or more receivers are measured: where
-    /// it ends [`Verdict::Unexplained`](crate::Verdict::Unexplained) without a name, and where it names causes, but one formula would explain
-    /// the decays as well as all of them, or what they leave, and by chance none would. Everywhere else the answer is that of a diagnosis that
+    /// it ends [`Verdict::Unexplained`](crate::Verdict::Unexplained) without a name or [`Verdict::Incomplete`](crate::Verdict::Incomplete) with
+    /// one, and where one formula would explain the decays as well as all causes that it names, or what they leave, and by chance none would. Everywhere else the answer is that of a diagnosis that
     /// looks for no law, and so it is where none stands; what a name must reach is the same, too ([`threshold_nats`](Self::threshold_nats)).
     #[must_use]
     pub fn discovering_if_needed(self) -> Self {

@@ -160,6 +160,28 @@ fn levels_that_go_with_the_order_of_recording_are_a_law() {
     assert!(found.model.room(&room).is_ok());
 }
 
+/// A latency is named, rightly, beside something that no effect explains.
+#[test]
+fn a_name_that_leaves_a_misfit_is_not_the_whole_explanation() {
+    let latency = Hidden::TimeZero { latency_s: 0.005 };
+    let swell = Hidden::GainDrift { depth_db: 3.0, period_s: 0.31, phase_rad: 0.4 };
+    let bands = Bands::octaves(500.0, 1000.0).unwrap();
+    for (hidden, verdict) in
+        [(vec![latency.clone()], Verdict::Explained), (vec![latency, swell], Verdict::Incomplete)]
+    {
+        let (_folder, room) = room(LabConfig { bands, receivers: 6, ..in_few_octaves() }, &hidden);
+        let config = DiagnoseConfig { rays: 1000, ..DiagnoseConfig::default() };
+        let among = ["time_zero", "sound_speed", "sampling_clock"].map(str::to_owned);
+        let diagnoser = Diagnoser::new(config).unwrap().with_only(&among).unwrap();
+        let found = diagnoser.diagnose(&room, &[], &()).unwrap();
+        let named: Vec<&str> = found.causes.iter().map(|c| c.effect.as_str()).collect();
+        assert_eq!((&named[..], found.verdict), (&["time_zero"][..], verdict), "{:?}", found.lack_of_fit);
+        assert_eq!(found.lack_of_fit.p_value_explained < 0.01, verdict == Verdict::Incomplete);
+        let told = found.notes.iter().any(|note| note.contains("may stand in for what is missing"));
+        assert_eq!(told, verdict == Verdict::Incomplete, "{:?}", found.notes);
+    }
+}
+
 /// The gain of the recorder swells and sinks: how fast, when and by how much is found.
 #[test]
 fn a_gain_that_swells_and_sinks_along_the_recordings_is_a_law() {

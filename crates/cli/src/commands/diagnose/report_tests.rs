@@ -81,6 +81,13 @@ fn each_verdict_says_what_it_means() {
         page.contains("Found at the one place measured, not confirmed: Air drier or more humid than stated.")
     );
     assert!(page.contains("A response at a second place would."));
+    let left = json!({ "p_value": 1e-9, "p_value_explained": 1e-3, "discrepancy_nats": 30.0, "discrepancy_nats_explained": 3.0,
+        "dispersion": [1.0, 1.0], "tests": [{ "name": "levels", "p_value": 1e-4 }] });
+    let page = html(&findings("incomplete", &json!({ "lack_of_fit": left })), None).unwrap();
+    assert!(
+        page.contains("Found, but not everything is explained: Air drier or more humid than stated.")
+            && page.contains("what is named may stand in for what is missing")
+    );
     let set = json!({ "alternatives": ["surface_absorption"], "would_decide": ["measure on a damp day"] });
     let page = html(&findings("ambiguous", &set), None).unwrap();
     assert!(page.contains("which of 2 causes it is") && page.contains("<li>Measure on a damp day.</li>"));
