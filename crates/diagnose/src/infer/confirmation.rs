@@ -3,6 +3,8 @@
 use crate::effect::{Effect, Nuisance, Observable, Parameter};
 use crate::effects::RoomModes;
 use crate::error::Error;
+use crate::extend::extension::changes;
+use crate::extend::model_change::ModelChange;
 use crate::infer::candidates::Candidate;
 use crate::infer::cross_validation::{Folds, Predicted, predict};
 use crate::infer::lack_of_fit::{self, Lack};
@@ -54,6 +56,8 @@ pub(crate) struct Confirmation {
     pub verdict: Verdict,
     /// Whether bins scatter so far that no name can be trusted.
     pub hopeless: bool,
+    /// Whether decays are predicted without the sound that a cause adds.
+    pub without_added: bool,
     /// Causes that the discrepancy without a name beats.
     pub unseated: Vec<String>,
     /// Causes that were dropped, and why.
@@ -64,10 +68,10 @@ pub(crate) struct Confirmation {
 
 impl Confirmation {
     /// Whether a law is worth a search, which holds where the baseline meets the data well enough for a name to be trusted: chance does not
-    /// explain what is left, whether causes stand or none; or a formula would explain the decays as well as all causes that stand, or what they
+    /// explain what is left, whether causes stand or none (and decays are predicted with all sound that they add); or a formula would explain the decays as well as all causes that stand, or what they
     /// leave, and by chance none would. `significance` and `naming_nats` are those of the configuration.
     pub fn calls_for_laws(&self, significance: f64, naming_nats: f64) -> bool {
-        if self.hopeless {
+        if self.hopeless || self.without_added {
             return false;
         }
         match self.verdict {
@@ -137,20 +141,14 @@ pub(crate) fn confirm(
     };
     // Where bins scatter a hundred times as far as they may, the baseline itself has not been met: no name can be trusted.
     let hopeless = baseline.dispersion.iter().any(|d| *d > MAX_DISPERSION);
+    let without_added = adds_unpredicted_sound(search, &state);
+    let misfit_left = lack_after.as_ref().is_some_and(|lack| lack.p_value < config.significance);
     let verdict = if hopeless || is_beaten(search, &base, &state, &lack_before) {
         Verdict::Unexplained
     } else if state.chosen.is_empty() {
         if lack_before.p_value < config.significance { Verdict::Unexplained } else { Verdict::Adequate }
-    } else if !found.rivals.is_empty() {
-        Verdict::Ambiguous
-    } else if predicted.gains.is_empty()
-        && state.chosen.iter().any(|&c| is_of_decays_alone(&search.candidates[c]))
-    {
-        Verdict::Unconfirmed
-    } else if lack_after.as_ref().is_some_and(|lack| lack.p_value < config.significance) {
-        Verdict::Incomplete
     } else {
-        Verdict::Explained
+        of_causes(search, (found, &state, &predicted), misfit_left && !without_added)
     };
     let mut unseated: Vec<String> = Vec::new();
     if verdict == Verdict::Unexplained && !state.chosen.is_empty() {
@@ -174,11 +172,40 @@ pub(crate) fn confirm(
         lack_before,
         verdict,
         hopeless,
+        without_added,
         unseated,
         dropped,
         predicting_s,
         testing_s: started.elapsed().as_secs_f64(),
     })
+}
+
+/// The verdict on causes that stand, given whether they leave what neither chance nor they explain.
+fn of_causes(
+    search: &Search<'_>,
+    (found, state, predicted): (&Selection, &State, &Predicted),
+    misfit_left: bool,
+) -> Verdict {
+    let of_decays = |&candidate: &usize| is_of_decays_alone(&search.candidates[candidate]);
+    if !found.rivals.is_empty() {
+        Verdict::Ambiguous
+    } else if predicted.gains.is_empty() && state.chosen.iter().any(of_decays) {
+        Verdict::Unconfirmed
+    } else if misfit_left {
+        Verdict::Incomplete
+    } else {
+        Verdict::Explained
+    }
+}
+
+/// Whether a cause adds reflections for which no path stands: what they carry is then missing in predicted decays, and no law.
+fn adds_unpredicted_sound(search: &Search<'_>, state: &State) -> bool {
+    let adds = |candidate: usize| {
+        let case = search.candidates[candidate].case;
+        case.reflection_term().is_some()
+            && !changes(search, state, candidate).iter().any(ModelChange::moves_paths)
+    };
+    state.chosen.iter().any(|&candidate| adds(candidate))
 }
 
 /// The lack of fit under the chosen causes, where there are any.

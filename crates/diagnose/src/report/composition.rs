@@ -173,6 +173,7 @@ fn notes_on(
         converged: base.energy.converged && state.energy.converged && state.arrivals.converged,
         misfit_left: confirmed.lack_after.p_value < search.baseline.config.significance,
         hopeless: confirmed.hopeless,
+        without_added: confirmed.without_added,
         scattered: first_dispersion.iter().any(|d| *d > WARN_DISPERSION),
         unseated: &confirmed.unseated,
         dropped: &dropped,

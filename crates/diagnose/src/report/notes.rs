@@ -15,6 +15,8 @@ pub(crate) struct Circumstances<'a> {
     /// Whether chance does not explain what the causes leave.
     pub misfit_left: bool,
     pub hopeless: bool,
+    /// Whether decays are predicted without the sound that a cause adds.
+    pub without_added: bool,
     /// Whether bins scatter far more than they should.
     pub scattered: bool,
     /// Causes that a discrepancy without a name beats.
@@ -62,6 +64,12 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
     }
     if matches!(about.verdict, Verdict::Incomplete | Verdict::Unconfirmed) && about.misfit_left {
         notes.push("A significant misfit is left that none of the named causes explains: one of them may stand in for what is missing.".into());
+    }
+    if about.misfit_left && about.without_added {
+        notes.push(
+            "Decays are predicted without the sound that the surface which was found adds: what chance does not explain of them may be that."
+                .into(),
+        );
     }
     if let Some((rms_db, largest)) = &about.levels {
         notes.push(format!(

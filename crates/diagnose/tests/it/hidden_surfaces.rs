@@ -75,6 +75,10 @@ fn a_panel_that_the_mesh_lacks_is_found_and_located() {
         assert!(high - low < 0.2, "{name}: {low} to {high}");
     }
     assert_eq!(found.model.applied().sheets.len(), 1);
+    // What the panel adds to decays is not predicted, which is no second cause.
+    let left = found.lack_of_fit.p_value_explained < 0.01;
+    let told = found.notes.iter().any(|note| note.contains("without the sound that the surface"));
+    assert_eq!(told, left, "{:?}", found.notes);
     // The pulse's height is that of the high octaves.
     let (low, high) = interval(&cause, "reflectance");
     let truth_db = 10.0 * reflectance[reflectance.len() - 1].log10();

@@ -110,8 +110,13 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
             told.push(if fit.p_value_explained >= UNLIKELY {
                 "With that in the model, what is left is no more than chance.".to_owned()
             } else {
+                let doubt = if findings.verdict == Verdict::Explained {
+                    ""
+                } else {
+                    ": what is named may stand in for what is missing"
+                };
                 format!(
-                    "With that in the model the fit is better, but not everything is explained ({}): what is named may stand in for what is missing.",
+                    "With that in the model the fit is better, but not everything is explained ({}){doubt}.",
                     p_value(fit.p_value_explained)
                 )
             });
