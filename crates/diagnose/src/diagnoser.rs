@@ -138,8 +138,10 @@ impl Diagnoser {
 
     /// As [`discovering`](Self::discovering), but only where the rest of the diagnosis asks for it, and six or more receivers are measured: where
     /// it ends [`Verdict::Unexplained`](crate::Verdict::Unexplained) without a name or [`Verdict::Incomplete`](crate::Verdict::Incomplete) with
-    /// one, and where one formula would explain the decays as well as all causes that it names, or what they leave, and by chance none would. Everywhere else the answer is that of a diagnosis that
-    /// looks for no law, and so it is where none stands; what a name must reach is the same, too ([`threshold_nats`](Self::threshold_nats)).
+    /// one, and where one formula would explain the decays as well as all causes that it names, or what they leave, and by chance none would.
+    /// Where a named surface adds sound without which decays are predicted (`extra_reflector`), no law is looked for. Everywhere else the answer
+    /// is that of a diagnosis that looks for no law, and so it is where none stands; what a name must reach is the same, too
+    /// ([`threshold_nats`](Self::threshold_nats)).
     #[must_use]
     pub fn discovering_if_needed(self) -> Self {
         Self { only_if_needed: true, ..self.discovering() }

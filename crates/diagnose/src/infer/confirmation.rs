@@ -67,9 +67,10 @@ pub(crate) struct Confirmation {
 }
 
 impl Confirmation {
-    /// Whether a law is worth a search, which holds where the baseline meets the data well enough for a name to be trusted: chance does not
-    /// explain what is left, whether causes stand or none (and decays are predicted with all sound that they add); or a formula would explain the decays as well as all causes that stand, or what they
-    /// leave, and by chance none would. `significance` and `naming_nats` are those of the configuration.
+    /// Whether a law is worth a search, which holds where the baseline meets the data well enough for a name to be trusted, and decays are
+    /// predicted with all sound that causes add: chance does not explain what is left, whether causes stand or none; or a formula would
+    /// explain the decays as well as all causes that stand, or what they leave, and by chance none would. `significance` and `naming_nats`
+    /// are those of the configuration.
     pub fn calls_for_laws(&self, significance: f64, naming_nats: f64) -> bool {
         if self.hopeless || self.without_added {
             return false;

@@ -13,7 +13,8 @@ use std::fmt;
 pub enum Verdict {
     /// The simulation explains the measurement within its expected spread.
     Adequate,
-    /// One or more causes are named, and what they leave is no more than chance leaves.
+    /// One or more causes are named, and what they leave is no more than chance leaves; or it may be the sound that a named surface adds, without
+    /// which decays are predicted (a note says so).
     Explained,
     /// One or more causes are named, and chance does not explain what they leave: something else acts as well, or in the place of one of them.
     Incomplete,
