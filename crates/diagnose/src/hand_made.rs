@@ -18,11 +18,13 @@ use crate::simulate::traced_pair::Arrival;
 use crate::survey::surfaces::{Surface, axes_of};
 use crate::survey::{Place, Survey, SurveyedResponse};
 use sabine_acoustics::{Air, Bands, Material, PerBand};
-use sabine_scene::{Levels, Measurement, TimeZero};
+use sabine_scene::{Levels, MaterialPrior, Measurement, TimeZero};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Bins of each band.
 const BINS: usize = 14;
+/// Stated absorption of each material and octave.
+const ABSORPTION: [[f64; 2]; 2] = [[0.3, 0.4], [0.1, 0.12]];
 
 /// Two materials, two octaves, one source, three receivers.
 pub(crate) fn survey(levels: Levels, time_zero: TimeZero) -> Survey {
@@ -54,12 +56,18 @@ pub(crate) fn survey(levels: Levels, time_zero: TimeZero) -> Survey {
             }
         })
         .collect();
+    let bands = Bands::octaves(1000.0, 2000.0).expect("two octaves");
+    let table = |absorption: [f64; 2]| MaterialPrior {
+        absorption: PerBand::new(bands, absorption.to_vec()).ok(),
+        absorption_sd: PerBand::uniform(bands, 0.01),
+    };
     Survey {
-        bands: Bands::octaves(1000.0, 2000.0).expect("two octaves"),
+        bands,
         air,
         air_assumed: false,
         measurement: Measurement { time_zero, levels },
         materials: vec!["carpet".to_owned(), "plaster".to_owned()],
+        absorption_priors: ABSORPTION.map(table).to_vec(),
         sources: vec![source],
         receivers,
         responses,
@@ -147,7 +155,7 @@ impl Tables {
             direct_s: survey.responses.iter().map(|r| r.direct_s).collect(),
             speed_m_s: survey.responses.iter().map(|r| r.air.speed_of_sound_m_s()).collect(),
             reference: vec![0.05; bands],
-            absorption: vec![vec![0.3, 0.4], vec![0.1, 0.12]],
+            absorption: ABSORPTION.map(Vec::from).to_vec(),
             priors: vec![vec![prior(0.3), prior(0.4)], vec![prior(0.1), prior(0.12)]],
             dispersion: vec![1.0, 1.3],
             level_sd: vec![0.16, 0.2],

@@ -34,10 +34,11 @@ MATERIALS = {
     "ceiling": "board",
 }
 SHAPES = {"brick": [0, 0, 0, 0, 0, 0], "plaster": [3, 1, 0, -1, -1, 0], "carpet": [-4, -2, 0, 2, 3, 4], "board": [2, 1, 0, 0, 1, 1]}
-EFFECTS = ["null", "position", "surface", "temperature", "latency", "gain", "wall", "warming", "swell", "agc"]
+EFFECTS = ["null", "position", "surface", "temperature", "latency", "gain", "wall", "warming", "swell", "agc", "tables"]
 WARMING_DB = 6.0  # by which a loudspeaker that has warmed up is quieter, in the end
 SWELL_DB = 3.0  # by which a gain that swells and sinks goes up and down
 AGC_DB = 9.0  # by which an automatic gain control that a loud first sound has turned down comes up again
+TABLE_FACTOR_SD = 0.35  # of the logarithm of the factor by which each table is off with --effect tables
 BEFORE_M = 0.35  # a displaced wall stays this far from all places
 
 
@@ -187,6 +188,18 @@ def gain_course(effect, seed):
     return None, {}
 
 
+def stated_tables(absorption, random, seed, effect, together):
+    """What the file says of absorption. Factors are drawn apart: rooms stay what they were."""
+    one = (lambda: np.full(6, random.normal(0, TABLE_SD))) if together else (lambda: random.normal(0, TABLE_SD, 6))
+    off = {name: one() for name in absorption}
+    factors = {name: 1.0 for name in absorption}
+    if effect == "tables":
+        apart = np.random.default_rng([seed, 3])
+        factors = {name: float(np.exp(apart.normal(0, TABLE_FACTOR_SD))) for name in absorption}
+    stated = {name: np.clip(factors[name] * table + off[name], 0.01, 0.95) for name, table in absorption.items()}
+    return stated, {"table_over_truth": factors} if effect == "tables" else {}
+
+
 def eyring_s(prism, absorption):
     """Longest reverberation time of the octaves, without air."""
     total = sum(area for _, _, area in prism.faces())
@@ -292,6 +305,7 @@ def main():
     parser.add_argument("--receivers", type=int, default=8)
     parser.add_argument("--order", action="store_true", help="the file says in which order was recorded, as it does with --effect warming")
     parser.add_argument("--uneven", type=float, default=1.0, help="how much absorption differs from octave to octave; 0 for the same in all")
+    parser.add_argument("--together", action="store_true", help="tables are off by the same in all octaves, as far as is stated")
     parser.add_argument("--rays", type=int, default=100_000, help="of pyroomacoustics")
     parser.add_argument(
         "--scattering",
@@ -319,7 +333,8 @@ def main():
     course, of_course = gain_course(arguments.effect, arguments.seed)
     recorder, hidden = {**recorder, "course": course}, {**hidden, **of_course}
     # Nobody knows tables and places exactly: the file is off, the truth is what was drawn.
-    stated = {name: np.clip(table + random.normal(0, TABLE_SD, 6), 0.01, 0.95) for name, table in absorption.items()}
+    stated, of_tables = stated_tables(absorption, random, arguments.seed, arguments.effect, arguments.together)
+    hidden = {**hidden, **of_tables}
     stated_places = [place + random.normal(0, PLACE_SD_M, 3) for place in places]
     responses, image_order, speed = simulate(
         arguments.method,

@@ -1,5 +1,6 @@
 //! The catalogue: one file an effect.
 
+mod absorption_tables;
 mod air_absorption;
 mod angle_dependent_absorption;
 mod background_noise;
@@ -30,6 +31,7 @@ mod transducer_response;
 mod truncation;
 mod unknown_law;
 
+pub use absorption_tables::AbsorptionTables;
 pub use air_absorption::AirAbsorption;
 pub use angle_dependent_absorption::AngleDependentAbsorption;
 pub use background_noise::BackgroundNoise;
@@ -92,6 +94,7 @@ pub fn catalogue() -> Vec<Box<dyn Effect>> {
         Box::new(SurfaceDisplacement),
         Box::new(CoordinateShift),
         Box::new(TemperatureGradient),
+        Box::new(AbsorptionTables),
     ]
 }
 

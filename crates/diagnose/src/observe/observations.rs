@@ -178,6 +178,7 @@ pub(crate) fn survey_of(room: &MeasuredRoom, position_sd_m: f64) -> Survey {
         air_assumed: room.air_assumed(),
         measurement: room.measurement(),
         materials: stated.iter().map(|m| m.name.clone()).collect(),
+        absorption_priors: room.priors().to_vec(),
         sources: room.sources().iter().map(source).collect(),
         receivers: room.receivers().iter().map(receiver).collect(),
         responses: Vec::new(),

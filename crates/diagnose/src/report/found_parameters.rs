@@ -28,8 +28,20 @@ pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -
     }
     let bands = baseline.survey().bands;
     let open = (f64::NEG_INFINITY, f64::INFINITY);
+    let absorptions = case.relaxes.iter().filter(|(n, _)| matches!(n, Nuisance::Absorption(_))).count();
     for &(nuisance, _) in &case.relaxes {
         match nuisance {
+            Nuisance::Absorption(m) if absorptions > 1 => {
+                let survey = baseline.survey();
+                let Some(stated) = &survey.absorption_prior(m).absorption else { continue };
+                let stated: f64 = stated.values().iter().sum();
+                let own = baseline.decay_layout().material(m);
+                let fitted: f64 = state.energy.values[own.clone()].iter().sum();
+                let variance =
+                    state.energy.covariance.view((own.start, own.start), (own.len(), own.len())).sum();
+                let (factor, sd) = (fitted / stated, variance.max(0.0).sqrt() / stated);
+                push(format!("factor_{}", survey.materials()[m]), factor, sd, (0.0, f64::INFINITY), "");
+            }
             Nuisance::Absorption(m) => {
                 for b in 0..bands.len() {
                     let i = baseline.decay_layout().absorption(m, b);

@@ -7,7 +7,7 @@ pub(crate) mod surfaces;
 use crate::survey::planes::Plane;
 use crate::survey::surfaces::Surface;
 use sabine_acoustics::{Air, Bands};
-use sabine_scene::Measurement;
+use sabine_scene::{MaterialPrior, Measurement};
 
 /// Recordings below which nothing is said of what goes with their order.
 pub(crate) const LEAST_RECORDINGS: usize = 6;
@@ -56,6 +56,7 @@ pub struct Survey {
     pub(crate) air_assumed: bool,
     pub(crate) measurement: Measurement,
     pub(crate) materials: Vec<String>,
+    pub(crate) absorption_priors: Vec<MaterialPrior>,
     pub(crate) sources: Vec<Place>,
     pub(crate) receivers: Vec<Place>,
     pub(crate) responses: Vec<SurveyedResponse>,
@@ -93,6 +94,11 @@ impl Survey {
     /// Names of the materials.
     pub fn materials(&self) -> &[String] {
         &self.materials
+    }
+
+    /// What the room file says of a material's absorption.
+    pub fn absorption_prior(&self, material: usize) -> &MaterialPrior {
+        &self.absorption_priors[material]
     }
 
     /// Sources.

@@ -65,9 +65,10 @@ pub(crate) const ON_TIMES: [&str; 9] = [
     "extra_reflector",
 ];
 /// What bends decays or lifts their ends, the same for all responses.
-const ON_DECAYS: [&str; 7] = [
+const ON_DECAYS: [&str; 8] = [
     "air_absorption",
     "surface_absorption",
+    "absorption_tables",
     "scattering",
     "coupled_volume",
     "background_noise",
@@ -293,6 +294,20 @@ fn a_material_that_is_another_is_found() {
     let Hidden::SurfaceAbsorption { material, .. } = hidden else { panic!("{hidden:?}") };
     let cause = only_cause(&diagnose_among(&lab, &[hidden], &ON_DECAYS), "surface_absorption");
     assert_eq!(cause.subject.as_deref(), Some(lab.scene().materials()[material].name.as_str()));
+}
+
+#[test]
+fn tables_that_are_off_by_more_than_they_state_are_found() {
+    let lab = small_lab(526, 8, THREE_OCTAVES_HZ);
+    let hidden = Hidden::random("absorption_tables", 1.0, &lab, 526).unwrap();
+    let Hidden::AbsorptionTables { ref absorption } = hidden else { panic!("{hidden:?}") };
+    let truth = absorption.clone();
+    let cause = only_cause(&diagnose_among(&lab, &[hidden], &ON_DECAYS), "absorption_tables");
+    for (material, own) in lab.scene().materials().iter().zip(truth) {
+        let stated = material.material.absorption().values();
+        let factor = own.iter().sum::<f64>() / stated.iter().sum::<f64>();
+        holds(&cause, &format!("factor_{}", material.name), factor);
+    }
 }
 
 #[test]

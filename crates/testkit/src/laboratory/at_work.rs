@@ -58,6 +58,11 @@ impl Hidden {
             Self::SurfaceAbsorption { material, absorption } => {
                 truth.materials[*material].absorption.clone_from(absorption);
             }
+            Self::AbsorptionTables { absorption } => {
+                for (material, own) in truth.materials.iter_mut().zip(absorption) {
+                    material.absorption.clone_from(own);
+                }
+            }
             Self::SoundSpeed { temperature_offset_k } => truth.temperature_c += temperature_offset_k,
             Self::SamplingClock { ppm } => truth.clock_ppm += ppm,
             Self::RoomDimensions { scale } => {
@@ -191,6 +196,13 @@ fn check(truth: &Truth, effect: &Hidden) -> Result<(), Error> {
         Hidden::SurfaceAbsorption { material, absorption } => {
             exists("material", *material, truth.materials.len())?;
             each("absorption", absorption, 0.0, 0.99, "between 0 and 0.99")
+        }
+        Hidden::AbsorptionTables { absorption } => {
+            let (expected, found) = (truth.materials.len(), absorption.len());
+            if expected != found {
+                return Err(Error::Length { expected, found });
+            }
+            absorption.iter().try_for_each(|own| each("absorption", own, 0.0, 0.99, "between 0 and 0.99"))
         }
         Hidden::BackgroundNoise { levels_db } => {
             each("noise level (dB)", levels_db, -300.0, 0.0, "between -300 and 0 dB")

@@ -37,6 +37,11 @@ pub enum Hidden {
         /// True absorption of each octave, 0 to 0.99.
         absorption: Vec<f64>,
     },
+    /// No material is what its table says.
+    AbsorptionTables {
+        /// True absorption of each material and octave, 0 to 0.99.
+        absorption: Vec<Vec<f64>>,
+    },
     /// Stationary noise in the room, the same level everywhere.
     BackgroundNoise {
         /// Mean power of each octave's noise relative to the octave's mean power in its strongest 20 ms (median of the
@@ -318,7 +323,7 @@ pub struct Gap {
 
 impl Hidden {
     /// Identifiers of the catalogue's effects.
-    pub const CATALOGUE: [&'static str; 24] = [
+    pub const CATALOGUE: [&'static str; 25] = [
         "transducer_response",
         "air_absorption",
         "source_directivity",
@@ -343,6 +348,7 @@ impl Hidden {
         "surface_displacement",
         "coordinate_shift",
         "temperature_gradient",
+        "absorption_tables",
     ];
     /// Names of the effects that no catalogue holds.
     pub const OUTSIDE: [&'static str; 4] = ["gain_drift", "dropouts", "foreign_chirp", "grazing_absorption"];
@@ -361,6 +367,7 @@ impl Hidden {
             Self::SourceDirectivity { .. } => "source_directivity",
             Self::Scattering { .. } => "scattering",
             Self::SurfaceAbsorption { .. } => "surface_absorption",
+            Self::AbsorptionTables { .. } => "absorption_tables",
             Self::BackgroundNoise { .. } => "background_noise",
             Self::CoupledVolume { .. } => "coupled_volume",
             Self::Truncation { .. } => "truncation",

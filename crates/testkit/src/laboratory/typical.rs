@@ -60,6 +60,13 @@ fn draw(id: &str, strength: f64, lab: &Laboratory, seed: u64, r: &mut Pcg64Mcg) 
         "source_directivity" => source_directivity(r, truth, strength),
         "scattering" => scattering(r, truth, strength),
         "surface_absorption" => surface_absorption(r, truth, strength),
+        "absorption_tables" => Hidden::AbsorptionTables {
+            absorption: truth
+                .materials
+                .iter()
+                .map(|m| of_another_product(r, &m.absorption, strength))
+                .collect(),
+        },
         "background_noise" => {
             let middle_db = -35.0 + 10.0 * unit(r);
             let slope_db = 2.0 * (2.0 * unit(r) - 1.0);
@@ -183,6 +190,16 @@ fn surface_absorption(r: &mut Pcg64Mcg, truth: &Truth, strength: f64) -> Hidden 
             .map(|a| if shift == 0.0 { *a } else { (a + shift).clamp(0.02, 0.95) })
             .collect(),
     }
+}
+
+/// Absorption off by a factor of 1.35 to 2 in either direction, and by up to 15 % more or less from octave to octave.
+fn of_another_product(r: &mut Pcg64Mcg, table: &[f64], strength: f64) -> Vec<f64> {
+    let common = sign(r) * (0.3 + 0.4 * unit(r));
+    let mut own = |a: &f64| {
+        let off = strength * (common + 0.15 * (2.0 * unit(r) - 1.0));
+        if off == 0.0 { *a } else { (a * off.exp()).clamp(0.005, 0.95) }
+    };
+    table.iter().map(&mut own).collect()
 }
 
 /// A decay 1.5 to 3 times as long as the room's at 1 kHz, at most 2.5 s.

@@ -9,6 +9,8 @@ use crate::likelihood::laplace::{LaplaceFit, Model, maximise};
 const MAX_STARTS: usize = 2;
 /// Absorption from which a material that may be anything starts.
 const WIDENED_STARTS: [f64; 3] = [0.08, 0.3, 0.7];
+/// Least standard deviation of one that may be anything.
+const ANYTHING_SD: f64 = 0.2;
 
 /// An earlier fit to start from: its values, and where the parameters of its cases stand; they are the first cases of the new one.
 #[derive(Clone, Copy)]
@@ -49,8 +51,11 @@ pub(crate) fn fit(
             })
             .collect();
         if known.is_none() {
-            for &(nuisance, _) in &case.relaxes {
+            for &(nuisance, sd) in &case.relaxes {
                 let Nuisance::Absorption(material) = nuisance else { continue };
+                if sd < ANYTHING_SD {
+                    continue;
+                }
                 let plain = unstrained.get_or_insert_with(|| {
                     let mut plain = model.start(None);
                     model.start_gains(&mut plain);

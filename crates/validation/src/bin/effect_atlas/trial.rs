@@ -3,6 +3,7 @@
 use crate::decide;
 use crate::task::Task;
 use sabine::diagnose::{Cause, Diagnosis, Verdict};
+use sabine::scene::NamedMaterial;
 use sabine_testkit::{Fault, Hidden, LabConfig, Laboratory};
 use sabine_validation::AnyError;
 use sabine_validation::absorption::absorption_errors;
@@ -244,6 +245,15 @@ fn true_parameters(hidden: &Hidden, lab: &Laboratory) -> Result<Vec<(String, f64
             vec![("relative_humidity".into(), *relative_humidity_percent)]
         }
         Hidden::SurfaceAbsorption { absorption, .. } => by_band("absorption", absorption),
+        Hidden::AbsorptionTables { absorption } => {
+            let stated = lab.scene().materials().iter();
+            let factor = |(own, true_values): (&NamedMaterial, &Vec<f64>)| {
+                let table = own.material.absorption().values();
+                let factor = true_values.iter().sum::<f64>() / table.iter().sum::<f64>();
+                (format!("factor_{}", own.name), factor)
+            };
+            stated.zip(absorption).map(factor).collect()
+        }
         Hidden::Truncation { end_s, .. } => vec![("end".into(), *end_s)],
         Hidden::SoundSpeed { temperature_offset_k } => {
             vec![("temperature".into(), lab.air().temperature_c() + temperature_offset_k)]

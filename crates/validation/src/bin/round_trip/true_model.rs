@@ -57,6 +57,10 @@ impl TrueModel {
                     let name = lab.scene().materials()[*material].name.clone();
                     model.absorption.push((name, absorption.clone()));
                 }
+                Hidden::AbsorptionTables { absorption } => {
+                    let names = lab.scene().materials().iter().map(|m| m.name.clone());
+                    model.absorption.extend(names.zip(absorption.clone()));
+                }
                 other => model.add(other, lab, &nothing_hidden, fitted),
             }
         }
