@@ -298,7 +298,7 @@ fn a_material_that_is_another_is_found() {
 
 #[test]
 fn tables_that_are_off_by_more_than_they_state_are_found() {
-    let lab = small_lab(526, 8, THREE_OCTAVES_HZ);
+    let lab = small_lab(526, 8, FOUR_OCTAVES_HZ);
     let hidden = Hidden::random("absorption_tables", 1.0, &lab, 526).unwrap();
     let Hidden::AbsorptionTables { ref absorption } = hidden else { panic!("{hidden:?}") };
     let truth = absorption.clone();

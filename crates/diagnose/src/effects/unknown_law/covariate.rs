@@ -1,5 +1,6 @@
 //! What a law may go with.
 
+use super::release::Release;
 use super::wave::{WAVE, Wave};
 use crate::survey::{LEAST_RECORDINGS, Survey};
 use sabine_paths::laws::{Law, LawError, LawParameter, LawTarget};
@@ -9,7 +10,7 @@ use sabine_scene::Levels;
 pub(super) type Scale = (&'static str, f64, &'static str);
 
 /// A pure number by name, and lengths and times in it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Form {
     pub name: &'static str,
     pub text: &'static str,
@@ -22,7 +23,7 @@ pub(super) const fn form(name: &'static str, text: &'static str) -> Form {
     scaled(name, text, &[])
 }
 
-const fn scaled(name: &'static str, text: &'static str, scales: &'static [Scale]) -> Form {
+pub(super) const fn scaled(name: &'static str, text: &'static str, scales: &'static [Scale]) -> Form {
     Form { name, text, scales, meaning: "" }
 }
 
@@ -102,6 +103,8 @@ pub(crate) struct Covariate {
     scales: Vec<Scale>,
     /// What it is as a course along the recording, if it is one.
     pub wave: Option<Wave>,
+    /// The same, if the course is one of a gain that comes up again.
+    pub release: Option<Release>,
     /// Whether it may add as well as take: not where paths meet it a hundred times.
     pub both_signs: bool,
     /// Its share of the probability beforehand; the shares of all sum to one.
@@ -122,6 +125,7 @@ pub(crate) fn covariates(survey: &Survey) -> Vec<Covariate> {
             forms: vec![form],
             scales: Vec::new(),
             wave: None,
+            release: None,
             both_signs: false,
             share: of_reflections,
         })
@@ -132,6 +136,7 @@ pub(crate) fn covariates(survey: &Survey) -> Vec<Covariate> {
         forms,
         scales: Vec::new(),
         wave: None,
+        release: None,
         both_signs: true,
         share,
     };
@@ -144,8 +149,12 @@ pub(crate) fn covariates(survey: &Survey) -> Vec<Covariate> {
     let order = order_of_recordings(survey);
     let of_order = if order.is_some() { &OF_ORDER[..] } else { &[] };
     let waves = Wave::all(survey);
-    let share = each(3, OF_RECORDINGS.len() + of_order.len() + usize::from(!waves.is_empty()));
+    let share = each(3, OF_RECORDINGS.len() + 1 + of_order.len() + usize::from(!waves.is_empty()));
     all.extend(OF_RECORDINGS.iter().map(|f| plain(LawTarget::Recorder, vec![*f], share)));
+    all.extend(Release::ALL.map(|release| Covariate {
+        release: Some(release),
+        ..plain(LawTarget::Recorder, vec![release.form()], share / Release::ALL.len() as f64)
+    }));
     let scales = order.map_or_else(Vec::new, Vec::from);
     all.extend(of_order.iter().map(|f| {
         let of_recordings = plain(LawTarget::Recorder, vec![*f], share);
@@ -177,6 +186,11 @@ impl Covariate {
     /// The same of one form alone.
     pub fn of_form(&self, form: Form) -> Self {
         Self { forms: vec![form], ..self.clone() }
+    }
+
+    /// Whether it is a course of the recorder's gain whose own numbers are fitted.
+    pub fn is_fitted_course(&self) -> bool {
+        self.wave.is_some() || self.release.is_some()
     }
 
     /// Whether it asks where paths go or come from.
@@ -219,6 +233,10 @@ impl Covariate {
         meaning.extend(self.wave.map(|wave| {
             let [shortest, longest] = wave.periods_s();
             format!(", a period of {shortest:.2} to {longest:.2} s")
+        }));
+        meaning.extend(self.release.map(|release| {
+            let [shortest, longest] = release.times_s();
+            format!(", a time constant of {shortest:.2} to {longest:.2} s")
         }));
         format!("{what} with {}{meaning}", self.text())
     }

@@ -2,6 +2,7 @@
 
 use super::band_law::{BandLaw, BandTerm};
 use super::covariate::{Covariate, covariates};
+use super::release::{FittedRelease, Release};
 use super::wave::{FittedWave, Wave};
 use crate::effect::{Case, DecayTerm, FittedCase, Parameter, Stage};
 use crate::effects::law_effect::tabulated_law::TabulatedLaw;
@@ -37,10 +38,10 @@ impl Grammar {
         let covariates = covariates(survey);
         let band_laws = BandLaw::all(survey.bands().len());
         // What changes the gain of a recording does so in all octaves.
-        let of_waves = [(BandLaw::Same, 1.0)];
+        let of_courses = [(BandLaw::Same, 1.0)];
         let of_covariate = |(covariate, own): (usize, &Covariate)| {
             let share = own.share;
-            let band_laws = if own.wave.is_some() { &of_waves[..] } else { &band_laws };
+            let band_laws = if own.is_fitted_course() { &of_courses[..] } else { &band_laws };
             let one = move |&(bands, of_bands): &(BandLaw, f64)| Formula {
                 covariate,
                 bands,
@@ -64,12 +65,15 @@ impl Grammar {
         if let Some(wave) = covariate.wave {
             return Ok(self.wave_case(formula, wave, survey));
         }
+        if let Some(release) = covariate.release {
+            return Ok(self.release_case(formula, release, survey));
+        }
         let amplitude = self.amplitude(formula, survey);
         let law = TabulatedLaw::new(covariate.unit_law()?, 0, amplitude.range_db);
         let found = found(covariate.clone(), formula.bands, survey.bands());
         let changes = move |fitted: &FittedCase<'_>| {
-            let parameter = |i: usize| LawParameter::new(fitted.values()[i], fitted.interval(i), "dB");
-            let law = found(&(0..fitted.values().len()).map(parameter).collect::<Vec<_>>());
+            let parameters = (0..fitted.values().len()).map(|i| fitted_parameter(fitted, i, "dB"));
+            let law = found(&parameters.collect::<Vec<_>>());
             law.map_or_else(|_| Vec::new(), |law| vec![ModelChange::Law(Box::new(law))])
         };
         let (parameters, stage) = (self.parameters(formula, survey), self.stage(formula));
@@ -83,22 +87,40 @@ impl Grammar {
 
     /// A wave as a case: its period and its phase are fitted with its amplitude.
     fn wave_case(&self, formula: &Formula, wave: Wave, survey: &Survey) -> Case {
-        let mut parameters = self.parameters(formula, survey);
-        let begin: Vec<f64> = wave.parameters().iter().map(|p| p.neutral).collect();
-        let starts = starts(&parameters).into_iter().map(|own| [own, begin.clone()].concat()).collect();
-        parameters.extend(wave.parameters());
-        let changes = move |fitted: &FittedCase<'_>| {
-            let parameter = |(i, unit): (usize, &'static str)| {
-                LawParameter::new(fitted.values()[i], fitted.interval(i), unit)
-            };
-            let law = wave.law([(0, "dB"), (1, "rad/s"), (2, "rad")].map(parameter));
-            law.map_or_else(|_| Vec::new(), |law| vec![ModelChange::Law(Box::new(law))])
+        let law = move |fitted: &FittedCase<'_>| {
+            wave.law([(0, "dB"), (1, "rad/s"), (2, "rad")].map(|(i, unit)| fitted_parameter(fitted, i, unit)))
         };
-        Case::decay(parameters, FittedWave)
+        self.course_case(formula, survey, wave.parameters().to_vec(), FittedWave, law)
+    }
+
+    /// A release as a case: its time constant is fitted with its amplitude.
+    fn release_case(&self, formula: &Formula, release: Release, survey: &Survey) -> Case {
+        let law = move |fitted: &FittedCase<'_>| {
+            release.law([(0, "dB"), (1, "s")].map(|(i, unit)| fitted_parameter(fitted, i, unit)))
+        };
+        self.course_case(formula, survey, vec![release.parameter()], FittedRelease, law)
+    }
+
+    /// A course of the recorder's gain as a case, with these parameters behind its amplitude.
+    fn course_case(
+        &self,
+        formula: &Formula,
+        survey: &Survey,
+        own: Vec<Parameter>,
+        term: impl DecayTerm + 'static,
+        law: impl Fn(&FittedCase<'_>) -> Result<Law, LawError> + Send + Sync + 'static,
+    ) -> Case {
+        let mut parameters = self.parameters(formula, survey);
+        let begin: Vec<f64> = own.iter().map(|p| p.neutral).collect();
+        let starts = starts(&parameters).into_iter().map(|start| [start, begin.clone()].concat()).collect();
+        parameters.extend(own);
+        Case::decay(parameters, term)
             .about(self.subject(formula, survey))
             .at(self.stage(formula))
             .starting(starts)
-            .changing(changes)
+            .changing(move |fitted| {
+                law(fitted).map_or_else(|_| Vec::new(), |law| vec![ModelChange::Law(Box::new(law))])
+            })
     }
 
     /// A formula with these numbers for its covariate, `[pair][band][bin]`: one for each bin in the place of one for each path.
@@ -129,6 +151,11 @@ impl Grammar {
         let shares = formula.bands.terms(survey).into_iter().map(|t| t.shares).collect();
         Amplitude { shares, range_db }
     }
+}
+
+/// A fitted value with its interval, as a number of a law.
+fn fitted_parameter(fitted: &FittedCase<'_>, i: usize, unit: &'static str) -> LawParameter {
+    LawParameter::new(fitted.values()[i], fitted.interval(i), unit)
 }
 
 /// Small and large amplitudes, on each side where both are sought.
@@ -242,7 +269,9 @@ mod tests {
     use super::*;
     use crate::config::DiagnoseConfig;
     use crate::hand_made;
+    use crate::infer::baseline::Baseline;
     use crate::likelihood::decay::EnergyModel;
+    use sabine_paths::laws::BoundLaws;
     use sabine_scene::{Levels, TimeZero};
 
     #[test]
@@ -265,7 +294,7 @@ mod tests {
         for formula in &grammar.formulas {
             let case = grammar.case(formula, &survey).unwrap();
             let terms = formula.bands.terms(&survey);
-            // Those of a wave behind its amplitude stay as they are.
+            // Those of a course behind its amplitude stay as they are.
             let value =
                 |(i, p): (usize, &Parameter)| if i < terms.len() { 0.3 * p.bounds.1 } else { p.neutral };
             let fitted: Vec<f64> = case.parameters.iter().enumerate().map(value).collect();
@@ -288,6 +317,47 @@ mod tests {
                 );
             }
             assert!(law.words().ends_with('.') && case.starts.iter().all(|s| s.len() == fitted.len()));
+        }
+    }
+
+    /// What is fitted, against energies of all paths under the law that is then rendered.
+    #[test]
+    fn what_a_fit_of_a_course_does_to_each_bin_is_what_its_law_does_to_the_paths() {
+        let baseline = Baseline::of_laboratory(32);
+        let (survey, data) = (baseline.survey(), baseline.energy_data());
+        let grammar = Grammar::of(survey);
+        let used = vec![true; baseline.pairs()];
+        let plain = EnergyModel::new(&data, &[], &used);
+        let room = baseline.room_view().unwrap();
+        let (pair, band) = (1, 3);
+        let count = data.ends[pair][band];
+        let is_course = |f: &&Formula| grammar.covariates[f.covariate].is_fitted_course();
+        let courses: Vec<&Formula> = grammar.formulas.iter().filter(is_course).collect();
+        assert_eq!(courses.len(), 44);
+        let (releases, waves) = courses.split_at(Release::ALL.len());
+        for formula in releases.iter().chain(waves.iter().step_by(7)) {
+            let case = grammar.case(formula, survey).unwrap();
+            let found: Vec<f64> =
+                case.parameters.iter().map(|p| if p.unit == "dB" { 2.0 } else { 1.02 * p.neutral }).collect();
+            let cases = [&case];
+            let model = EnergyModel::new(&data, &cases, &used);
+            let mut values = model.start(None);
+            let first = model.first_of(0);
+            values[first..first + found.len()].copy_from_slice(&found);
+            let before = plain.predicted(&plain.start(None), pair, band, count);
+            let after = model.predicted(&values, pair, band, count);
+            let changes = case.model_changes(&FittedCase::of_values(survey, &found));
+            let [ModelChange::Law(law)] = changes.as_slice() else { panic!("{changes:?}") };
+            let bound = BoundLaws::new(std::slice::from_ref(&**law), &room.pair(pair).law_site()).unwrap();
+            let paths =
+                room.pair(pair).ln_changes(band, &room.pair(pair).energies_under(&bound).unwrap()[band]);
+            let mut most = 0.0f64;
+            for (bin, expected) in paths.iter().take(count).enumerate() {
+                let change = after[bin] - before[bin];
+                assert!((change - expected).abs() < 0.02, "{}: {bin}: {change} {expected}", law.words());
+                most = most.max(change.abs());
+            }
+            assert!(most > 0.1, "{most}");
         }
     }
 

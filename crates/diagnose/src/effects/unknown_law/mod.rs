@@ -3,6 +3,7 @@
 mod band_law;
 mod covariate;
 mod formula;
+mod release;
 mod wave;
 
 pub(crate) use band_law::BandLaw;
@@ -24,7 +25,8 @@ const MOST_PER_OCTAVE_DB: f64 = 4.0;
 /// A law that the data choose among the formulas of a grammar: an amplitude in dB, how it goes with the octave (the same in all, evenly up or
 /// down, both, above or below an edge, with the square of the frequency, about a resonance), and a covariate: the angle at each surface, length
 /// and share of scattering of paths, where they leave the source and reach the receiver, distance, time, the order of the recordings where it is
-/// stated, products of two, and waves along the recording, whose period and phase are fitted too. Where its covariate is 1 a law takes up to
+/// stated, products of two, and two courses of the recorder's gain: waves, whose period and phase are fitted too, and releases after a loud first
+/// sound, whose time constant is. Where its covariate is 1 a law takes up to
 /// 20 dB, or adds up to 10. A second term of another covariate is a second law, which is searched for beside the first.
 ///
 /// Mark: none of the catalogue explains what is left, and it goes with one of these. Mimicked by: every cause of the catalogue that goes with

@@ -106,12 +106,8 @@ impl DecayTerm for FittedWave {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)] // a panic is how a test fails
     use super::*;
-    use crate::effects::Grammar;
     use crate::infer::baseline::Baseline;
-    use crate::likelihood::decay::EnergyModel;
-    use sabine_paths::laws::BoundLaws;
 
     #[test]
     fn the_sine_and_the_cosine_of_each_period_make_its_waves() {
@@ -129,44 +125,6 @@ mod tests {
                 });
                 assert!(own.fold(0.0, f64::max) < 1e-12);
             }
-        }
-    }
-
-    /// What is fitted, against energies of all paths under the law that is then rendered.
-    #[test]
-    fn what_a_fit_does_to_each_bin_is_what_its_law_does_to_the_paths() {
-        let baseline = Baseline::of_laboratory(32);
-        let (survey, data) = (baseline.survey(), baseline.energy_data());
-        let grammar = Grammar::of(survey);
-        let used = vec![true; baseline.pairs()];
-        let plain = EnergyModel::new(&data, &[], &used);
-        let room = baseline.room_view().unwrap();
-        let (pair, band) = (1, 3);
-        let count = data.ends[pair][band];
-        for wave in Wave::all(survey).into_iter().step_by(7) {
-            let formula =
-                grammar.formulas.iter().find(|f| grammar.covariates[f.covariate].wave == Some(wave));
-            let case = grammar.case(formula.unwrap(), survey).unwrap();
-            let found = [2.0, 1.02 * wave.rad_per_s, wave.phase_rad + 0.1];
-            let cases = [&case];
-            let model = EnergyModel::new(&data, &cases, &used);
-            let mut values = model.start(None);
-            values[model.first_of(0)..model.first_of(0) + 3].copy_from_slice(&found);
-            let before = plain.predicted(&plain.start(None), pair, band, count);
-            let after = model.predicted(&values, pair, band, count);
-            let parameter = |(x, unit): (f64, &'static str)| LawParameter::new(x, [x; 2], unit);
-            let law =
-                wave.law([(found[0], "dB"), (found[1], "rad/s"), (found[2], "rad")].map(parameter)).unwrap();
-            let bound = BoundLaws::new(std::slice::from_ref(&law), &room.pair(pair).law_site()).unwrap();
-            let paths =
-                room.pair(pair).ln_changes(band, &room.pair(pair).energies_under(&bound).unwrap()[band]);
-            let mut most = 0.0f64;
-            for (bin, expected) in paths.iter().take(count).enumerate() {
-                let change = after[bin] - before[bin];
-                assert!((change - expected).abs() < 0.02, "{}: {bin}: {change} {expected}", law.words());
-                most = most.max(change.abs());
-            }
-            assert!(most > 0.1, "{most}");
         }
     }
 }

@@ -53,7 +53,7 @@ pub(crate) fn points(
             if strength(band) < LEAST_SHARE * most {
                 continue;
             }
-            let x = if grammar.covariates[formula.covariate].wave.is_some() {
+            let x = if grammar.covariates[formula.covariate].is_fitted_course() {
                 // The course of a gain is drawn over time.
                 data.states[pair][band].time_s[..count].iter().map(|t| data.direct_s[pair] + t).collect()
             } else {
