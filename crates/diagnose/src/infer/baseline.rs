@@ -228,8 +228,8 @@ impl Baseline {
         let used = self.observations.fitted.clone();
         for round in 0..ROUNDS {
             report(observer, "baseline", round as u64, ROUNDS as u64)?;
-            let found = self.fit_energy(&[], &used, None)?;
-            let moved = self.move_absorption(&found.0.values, 1.0);
+            let found = decay::fit_from_elsewhere(&self.energy_data(), &used)?;
+            let moved = self.move_absorption(&found.values, 1.0);
             let last = moved < TOLERANCE || round + 1 == ROUNDS;
             self.simulation.expand(&self.observations, last)?;
             if last {

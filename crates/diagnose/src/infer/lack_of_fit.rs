@@ -15,7 +15,6 @@ use crate::infer::law_search::best::{BestFormula, Formulas};
 use crate::infer::search::{Search, State};
 use crate::likelihood::arrivals::ArrivalModel;
 use crate::likelihood::decay::{BinResidual, EnergyModel};
-use crate::likelihood::laplace::Model;
 use crate::observe::observed_response::Measured;
 use crate::statistics::{poisson_tail, upper_tail};
 use rayon::prelude::*;
@@ -215,11 +214,11 @@ fn against_statements(search: &Search<'_>, state: &State) -> Vec<Test> {
         (survey.bands_of_modes..survey.bands.len()).map(|b| layout.absorption(m, b)).collect()
     };
     let absorption = (0..survey.materials.len())
-        .map(|m| (m, stated::contradiction(&state.energy, decays.priors(), &of_material(m))));
+        .map(|m| (m, stated::contradiction(&state.energy, &decays, &of_material(m))));
     let mut tests = vec![least("absorption against the tables", absorption, |m| survey.materials[m].clone())];
     if survey.measurement.levels != StatedLevels::PerResponse {
         let gains: Vec<usize> = (0..survey.responses.len()).map(|r| layout.gain(r)).collect();
-        let p_value = stated::contradiction(&state.energy, decays.priors(), &gains);
+        let p_value = stated::contradiction(&state.energy, &decays, &gains);
         tests.push(Test { name: "gains of responses against what is stated", subject: None, p_value });
     }
     let sources = survey.sources.len();
@@ -228,7 +227,7 @@ fn against_statements(search: &Search<'_>, state: &State) -> Vec<Test> {
     };
     let stated = (0..sources + survey.receivers.len()).map(|i| {
         let own: Vec<usize> = of_place(i).collect();
-        (i, stated::contradiction(&state.arrivals, arrivals.priors(), &own))
+        (i, stated::contradiction(&state.arrivals, &arrivals, &own))
     });
     let name = |i: usize| {
         if i < sources { survey.sources[i].id.clone() } else { survey.receivers[i - sources].id.clone() }

@@ -14,7 +14,7 @@ mod pair_likelihood;
 mod tests;
 mod variance;
 
-pub(crate) use fit::{WarmStart, fit};
+pub(crate) use fit::{WarmStart, fit, fit_from_elsewhere};
 use group_sums::energies_and_hits;
 use offsets::{BandBins, Directions};
 pub(crate) use offsets::{DRIFTS, unit_drift};
@@ -131,6 +131,17 @@ impl<'a> EnergyModel<'a> {
         if let Some(before) = before {
             let n = self.layout.len().min(before.len());
             x[..n].copy_from_slice(&before[..n]);
+        }
+        x
+    }
+
+    /// Values with other absorptions, by material and band.
+    fn with_absorption(&self, values: &[f64], absorption: impl Fn(usize, usize) -> f64) -> Vec<f64> {
+        let mut x = values.to_vec();
+        for m in 0..self.data.absorption.len() {
+            for band in 0..self.data.survey.bands.len() {
+                x[self.layout.absorption(m, band)] = absorption(m, band);
+            }
         }
         x
     }

@@ -106,6 +106,12 @@ pub(crate) fn known_beforehand(model: &dyn Model) -> DMatrix<f64> {
     inverse
 }
 
+/// The covariance of some of a model's parameters beforehand. Those that go together with others need not all be among them.
+pub(crate) fn covariance_beforehand(model: &dyn Model, parameters: &[usize]) -> Option<DMatrix<f64>> {
+    let whole = known_beforehand(model).cholesky()?.inverse();
+    Some(whole.select_rows(parameters).select_columns(parameters))
+}
+
 /// Derivatives of a log-likelihood: its gradient, and the expected curvature (Fisher information).
 pub(crate) struct Slopes {
     pub gradient: DVector<f64>,

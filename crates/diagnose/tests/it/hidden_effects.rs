@@ -296,6 +296,21 @@ fn a_material_that_is_another_is_found() {
     assert_eq!(cause.subject.as_deref(), Some(lab.scene().materials()[material].name.as_str()));
 }
 
+/// Between these walls, hard and soft in the highest octaves, a fit from the stated absorption comes to rest 66 nats below the best one.
+#[test]
+fn a_fit_that_could_rest_elsewhere_is_not_taken_for_a_misfit() {
+    let config = LabConfig { seed: 2_201_735_714, receivers: 12, ..LabConfig::default() };
+    let lab = Laboratory::new(config).unwrap();
+    let truth = lab.truth(&[]).unwrap();
+    let found = diagnose_among(&lab, &[], &ON_DECAYS);
+    assert_eq!(found.verdict, Verdict::Adequate, "{:?}", found.lack_of_fit);
+    for material in &truth.materials {
+        let (_, fitted) = found.materials.iter().find(|(name, _)| *name == material.name).unwrap();
+        let (fitted, own) = (fitted.absorption.last().unwrap(), material.absorption.last().unwrap());
+        assert!((fitted - own).abs() < 0.03, "{}: {fitted} for {own} in the highest octave", material.name);
+    }
+}
+
 #[test]
 fn tables_that_are_off_by_more_than_they_state_are_found() {
     let lab = small_lab(526, 8, FOUR_OCTAVES_HZ);

@@ -27,11 +27,15 @@ pub(crate) fn fit(
     before: Option<WarmStart<'_>>,
 ) -> Result<(LaplaceFit, Vec<usize>), Error> {
     let model = EnergyModel::new(data, cases, used);
-    let mut first_start = model.start(before.map(|b| b.values));
+    let mut starts: Vec<Vec<f64>> = vec![model.start(before.map(|b| b.values))];
     if before.is_none() {
-        model.start_gains(&mut first_start);
+        // What is stated, and what an earlier fit found: the predictions are expanded about it.
+        let found = model.with_absorption(&starts[0], |m, band| data.absorption[m][band]);
+        if found != starts[0] {
+            starts.push(found);
+        }
+        starts.iter_mut().for_each(|start| model.start_gains(start));
     }
-    let mut starts: Vec<Vec<f64>> = vec![first_start];
     // Where a material may be anything, the others that made up for it so far mislead: from what is stated of them, too.
     let mut unstrained: Option<Vec<f64>> = None;
     let mut more: Vec<Vec<f64>> = Vec::new();
@@ -80,6 +84,45 @@ pub(crate) fn fit(
     }
     let firsts = (0..cases.len()).map(|order| model.first_of(order)).collect();
     best.map(|b| (b, firsts)).ok_or(Error::Singular { what: "decays" })
+}
+
+/// How far each material is taken from its table for a start elsewhere, in standard deviations: one material up or down, all others the other way.
+const ELSEWHERE: [f64; 2] = [2.0, -1.0];
+/// What another optimum must gain to be taken, in nats.
+const LEAST_GAIN_NATS: f64 = 1.0;
+
+/// The fit without causes, looked for elsewhere, too. Between few surfaces, some hard and some soft, which of them absorbs may have several
+/// answers in an octave, each the best in its neighbourhood: octave by octave, those that are found from other absorptions than the stated
+/// ones are tried in the place of the first.
+pub(crate) fn fit_from_elsewhere(data: &EnergyData<'_>, used: &[bool]) -> Result<LaplaceFit, Error> {
+    let (mut best, _) = fit(data, &[], used, None)?;
+    let model = EnergyModel::new(data, &[], used);
+    let (priors, stated) = (model.priors(), model.start(None));
+    let materials = data.absorption.len();
+    let ways = (0..materials).flat_map(|own| [(own, ELSEWHERE), (own, ELSEWHERE.map(|sds| -sds))]);
+    for (own, [this, others]) in ways.take(if materials > 1 { 2 * materials } else { 0 }) {
+        let mut start = model.with_absorption(&stated, |m, band| {
+            let prior = &priors[model.layout.absorption(m, band)];
+            let sds = if m == own { this } else { others };
+            (prior.mean + sds * prior.sd).clamp(0.3 * prior.mean, prior.high)
+        });
+        model.start_gains(&mut start);
+        let other = maximise(&model, &start, "decays")?;
+        for band in 0..data.survey.bands.len() {
+            let of_band: Vec<usize> = (0..materials).map(|m| model.layout.absorption(m, band)).collect();
+            let apart = |&i: &usize| (other.values[i] - best.values[i]).abs() > priors[i].sd.min(0.02);
+            if !of_band.iter().any(apart) {
+                continue;
+            }
+            let mut start = best.values.clone();
+            of_band.iter().for_each(|&i| start[i] = other.values[i]);
+            let tried = maximise(&model, &start, "decays")?;
+            if tried.log_posterior > best.log_posterior + LEAST_GAIN_NATS {
+                best = tried;
+            }
+        }
+    }
+    Ok(best)
 }
 
 /// Those of the starts from which a search begins highest.
