@@ -177,6 +177,7 @@ fn doubted(weighed: &Weighed, confirmed: &Confirmation) -> Vec<FallenLaw> {
         reason: match doubt {
             Doubt::Modes => "octaves below the Schroeder frequency alone speak for it",
             Doubt::Rays(_) => "other rays do not confirm it",
+            Doubt::Decays => "decays speak for it, not the tables",
             Doubt::Misfit => "more speaks against what is left than for it",
             Doubt::Elsewhere => "it does not help to predict positions that are left out in turn",
         }

@@ -148,6 +148,21 @@ impl Case {
         }
     }
 
+    /// Whether it does not believe the tables of several materials: beside it every other cause is judged by tables that may be anything.
+    pub(crate) fn opens_several_tables(&self) -> bool {
+        self.relaxes.iter().filter(|(nuisance, _)| matches!(nuisance, Nuisance::Absorption(_))).count() > 1
+    }
+
+    /// Whether another case relaxes all that this one does, and more: it says the same less precisely.
+    pub(crate) fn is_part_of(&self, other: &Self) -> bool {
+        let alone = |case: &Self| matches!(case.term, Term::PriorOnly);
+        let within = |(nuisance, _): &(Nuisance, f64)| other.relaxes.iter().any(|(n, _)| n == nuisance);
+        alone(self)
+            && alone(other)
+            && self.relaxes.len() < other.relaxes.len()
+            && self.relaxes.iter().all(within)
+    }
+
     pub(crate) fn decay_term(&self) -> Option<&dyn DecayTerm> {
         if let Term::Decay(term) = &self.term { Some(&**term) } else { None }
     }

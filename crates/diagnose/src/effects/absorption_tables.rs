@@ -52,8 +52,21 @@ impl Effect for AbsorptionTables {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::{PositionError, SurfaceAbsorption};
     use crate::hand_made;
     use sabine_scene::{Levels, TimeZero};
+
+    #[test]
+    fn one_material_is_part_of_all_and_not_the_other_way_round() {
+        let survey = hand_made::survey(Levels::Common, TimeZero::Emission);
+        let all = &AbsorptionTables.cases(&survey)[0];
+        for one in SurfaceAbsorption.cases(&survey) {
+            assert!(one.is_part_of(all) && !all.is_part_of(&one) && !one.is_part_of(&one));
+            assert!(all.opens_several_tables() && !one.opens_several_tables());
+        }
+        let moved = PositionError.cases(&survey);
+        assert!(!moved[0].is_part_of(all));
+    }
 
     #[test]
     fn tables_that_state_more_than_half_are_believed() {

@@ -42,6 +42,8 @@ pub(crate) enum Doubt {
     Elsewhere,
     /// More speaks against the fit with it than for it.
     Misfit,
+    /// It says that tables are uncertain, and not they speak for it but the decays.
+    Decays,
 }
 
 /// What is left of a selection, and why.
@@ -244,6 +246,12 @@ fn doubtful(
         .iter()
         .map(|&candidate| rests_on_tables(search, state, candidate))
         .collect::<Result<Vec<bool>, _>>()?;
+    // Decays that come nearer because all tables may be anything have another cause.
+    let opens = |c: usize| search.candidates[c].case.opens_several_tables();
+    let chosen = state.chosen.iter().copied();
+    if let Some((worst, _)) = chosen.zip(&rests_on_tables).find(|&(c, rests)| opens(c) && !rests) {
+        return Ok(Some((worst, Doubt::Decays)));
+    }
     Ok(least_confirmed(search, state, predicted, &rests_on_tables).map(|worst| (worst, Doubt::Elsewhere)))
 }
 

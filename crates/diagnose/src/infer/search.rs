@@ -237,13 +237,15 @@ impl<'a> Search<'a> {
     }
 
     /// Others that explain the same as well: those near in evidence that add nothing beside the best, as the best adds
-    /// nothing beside them.
+    /// nothing beside them. One that says what the best says less precisely is none.
     pub fn rivals(&self, state: &State, ranked: &[EffectScore]) -> Result<Vec<EffectScore>, Error> {
         let Some(best) = ranked.first() else { return Ok(Vec::new()) };
         let with_best = self.with(state, best.best)?;
-        let near = ranked[1..]
-            .iter()
-            .filter(|r| best.nats - r.nats < RIVAL_NATS && r.nats > self.threshold() - RIVAL_NATS);
+        let near = ranked[1..].iter().filter(|r| {
+            best.nats - r.nats < RIVAL_NATS
+                && r.nats > self.threshold() - RIVAL_NATS
+                && !self.candidates[best.best].case.is_part_of(self.candidates[r.best].case)
+        });
         let mut rivals = Vec::new();
         for rival in near {
             let with_rival = self.with(state, rival.best)?;

@@ -28,10 +28,9 @@ pub(crate) fn parameters(search: &Search<'_>, state: &State, candidate: usize) -
     }
     let bands = baseline.survey().bands;
     let open = (f64::NEG_INFINITY, f64::INFINITY);
-    let absorptions = case.relaxes.iter().filter(|(n, _)| matches!(n, Nuisance::Absorption(_))).count();
     for &(nuisance, _) in &case.relaxes {
         match nuisance {
-            Nuisance::Absorption(m) if absorptions > 1 => {
+            Nuisance::Absorption(m) if case.opens_several_tables() => {
                 let survey = baseline.survey();
                 let Some(stated) = &survey.absorption_prior(m).absorption else { continue };
                 let stated: f64 = stated.values().iter().sum();

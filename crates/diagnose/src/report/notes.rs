@@ -119,6 +119,7 @@ fn why_not(doubt: &Doubt) -> String {
         Doubt::Elsewhere => {
             "fits the positions that it was fitted to, but does not help to predict those left out".to_owned()
         }
+        Doubt::Decays => "brings decays nearer by more than it takes off the tables, so that something else may be at work".into(),
         Doubt::Modes => "would explain the lowest octaves alone, where few room modes decide and no simulation is that exact".into(),
         Doubt::Rays(rays) => {
             let quarters: Vec<String> =
