@@ -7,11 +7,11 @@ use crate::survey::Survey;
 
 /// Absorption of each material off by a factor of its own, far beyond the uncertainty that is stated: tables of other products than those on
 /// the walls, or a standard deviation that nobody measured. Each prior is widened to half of the material's mean stated absorption, 0.15 at
-/// most, and goes together over the octaves as for [`SurfaceAbsorption`](super::SurfaceAbsorption). Half is a choice: what textbooks state
-/// for one kind of surface differs by about that factor. Laboratories that measure one sample differ by less (ISO 12999-2).
+/// most, and goes together over the octaves as for [`SurfaceAbsorption`](super::SurfaceAbsorption); half is a choice. Materials whose stated
+/// deviation is larger stay as they are, and where fewer than two are left there is no case.
 ///
-/// Mark: decays of all octaves, and reflections of several surfaces, none of which is wrong by itself. Mimicked by: a single material that is
-/// far off, and to which the others yield.
+/// Mark: the tables are strained, and decays are met nearly as well without it; where decays come much nearer, something else acts, and it is
+/// not named. Mimicked by: a single material that is far off, and to which the others yield.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AbsorptionTables;
 
