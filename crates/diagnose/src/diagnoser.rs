@@ -1,6 +1,7 @@
 //! The whole diagnosis: observe, simulate, infer, confirm, report.
 
 mod discovering;
+mod held_out;
 mod parts_of_rays;
 
 use crate::config::DiagnoseConfig;
@@ -20,6 +21,7 @@ use crate::infer::visibility::d_prime;
 use crate::report::composition::compose;
 use crate::report::diagnosis::Diagnosis;
 use crate::simulate::scene_tracer::{Rays, SceneTracer};
+use held_out::held_receivers;
 use sabine_acoustics::Observer;
 use sabine_paths::laws::{BoundLaws, Law, LawSite};
 use sabine_scene::MeasuredRoom;
@@ -233,13 +235,16 @@ impl Diagnoser {
         observer: &dyn Observer,
     ) -> Result<Diagnosis, Error> {
         let held = held_receivers(room, hold_out)?;
-        if self.looks_for_laws() && !self.only_if_needed {
+        // Formulas are weighed by bins, which tables do not have.
+        let has_bins = !room.responses().is_empty();
+        if has_bins && self.looks_for_laws() && !self.only_if_needed {
             return self.discovered(room, &held, None, observer);
         }
         let task = self.without_search(room, &held);
         let (weighed, confirmed) = self.found(&task, observer)?;
         let (significance, naming_nats) = (self.config.significance, self.config.naming_nats);
-        let calls_for_laws = self.only_if_needed && confirmed.calls_for_laws(significance, naming_nats);
+        let calls_for_laws =
+            has_bins && self.only_if_needed && confirmed.calls_for_laws(significance, naming_nats);
         let plain = self.composed(&weighed, confirmed, task.effects, observer)?;
         if calls_for_laws && !self.vault(room, &held).is_empty() {
             return self.discovered(room, &held, Some(plain), observer);
@@ -373,6 +378,9 @@ impl Diagnoser {
         let mut baseline = Baseline::new(task.room, &held, &self.config, tracer, observer)?;
         let used = baseline.observations.fitted.clone();
         let mut cases = candidates::cases(&self.effects, baseline.survey());
+        if baseline.observations.are_tables() {
+            cases.retain(|own| own.case.bears_on_tables());
+        }
         // What cannot be prepared takes no part.
         let started = Instant::now();
         let mut refused = baseline.prepare(&cases)?.into_iter();
@@ -468,18 +476,4 @@ impl Weighed {
             .splice(0..0, fallen.into_iter().map(|(candidate, rays)| (candidate, Doubt::Rays(rays))));
         Ok(confirmed)
     }
-}
-
-/// Receivers (indices) to be held out.
-fn held_receivers(room: &MeasuredRoom, hold_out: &[String]) -> Result<Vec<usize>, Error> {
-    let mut held: Vec<usize> = Vec::new();
-    for id in hold_out {
-        let index = room.receivers().iter().position(|r| r.id == *id);
-        let index = index.filter(|&i| room.responses().iter().any(|r| r.receiver == i));
-        held.push(index.ok_or_else(|| Error::UnknownHoldOut { id: id.clone() })?);
-    }
-    if !room.responses().is_empty() && room.responses().iter().all(|r| held.contains(&r.receiver)) {
-        return Err(Error::AllHeldOut);
-    }
-    Ok(held)
 }

@@ -19,11 +19,15 @@ pub enum Error {
     /// A setting is out of range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
-    /// The room has no measured responses.
-    #[error("the room has no measured responses: there is nothing to compare the simulation with")]
+    /// The room has no measured responses, and no tables of parameters.
+    #[error(
+        "the room has no measured responses, nor tables of parameters: there is nothing to compare the simulation with"
+    )]
     NoResponses,
     /// No response can be compared in any band.
-    #[error("none of the {responses} responses can be compared with the simulation in any octave")]
+    #[error(
+        "none of the {responses} responses, or tables, can be compared with the simulation in any octave"
+    )]
     NothingToCompare {
         /// Responses looked at.
         responses: usize,

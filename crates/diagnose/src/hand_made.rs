@@ -10,14 +10,17 @@ use crate::likelihood::laplace::Prior;
 use crate::observe::early_energy::EarlySamples;
 use crate::observe::observations::Observations;
 use crate::observe::observed_response::Measured;
+use crate::observe::parameter_table::StatedParameter;
 use crate::observe::time_bins::Bins;
 use crate::simulate::band_state::BandState;
 use crate::simulate::simulation::Simulation;
+use crate::simulate::table_chance::TableChance;
+use crate::simulate::table_readings::{TimeAxis, read};
 use crate::simulate::tables::Tables as Prepared;
 use crate::simulate::traced_pair::Arrival;
 use crate::survey::surfaces::{Surface, axes_of};
 use crate::survey::{Place, Survey, SurveyedResponse};
-use sabine_acoustics::{Air, Bands, Material, PerBand};
+use sabine_acoustics::{Air, Bands, Material, ParameterKind, PerBand};
 use sabine_scene::{Levels, MaterialPrior, Measurement, TimeZero};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -203,6 +206,23 @@ impl Tables {
         all
     }
 
+    /// With a table of parameters of each pair in the place of its response: as predicted, and off by some hundredths.
+    pub fn with_parameters(mut self) -> Self {
+        let kinds = [ParameterKind::Edt, ParameterKind::C50, ParameterKind::C80, ParameterKind::CentreTime];
+        let stated = kinds.map(|kind| StatedParameter { kind, ln_sd: 0.05 }).to_vec();
+        for (pair, (measured, states)) in self.measured.iter_mut().zip(&mut self.states).enumerate() {
+            for (band, (energies, state)) in measured.energies.iter_mut().zip(states).enumerate() {
+                let axis = TimeAxis { bins: state.bins, time_s: &state.time_s };
+                let predicted = read(&stated, axis, &state.ln_energy);
+                let off = |k: usize| 0.03 * (3.0 * k as f64 + 2.0 * pair as f64 + band as f64).sin();
+                *energies = Some(predicted.iter().enumerate().map(|(k, ln)| (ln + off(k)).exp()).collect());
+                state.table = TableChance::of(&stated, state);
+            }
+            measured.table = Some(vec![stated.clone(); measured.energies.len()]);
+        }
+        self
+    }
+
     /// A baseline of these tables: what the search, the selection and the model need.
     pub fn baseline(self, config: DiagnoseConfig) -> Baseline {
         let column = |values: &Vec<f64>| PerBand::new(self.survey.bands, values.clone());
@@ -293,6 +313,7 @@ fn measured(survey: &Survey, pair: usize, states: &[BandState], arrivals: &[Arri
     let later = &arrivals[1..];
     Measured {
         energies: energies.collect(),
+        table: None,
         direct_s: arrivals[0].length_m / speed_m_s + 6e-6,
         peaks_s: later
             .iter()

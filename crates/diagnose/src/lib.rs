@@ -16,7 +16,8 @@
 //! # How
 //! Decays are compared as energy in octaves and time bins, relative to the direct sound; each bin with the spread that interference of
 //! the traced paths and their Monte-Carlo error give it. Arrival times of the direct sound and of early reflections are compared
-//! by themselves; so is the energy of single first reflections, for holes in walls. Absorption stays free within its stated uncertainty beside every cause, gains, latencies and places within
+//! by themselves; so is the energy of single first reflections, for holes in walls. Of a room that has no responses its tables of parameters
+//! are compared instead ([`MeasuredRoom::parameters`](sabine_scene::MeasuredRoom::parameters)): they tell of decays alone. Absorption stays free within its stated uncertainty beside every cause, gains, latencies and places within
 //! theirs: otherwise a cause is credited with what absorption could have explained. Each cause is weighed by its evidence, all
 //! parameters integrated out, against every other and against a smooth discrepancy without a name; details at [`Diagnoser`], the
 //! reasoning in `docs/explanation/diagnosis.md`.
@@ -120,6 +121,7 @@ pub use plan::measurement::PlannedMeasurement;
 pub use plan::open_question::QuestionError;
 pub use plan::outcome::{Chosen, Decision, EffectSize, LookAlikes, Plan, Weighing};
 pub use plan::planner::Planner;
+pub use report::compared_values::ComparedValue;
 pub use report::diagnosis::{
     CandidateScore, Cause, DecayCurves, Diagnosis, FallenLaw, FitTest, FittedMaterial, FoundLaw, HeldOut,
     HeldOutGain, Isolability, LackOfFit, LawPoint, LawSearch, MovedReflection, RayDependence, ResidualCell,

@@ -1,4 +1,4 @@
-//! `sabine fit` on a room that was measured as a table: parameters of image sources and particles (testkit's laboratory), read by
+//! `sabine fit` and `sabine diagnose` on a room that was measured as a table: parameters of image sources and particles (testkit's laboratory), read by
 //! `sabine-acoustics`, the responses themselves thrown away.
 
 use crate::sabine;
@@ -151,10 +151,38 @@ fn what_there_is_not_is_said_and_nothing_is_written() {
     assert!(message.contains("none is left"), "{message}");
     let message = run("fit", &["--hold-out", "nobody"]);
     assert!(message.contains("nobody"), "{message}");
-    // A diagnosis needs what a table does not hold; it says where to go.
-    let message = run("diagnose", &[]);
-    assert!(message.contains("tables of parameters") && message.contains("sabine fit"), "{message}");
     std::fs::write(at.join("table.csv"), "pair,band_hz,t30_s\ns1-r1,500,0.5\ns1-r9,500,0.5\n").unwrap();
     let message = run("fit", &[]);
     assert!(message.contains("table.csv") && message.contains("line 3, pair"), "{message}");
+}
+
+#[test]
+fn a_table_is_diagnosed_and_the_report_shows_its_values() {
+    let (folder, _) = room(23, None);
+    let out = folder.path().join("out");
+    let output = sabine("diagnose")
+        .args(["--room", folder.path().join("room").to_str().unwrap()])
+        .args(["--effects", "surface_absorption", "--rays", "500", "--out", out.to_str().unwrap()])
+        .output()
+        .unwrap();
+    let (said, complained) =
+        (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{complained}");
+    assert!(said.contains("no arrival times"), "{said}");
+    let found = json(&out.join("diagnosis.json"));
+    assert_eq!(
+        (&found["responses"], &found["tables"], &found["receivers"]),
+        (&0.into(), &6.into(), &6.into())
+    );
+    let values = found["values"].as_array().unwrap();
+    assert!(values.len() > 100 && values.iter().all(|v| v["pair"].as_str().unwrap().starts_with("s1-r")));
+    assert!(found["held_out"]["values_jnd"][0].as_f64().unwrap() < 5.0);
+    assert!(found["held_out"]["db_rmse"][0].is_null());
+    let page = std::fs::read_to_string(out.join("report.html")).unwrap();
+    for words in
+        ["tables of 6 source-receiver pairs", "Values at positions that were predicted", "JND off before"]
+    {
+        assert!(page.contains(words), "{words}");
+    }
+    assert!(!page.contains("NaN"), "{page}");
 }

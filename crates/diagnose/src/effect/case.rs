@@ -148,6 +148,14 @@ impl Case {
         }
     }
 
+    /// Whether parameters of decays tell of it: they hold neither times and levels, nor what the recorder adds and cuts.
+    pub(crate) fn bears_on_tables(&self) -> bool {
+        let of_levels = |(nuisance, _): &(Nuisance, f64)| matches!(nuisance, Nuisance::ResponseGain(_));
+        self.observable() == Observable::Decay
+            && self.stage < Stage::Transducer
+            && !self.relaxes.iter().any(of_levels)
+    }
+
     /// Whether it does not believe the tables of several materials: beside it every other cause is judged by tables that may be anything.
     pub(crate) fn opens_several_tables(&self) -> bool {
         self.relaxes.iter().filter(|(nuisance, _)| matches!(nuisance, Nuisance::Absorption(_))).count() > 1

@@ -86,9 +86,19 @@ impl Baseline {
             stale: BTreeSet::new(),
         };
         baseline.simulation.expand(&baseline.observations, false)?;
-        baseline.simulation.predict_arrivals(&mut baseline.observations.survey)?;
+        baseline.leave_unreadable()?;
+        baseline.simulation.predict_arrivals(&mut baseline.observations)?;
         baseline.fit(observer)?;
         Ok(baseline)
+    }
+
+    /// Leaves out values of tables that the prediction does not have.
+    fn leave_unreadable(&mut self) -> Result<(), Error> {
+        if self.observations.are_tables() {
+            self.observations.leave_unreadable(&self.simulation.states)?;
+            self.simulation.find_table_chances(&self.observations.measured);
+        }
+        Ok(())
     }
 
     pub fn survey(&self) -> &Survey {

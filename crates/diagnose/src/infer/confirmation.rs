@@ -122,13 +122,14 @@ pub(crate) fn confirm(
 
     let started = Instant::now();
     report(observer, "lack of fit", 0, 2)?;
-    let formulas = Formulas::of(baseline)?;
-    let lack_before = lack_of_fit::test(search, &base, &formulas)?;
+    let formulas = (!baseline.observations.are_tables()).then(|| Formulas::of(baseline)).transpose()?;
+    let formulas = formulas.as_ref();
+    let lack_before = lack_of_fit::test(search, &base, formulas)?;
     report(observer, "lack of fit", 1, 2)?;
     let mut dropped = Vec::new();
     let lack_after = loop {
         let doubt = doubtful(search, &state, found, &predicted)?;
-        let lack = if doubt.is_none() { lack_of(search, &state, &formulas)? } else { None };
+        let lack = if doubt.is_none() { lack_of(search, &state, formulas)? } else { None };
         let outweighed =
             lack.as_ref().map(|lack| outweighed(search, &state, found, lack)).transpose()?.flatten();
         let doubt = doubt.or(outweighed.map(|worst| (worst, Doubt::Misfit)));
@@ -212,7 +213,7 @@ fn adds_unpredicted_sound(search: &Search<'_>, state: &State) -> bool {
 }
 
 /// The lack of fit under the chosen causes, where there are any.
-fn lack_of(search: &Search<'_>, state: &State, formulas: &Formulas) -> Result<Option<Lack>, Error> {
+fn lack_of(search: &Search<'_>, state: &State, formulas: Option<&Formulas>) -> Result<Option<Lack>, Error> {
     if state.chosen.is_empty() {
         return Ok(None);
     }
@@ -354,7 +355,7 @@ fn least_confirmed(
         } else {
             predicted.decay_changes[place]
         };
-        let [before, after] = change.rmse_db;
+        let [before, after] = change.rmse;
         let nearer = after < MAX_RMSE_RATIO * before;
         // Likelier bins under decays that lie farther off: the cause stands for something else.
         let farther = MAX_RMSE_RATIO * after > before && change.is_farther_surely;
@@ -471,21 +472,22 @@ mod tests {
             low: 0.05,
             high: 0.15,
             db_rmse_before: 1.0,
+            values_jnd: None,
             db_rmse_after: 1.1,
             in_every_group: true,
         };
         // That curves of one group lie far off may be chance.
-        for (rmse_db, is_farther_surely, doubted) in
+        for (rmse, is_farther_surely, doubted) in
             [([0.8, 0.8], true, None), ([0.8, 0.85], true, Some(0)), ([0.8, 0.85], false, None)]
         {
             let predicted = Predicted {
                 gains: vec![gain.clone()],
-                decay_changes: vec![DecayChange { rmse_db: [1.0, 1.1], is_farther_surely: true }],
-                diffuse_changes: vec![DecayChange { rmse_db, is_farther_surely }],
+                decay_changes: vec![DecayChange { rmse: [1.0, 1.1], is_farther_surely: true }],
+                diffuse_changes: vec![DecayChange { rmse, is_farther_surely }],
                 ..Predicted::default()
             };
             let found = least_confirmed(&search, &state, &predicted, &[false]);
-            assert_eq!(found, doubted, "{rmse_db:?} {is_farther_surely}");
+            assert_eq!(found, doubted, "{rmse:?} {is_farther_surely}");
         }
     }
 }

@@ -9,6 +9,7 @@ use crate::infer::prediction::{Compared, Errors, compare, decay_db, squared_erro
 use crate::infer::search::{Search, State};
 use crate::likelihood::decay::WarmStart;
 use crate::likelihood::polarity;
+use crate::report::compared_values::{ComparedValue, compared_values};
 use crate::report::diagnosis::{DecayCurves, HeldOut, HeldOutGain};
 use crate::statistics;
 use crate::survey::{Survey, SurveyedResponse};
@@ -89,13 +90,14 @@ pub(crate) struct Predicted {
     pub decay_changes: Vec<DecayChange>,
     pub diffuse_changes: Vec<DecayChange>,
     pub decays: Vec<DecayCurves>,
+    pub values: Vec<ComparedValue>,
 }
 
 /// Decay curves at positions left out, without a cause and with it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DecayChange {
-    /// Their errors in dB.
-    pub rmse_db: [f64; 2],
+    /// Their errors in dB; those of the values of tables in just-noticeable differences.
+    pub rmse: [f64; 2],
     /// Whether they lie farther off beyond chance: the 90 % interval of the change over groups of positions has its lower end above zero, or
     /// every group is farther off.
     pub is_farther_surely: bool,
@@ -104,14 +106,14 @@ pub(crate) struct DecayChange {
 impl DecayChange {
     /// From squared errors without and with the cause and their number, for each group.
     fn of(groups: &[[(f64, f64); 2]]) -> Self {
-        let rmse_db = [0, 1].map(|k| {
+        let rmse = [0, 1].map(|k| {
             let (squares, points) = groups.iter().fold((0.0, 0.0), |(s, n), g| (s + g[k].0, n + g[k].1));
             if points > 0.0 { (squares / points).sqrt() } else { 0.0 }
         });
         let more: Vec<(f64, f64)> =
             groups.iter().map(|[before, after]| (after.0 - before.0, after.1)).collect();
         let [low, _] = statistics::ratio_interval(&more);
-        Self { rmse_db, is_farther_surely: low > 0.0 || more.iter().all(|(more, _)| *more > 0.0) }
+        Self { rmse, is_farther_surely: low > 0.0 || more.iter().all(|(more, _)| *more > 0.0) }
     }
 }
 
@@ -251,6 +253,7 @@ fn first_diffuse_band(survey: &Survey) -> usize {
 /// Gains, errors and curves over all splits.
 fn summary(baseline: &Baseline, causes: usize, folds: &Folds, splits: &[SplitGain]) -> Predicted {
     let bins: f64 = splits.iter().map(|s| s.bins).sum();
+    let are_tables = baseline.observations.are_tables();
     let mean = |gain: &dyn Fn(&SplitGain) -> f64| splits.iter().map(gain).sum::<f64>() / bins;
     let interval = |gain: &dyn Fn(&SplitGain) -> f64| {
         let gains: Vec<(f64, f64)> = splits.iter().map(|s| (gain(s), s.bins)).collect();
@@ -266,6 +269,7 @@ fn summary(baseline: &Baseline, causes: usize, folds: &Folds, splits: &[SplitGai
         db_rmse: three(|e| e.db_rmse),
         t20_jnd: three(|e| e.t20_jnd),
         c50_jnd: three(|e| e.c50_jnd),
+        values_jnd: are_tables.then(|| three(|e| e.values_jnd)),
         nats_per_bin: [mean(&|s| s.named), mean(&|s| s.free)],
         nats_interval: [interval(&|s| s.named), interval(&|s| s.free)],
     };
@@ -280,13 +284,16 @@ fn summary(baseline: &Baseline, causes: usize, folds: &Folds, splits: &[SplitGai
     let gains = (0..causes)
         .map(|i| {
             let [low, high] = interval(&|s| s.each[i]);
-            let [db_rmse_before, db_rmse_after] = decay_changes[i].rmse_db;
+            let rmse = decay_changes[i].rmse;
+            let [db_rmse_before, db_rmse_after] = if are_tables { [f64::NAN; 2] } else { rmse };
+            let values_jnd = are_tables.then_some(rmse);
             let in_every_group = splits.iter().all(|s| s.each[i] > 0.0);
             let nats_per_bin = mean(&|s| s.each[i]);
-            HeldOutGain { nats_per_bin, low, high, db_rmse_before, db_rmse_after, in_every_group }
+            HeldOutGain { nats_per_bin, low, high, db_rmse_before, db_rmse_after, values_jnd, in_every_group }
         })
         .collect();
     let curves = |s: &SplitGain| decay_curves(baseline, &s.predicted[0], &s.predicted[1], true);
+    let values = |s: &SplitGain| compared_values(baseline, &s.predicted[0], &s.predicted[1], true);
     Predicted {
         held_out: Some(held_out),
         gains,
@@ -294,6 +301,7 @@ fn summary(baseline: &Baseline, causes: usize, folds: &Folds, splits: &[SplitGai
         decay_changes,
         diffuse_changes: changes(first_diffuse_band(baseline.survey())),
         decays: splits.iter().flat_map(curves).collect(),
+        values: splits.iter().flat_map(values).collect(),
     }
 }
 
@@ -307,6 +315,7 @@ pub(crate) fn decay_curves(
     before
         .iter()
         .zip(after)
+        .filter(|(b, _)| !b.is_table())
         .map(|(b, a)| {
             let total = b.measured.iter().sum::<f64>().max(1e-300);
             DecayCurves {
@@ -349,10 +358,7 @@ mod tests {
         };
         // One group far off says nothing of others, however far.
         let one = of(&[0.99, 0.98, 2.0, 0.97]);
-        assert!(
-            !one.is_farther_surely && (one.rmse_db[1] - (0.25f64 * 4.94).sqrt()).abs() < 1e-12,
-            "{one:?}"
-        );
+        assert!(!one.is_farther_surely && (one.rmse[1] - (0.25f64 * 4.94).sqrt()).abs() < 1e-12, "{one:?}");
         assert!(of(&[1.1, 1.12, 1.09, 1.11, 1.1, 0.999]).is_farther_surely);
         // Two groups have no interval worth the name.
         assert!(of(&[1.1, 1.5]).is_farther_surely && !of(&[1.5, 0.99]).is_farther_surely);

@@ -4,6 +4,7 @@ mod levels;
 mod scatter;
 mod simulated;
 mod stated;
+mod table_values;
 
 pub(crate) use levels::Levels;
 pub(crate) use scatter::odd_bins;
@@ -56,7 +57,7 @@ pub(crate) struct Lack {
 
 /// Tests a fitted model: on measurements simulated from the model itself, on what is known of levels, on what was stated, and on
 /// whether they go with an angle, a length, a direction or a time.
-pub(crate) fn test(search: &Search<'_>, state: &State, formulas: &Formulas) -> Result<Lack, Error> {
+pub(crate) fn test(search: &Search<'_>, state: &State, formulas: Option<&Formulas>) -> Result<Lack, Error> {
     let baseline = search.baseline;
     let bands = baseline.survey().bands.len();
     let pairs: Vec<usize> = (0..search.used.len()).filter(|&p| search.used[p]).collect();
@@ -64,14 +65,21 @@ pub(crate) fn test(search: &Search<'_>, state: &State, formulas: &Formulas) -> R
     let residuals = baseline.residuals(&cases, &state.energy.values, &pairs);
     let (mut tests, discrepancy_nats) = against_simulated(search, state, &pairs)?;
     let p_odd = poisson_tail(odd_bins(&residuals, bands), ODD_BY_CHANCE);
+    let hz = |band: usize| format!("{} Hz", baseline.survey().bands.nominal_hz(band));
+    let response = |pair: usize| baseline.survey().responses[pair].name.clone();
+    if baseline.observations.are_tables() {
+        tests.push(Test { name: "single odd values", subject: None, p_value: p_odd });
+        let (by_octave, by_pair) = table_values::misfits(baseline, &residuals);
+        tests.push(least("values of the tables by octave", by_octave.into_iter().enumerate(), hz));
+        tests.push(least("values of the tables by pair", by_pair.into_iter().enumerate(), response));
+        return Ok(with_statements(search, state, (tests, discrepancy_nats)));
+    }
     tests.push(Test { name: "single odd bins", subject: None, p_value: p_odd });
     // Below the Schroeder frequency few modes decide how far bins scatter.
     let mut diffuse = residuals.clone();
     diffuse.retain(|r| r.band >= baseline.survey().bands_of_modes);
     let by_band = scatter::by_group(&diffuse, bands, |r| r.band);
     let by_pair = scatter::by_group(&diffuse, baseline.pairs(), |r| r.pair);
-    let hz = |band: usize| format!("{} Hz", baseline.survey().bands.nominal_hz(band));
-    let response = |pair: usize| baseline.survey().responses[pair].name.clone();
     tests.push(least("scatter of bins by octave", by_band.into_iter().enumerate(), hz));
     tests.push(least("scatter of bins by response", by_pair.into_iter().enumerate(), response));
     let levels = levels::levels(&residuals, &baseline.dispersion, &baseline.level_sd);
@@ -80,12 +88,22 @@ pub(crate) fn test(search: &Search<'_>, state: &State, formulas: &Formulas) -> R
     tests.push(Test { name, subject: farthest, p_value: levels.p_value });
     tests.extend(what_levels_go_with(baseline, &residuals));
     let before = (&state.energy, &state.energy_firsts[..]);
-    let found = formulas.best(baseline, &cases, before, &search.used)?;
+    let found = formulas.map(|all| all.best(baseline, &cases, before, &search.used)).transpose()?.flatten();
     let (subject, formula) = found.unzip();
     tests.extend(formula.map(|best: BestFormula| goes_with(subject, best.p_value)));
+    Ok(Lack { levels, formula, ..with_statements(search, state, (tests, discrepancy_nats)) })
+}
+
+/// What tests of decays say, and those of what was stated beside them.
+fn with_statements(
+    search: &Search<'_>,
+    state: &State,
+    (mut tests, discrepancy_nats): (Vec<Test>, f64),
+) -> Lack {
     let decays_p_value = corrected(&tests);
     tests.extend(against_statements(search, state));
-    Ok(Lack { p_value: corrected(&tests), decays_p_value, discrepancy_nats, levels, formula, tests })
+    let p_value = corrected(&tests);
+    Lack { p_value, decays_p_value, discrepancy_nats, levels: Levels::default(), formula: None, tests }
 }
 
 /// The least probability of several tests, corrected for their number (Bonferroni).
@@ -129,14 +147,19 @@ fn against_simulated(search: &Search<'_>, state: &State, pairs: &[usize]) -> Res
     let baseline = search.baseline;
     let cases = search.cases_of(&state.chosen, Observable::Decay);
     let free = baseline.free_discrepancy();
+    let of_tables = baseline.observations.are_tables();
     let mut all = cases.clone();
     all.push(&free);
     let early_bins = |pair: usize, band: usize| baseline.simulation.states[pair][band].bins.count(EARLY_S);
     let compare = |measured: &[Measured]| -> Result<Compared, Error> {
         let base = baseline.fit_energy_to(measured, &cases, &search.used, Some(state.before()))?;
         let more = baseline.fit_energy_to(measured, &all, &search.used, Some(state.before()))?;
-        let residuals = baseline.residuals_of(measured, &cases, &base.values, pairs);
-        let early = scatter::early_against_late(&residuals, &baseline.dispersion, early_bins);
+        let early = if of_tables {
+            Vec::new()
+        } else {
+            let residuals = baseline.residuals_of(measured, &cases, &base.values, pairs);
+            scatter::early_against_late(&residuals, &baseline.dispersion, early_bins)
+        };
         Ok(Compared {
             smooth: (more.log_likelihood - base.log_likelihood, more.log_evidence - base.log_evidence),
             early: early.iter().map(|(_, contrast)| contrast).sum(),
@@ -152,10 +175,15 @@ fn against_simulated(search: &Search<'_>, state: &State, pairs: &[usize]) -> Res
         |of: fn(&Compared) -> f64| upper_tail(of(&found), &simulated.iter().map(of).collect::<Vec<f64>>());
     let response = found.largest.map(|p| baseline.survey().responses[p].name.clone());
     let test = |name, subject, p_value| Test { name, subject, p_value };
-    let tests = vec![
-        test("a smooth difference that all responses share", None, tail(|c| c.smooth.0)),
-        test("early sound against late in single responses", response, tail(|c| c.early)),
-    ];
+    let smooth = tail(|c| c.smooth.0);
+    let tests = if of_tables {
+        vec![test("a smooth difference that all pairs share", None, smooth)]
+    } else {
+        vec![
+            test("a smooth difference that all responses share", None, smooth),
+            test("early sound against late in single responses", response, tail(|c| c.early)),
+        ]
+    };
     Ok((tests, found.smooth.1))
 }
 
@@ -216,6 +244,10 @@ fn against_statements(search: &Search<'_>, state: &State) -> Vec<Test> {
     let absorption = (0..survey.materials.len())
         .map(|m| (m, stated::contradiction(&state.energy, &decays, &of_material(m))));
     let mut tests = vec![least("absorption against the tables", absorption, |m| survey.materials[m].clone())];
+    // Parameters of decays say nothing of gains and places.
+    if baseline.observations.are_tables() {
+        return tests;
+    }
     if survey.measurement.levels != StatedLevels::PerResponse {
         let gains: Vec<usize> = (0..survey.responses.len()).map(|r| layout.gain(r)).collect();
         let p_value = stated::contradiction(&state.energy, &decays, &gains);

@@ -3,6 +3,8 @@
 use crate::effect::Case;
 use crate::infer::baseline::Baseline;
 use crate::likelihood::decay::EnergyModel;
+use crate::observe::parameter_table::{StatedParameter, value_of};
+use sabine_acoustics::ParameterKind;
 use sabine_scene::Levels;
 
 /// Measured and predicted energies of the compared bins of one pair and band.
@@ -10,7 +12,10 @@ use sabine_scene::Levels;
 pub(crate) struct Compared {
     pub pair: usize,
     pub band: usize,
+    /// Beginnings of the bins.
     pub times_s: Vec<f64>,
+    /// What a table states in place of bins, whose quantities are compared instead of energies; empty of a response.
+    pub stated: Vec<StatedParameter>,
     pub measured: Vec<f64>,
     pub predicted: Vec<f64>,
 }
@@ -36,16 +41,33 @@ pub(crate) fn compare(
             let predicted: Vec<f64> =
                 model.predicted(&values, pair, band, energies.len()).iter().map(|l| l.exp()).collect();
             let bins = baseline.simulation.states[pair][band].bins;
+            let table = baseline.observations.measured[pair].table.as_ref();
             found.push(Compared {
                 pair,
                 band,
                 times_s: (0..energies.len()).map(|k| bins.edge_s(k)).collect(),
+                stated: table.map_or_else(Vec::new, |table| table[band].clone()),
                 measured: energies.to_vec(),
                 predicted,
             });
         }
     }
     found
+}
+
+impl Compared {
+    pub fn is_table(&self) -> bool {
+        !self.stated.is_empty()
+    }
+
+    /// Kind, measured and predicted value of each parameter of a table.
+    pub fn values(&self) -> impl Iterator<Item = (ParameterKind, f64, f64)> + '_ {
+        let both = self.measured.iter().zip(&self.predicted);
+        self.stated.iter().zip(both).map(|(parameter, (measured, predicted))| {
+            let kind = parameter.kind;
+            (kind, value_of(kind, *measured), value_of(kind, *predicted))
+        })
+    }
 }
 
 /// Energy still to come, in dB relative to `total`.
@@ -63,12 +85,15 @@ pub(crate) fn decay_db(energies: &[f64], total: f64) -> Vec<f64> {
     found
 }
 
-/// Errors of decay curves (dB), T20 and C50 (just-noticeable differences: 5 % and 1 dB, ISO 3382-1:2009, table A.1).
-#[derive(Clone, Copy, Debug, Default)]
+/// Errors of decay curves (dB), T20 and C50 (just-noticeable differences: 5 % and 1 dB, ISO 3382-1:2009, table A.1); not numbers where there is
+/// nothing to compare.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Errors {
     pub db_rmse: f64,
     pub t20_jnd: f64,
     pub c50_jnd: f64,
+    /// Of all values of tables (root mean square).
+    pub values_jnd: f64,
 }
 
 /// Curves are compared down to so much below their beginning: what is left of the compared range decides what lies below.
@@ -76,10 +101,16 @@ const LOWEST_DB: f64 = -30.0;
 const T20_JND: f64 = 0.05;
 const C50_JND_DB: f64 = 1.0;
 
-/// Squared errors of decay curves in dB2, summed, and their number.
+/// Squared errors of decay curves in dB2, summed, and their number; of tables, those of their values in just-noticeable differences.
 pub(crate) fn squared_errors<'a>(compared: impl IntoIterator<Item = &'a Compared>) -> (f64, f64) {
     let (mut squares, mut points) = (0.0, 0.0);
     for c in compared {
+        if c.is_table() {
+            let off = c.values().map(|(kind, measured, predicted)| kind.in_jnd(predicted, measured));
+            squares += off.map(|jnd| jnd * jnd).sum::<f64>();
+            points += c.stated.len() as f64;
+            continue;
+        }
         let total: f64 = c.measured.iter().sum();
         if total <= 0.0 {
             continue;
@@ -96,9 +127,10 @@ pub(crate) fn squared_errors<'a>(compared: impl IntoIterator<Item = &'a Compared
 impl Errors {
     /// In the mean over pairs and bands.
     pub fn of(compared: &[Compared]) -> Self {
-        let (squares, points) = squared_errors(compared);
+        let (squares, points) = squared_errors(compared.iter().filter(|c| !c.is_table()));
+        let (of_values, values) = squared_errors(compared.iter().filter(|c| c.is_table()));
         let (mut t20, mut t20s, mut c50, mut c50s) = (0.0, 0.0, 0.0, 0.0);
-        for c in compared {
+        for c in compared.iter().filter(|c| !c.is_table()) {
             let total: f64 = c.measured.iter().sum();
             if total <= 0.0 {
                 continue;
@@ -114,8 +146,12 @@ impl Errors {
                 c50s += 1.0;
             }
         }
-        let mean = |sum: f64, count: f64| if count > 0.0 { sum / count } else { 0.0 };
-        Self { db_rmse: mean(squares, points).sqrt(), t20_jnd: mean(t20, t20s), c50_jnd: mean(c50, c50s) }
+        Self {
+            db_rmse: (squares / points).sqrt(),
+            t20_jnd: t20 / t20s,
+            c50_jnd: c50 / c50s,
+            values_jnd: (of_values / values).sqrt(),
+        }
     }
 }
 
@@ -159,10 +195,18 @@ mod tests {
             measured: decay(0.5),
             predicted: decay(0.5),
             times_s: times_s.clone(),
+            stated: Vec::new(),
         };
         let same = Errors::of(&[c]);
         assert!(same.db_rmse < 1e-9 && same.t20_jnd < 1e-9 && same.c50_jnd < 1e-9);
-        let c = Compared { pair: 0, band: 0, measured: decay(0.5), predicted: decay(0.55), times_s };
+        let c = Compared {
+            pair: 0,
+            band: 0,
+            measured: decay(0.5),
+            predicted: decay(0.55),
+            times_s,
+            stated: Vec::new(),
+        };
         // 10 % longer: two just-noticeable differences.
         assert!((Errors::of(&[c]).t20_jnd - 2.0).abs() < 0.1);
     }

@@ -10,6 +10,7 @@ mod fit;
 mod group_sums;
 mod offsets;
 mod pair_likelihood;
+mod table_band;
 #[cfg(test)]
 mod tests;
 mod variance;
@@ -148,7 +149,12 @@ impl<'a> EnergyModel<'a> {
 
     /// Unknown gains begin where early energies meet: from tens of decibels off, steps would be many.
     fn start_gains(&self, values: &mut [f64]) {
-        let pairs: Vec<usize> = (0..self.assignment.len()).filter(|&p| self.used[p]).collect();
+        let heard = |p: &usize| self.used[*p] && !self.is_table(*p);
+        let pairs: Vec<usize> = (0..self.assignment.len()).filter(heard).collect();
+        // Tables hold no levels.
+        if pairs.is_empty() {
+            return;
+        }
         if let Some(index) = self.layout.common_gain() {
             values[index] = median(pairs.iter().map(|&p| self.early_gain_db(p)).collect());
         } else if self.data.survey.measurement.levels == Levels::PerResponse {
@@ -176,6 +182,9 @@ impl<'a> EnergyModel<'a> {
     /// Fits the gain of one response, everything else staying as it is: where gains mean nothing, that of a response which was left out is
     /// not known from the others, and what is added after the gain (noise) must be added to sound of the right level.
     pub fn fit_gain(&self, values: &mut [f64], pair: usize) {
+        if self.is_table(pair) {
+            return;
+        }
         let index = self.layout.gain(self.assignment[pair]);
         let mut at = |gain_db: f64| -> f64 {
             values[index] = gain_db;
@@ -285,16 +294,25 @@ impl<'a> EnergyModel<'a> {
             && parameter.response.is_none_or(|own| own == self.assignment[pair])
     }
 
-    /// Bins that are compared, and their measured energies.
+    /// Bins that are compared, and their measured energies; or the quantities of a table.
     pub fn compared(&self, pair: usize, band: usize) -> Option<&[f64]> {
         let energies = self.data.measured[self.assignment[pair]].energies[band].as_deref()?;
-        let count = self.data.ends[pair][band].min(energies.len());
+        let end = self.data.ends[pair][band];
+        let count = if !self.is_table(pair) {
+            end.min(energies.len())
+        } else if end > 0 && self.data.states[pair][band].table.is_some() {
+            energies.len()
+        } else {
+            0
+        };
         (count > 0).then(|| &energies[..count])
     }
 
-    /// Logarithm of the predicted energy in the bins of a pair and band, as many as are compared.
+    /// Logarithm of the predicted energy in the bins of a pair and band, as many as are compared; of the quantities of its table, where it has one.
     pub fn predicted(&self, values: &[f64], pair: usize, band: usize, count: usize) -> Vec<f64> {
-        self.affected(values, (pair, band), self.paths(values, (pair, band), count, false).0)
+        let bins = self.predicted_bins(pair, band, count);
+        let ln_energy = self.affected(values, (pair, band), self.paths(values, (pair, band), bins, false).0);
+        self.table(pair, band, &ln_energy).map_or(ln_energy, |table| table.predicted())
     }
 
     /// What the effects make of the logarithm of the energy of the paths.

@@ -64,6 +64,9 @@ pub(crate) fn gates(
             continue;
         }
         let measured = &observations.measured[assignment[pair]];
+        if measured.table.is_some() {
+            continue;
+        }
         // Energies relative to the direct sound, by band and reflection.
         let energies: Vec<Vec<f64>> = (0..survey.bands.len())
             .map(|band| {

@@ -3,7 +3,9 @@
 use crate::error::Error;
 use crate::observe::band_pulse::{BandPulse, CELL_S};
 use crate::observe::observed_response::Measured;
+use crate::observe::parameter_table;
 use crate::observe::pre_arrival::PreArrival;
+use crate::simulate::band_state::BandState;
 use crate::statistics::median;
 use crate::survey::planes::planes;
 use crate::survey::surfaces::Surfaces;
@@ -13,7 +15,10 @@ use sabine_scene::{MeasuredRoom, Receiver, Source, TimeZero};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
-/// The measured responses of a room, and what the room file says of them.
+/// Sample rate at which octaves of tables are filtered: it holds the octave of 16 kHz.
+const TABLE_RATE_HZ: u32 = 48_000;
+
+/// The measured responses of a room, or its tables, and what the room file says of them.
 pub(crate) struct Observations {
     pub survey: Survey,
     /// Responses that may be fitted: those of receivers that are not held out.
@@ -55,7 +60,7 @@ impl Observations {
         observer: &dyn Observer,
     ) -> Result<Self, Error> {
         let total = room.responses().len();
-        if total == 0 {
+        if total == 0 && room.parameters().is_empty() {
             return Err(Error::NoResponses);
         }
         let mut found = Self {
@@ -72,12 +77,44 @@ impl Observations {
             report(observer, "reading responses", i as u64, total as u64)?;
             found.read_response(room, i)?;
         }
+        if total == 0 {
+            found.take_tables(room)?;
+        }
         found.fitted = found.survey.responses.iter().map(|r| !held.contains(&r.receiver)).collect();
         if !found.fitted.contains(&true) {
-            return Err(Error::NothingToCompare { responses: total });
+            return Err(Error::NothingToCompare { responses: total.max(found.measured.len()) });
         }
         found.pulses = found.pulses_by_rate.values().next_back().cloned().unwrap_or_default();
         Ok(found)
+    }
+
+    /// Takes the pairs of the room's tables in the place of responses.
+    fn take_tables(&mut self, room: &MeasuredRoom) -> Result<(), Error> {
+        let (pairs, notes) = parameter_table::pairs(room);
+        (self.survey.responses, self.measured) = pairs.into_iter().unzip();
+        self.notes.extend(notes);
+        self.pulses_by_rate.insert(TABLE_RATE_HZ, BandPulse::all(room.bands(), TABLE_RATE_HZ, CELL_S)?);
+        Ok(())
+    }
+
+    /// Whether pairs have tables of parameters in place of responses: all of them, or none.
+    pub fn are_tables(&self) -> bool {
+        self.measured.iter().any(|m| m.table.is_some())
+    }
+
+    /// Leaves out values of tables that the prediction does not have, and notes how many.
+    pub fn leave_unreadable(&mut self, states: &[Vec<BandState>]) -> Result<(), Error> {
+        let pairs = self.measured.iter_mut().zip(states);
+        let left_out: usize = pairs.map(|(measured, states)| measured.leave_unreadable(states)).sum();
+        if left_out > 0 {
+            self.notes.push(format!(
+                "{left_out} values of the tables are not used: the simulated decays do not have them (too short, or nothing before or after 50 or 80 ms)."
+            ));
+        }
+        if self.measured.iter().all(|measured| measured.energies.iter().all(Option::is_none)) {
+            return Err(Error::NothingToCompare { responses: self.measured.len() });
+        }
+        Ok(())
     }
 
     /// Reads one response; one in which no direct sound is found becomes a note.
@@ -120,7 +157,9 @@ impl Observations {
     /// whether that is the direct sound). Their first sound is weak and easily missed: their axis begins when the first path should come,
     /// by the times of the direct sounds of others.
     pub fn align(&mut self, in_sight: &[bool], direct_s: &[f64]) {
-        self.align_shadowed(in_sight, direct_s);
+        if !self.are_tables() {
+            self.align_shadowed(in_sight, direct_s);
+        }
         self.samples.clear();
         let lead_ins = self.measured.iter_mut().map(|m| std::mem::take(&mut m.lead_in));
         self.pre_arrival = PreArrival { responses: lead_ins.collect() };

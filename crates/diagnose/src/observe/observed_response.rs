@@ -2,6 +2,7 @@
 
 use crate::observe::band_pulse::BandPulse;
 use crate::observe::early_energy::{EarlySamples, is_fast};
+use crate::observe::parameter_table::StatedParameter;
 use crate::observe::pre_arrival;
 use crate::observe::pre_arrival::PreArrivalBand;
 use crate::observe::time_bins::Bins;
@@ -33,8 +34,12 @@ const ABOVE_END: f64 = 2.0;
 /// One measured response: energies relative to the direct sound's instant, arrivals in the time of the file.
 #[derive(Clone, Debug)]
 pub(crate) struct Measured {
-    /// Energy of each whole bin, `[band][bin]`, 1 for an undisturbed pulse of amplitude 1; `None` in a band above half the sample rate.
+    /// Energy of each whole bin, `[band][bin]`, 1 for an undisturbed pulse of amplitude 1; `None` in a band above half the sample rate. Of a
+    /// pair with a table in place of a response: the quantities of its values
+    /// ([`quantity`](crate::observe::parameter_table::quantity)), `[band][value]`.
     pub energies: Vec<Option<Vec<f64>>>,
+    /// What its values are of, `[band][value]`, where a table takes the place of the response.
+    pub table: Option<Vec<Vec<StatedParameter>>>,
     /// When the direct sound's peak comes, in seconds from the first sample.
     pub direct_s: f64,
     /// Later peaks, in seconds from the first sample.
@@ -108,6 +113,7 @@ impl Measured {
         let sounds_until_s = sounds_until_s(samples, rate);
         Ok(Self {
             energies,
+            table: None,
             direct_s,
             peaks_s,
             peaks_db,

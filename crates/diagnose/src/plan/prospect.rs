@@ -93,6 +93,7 @@ impl<'a> Setting<'a> {
         };
         Measured {
             energies: self.decays_s.iter().enumerate().map(energies).collect(),
+            table: None,
             direct_s: 0.0,
             peaks_s: Vec::new(),
             peaks_db: Vec::new(),
@@ -127,7 +128,7 @@ impl<'a> Setting<'a> {
             simulation.absorption.clone_from(&fitted.absorption);
         }
         simulation.expand(&observations, false)?;
-        simulation.predict_arrivals(&mut observations.survey)?;
+        simulation.predict_arrivals(&mut observations)?;
         if let Some(fitted) = &self.fitted {
             simulation.reference.clone_from(&fitted.reference);
         }

@@ -13,6 +13,7 @@ use crate::infer::lack_of_fit::{Levels, Test};
 use crate::infer::prediction::compare;
 use crate::infer::search::{Search, State};
 use crate::infer::selection::Selection;
+use crate::report::compared_values::compared_values;
 use crate::report::diagnosis::{
     CandidateScore, Cause, Diagnosis, FitTest, FittedMaterial, HeldOutGain, LackOfFit, Verdict,
 };
@@ -58,13 +59,14 @@ pub(crate) fn compose(
     let candidates = candidate_scores(search, state, found, observer)?;
     let cases_now = search.cases_of(&state.chosen, Observable::Decay);
     let (residuals, dispersion) = residual_map(baseline, base, &cases_now, state);
-    let decays = if confirmed.predicted.held_out.is_some() {
-        confirmed.predicted.decays.clone()
+    let (decays, values) = if confirmed.predicted.held_out.is_some() {
+        (confirmed.predicted.decays.clone(), confirmed.predicted.values.clone())
     } else {
         let all: Vec<usize> = (0..baseline.pairs()).collect();
         let before = compare(baseline, &[], &base.energy.values, &all);
         let after = compare(baseline, &cases_now, &state.energy.values, &all);
-        decay_curves(baseline, &before, &after, false)
+        let values = compared_values(baseline, &before, &after, false);
+        (decay_curves(baseline, &before, &after, false), values)
     };
     let model = extension::extended_model(search, state);
     let notes = notes_on(search, &confirmed, first_dispersion, (&candidates, &alternatives));
@@ -97,6 +99,7 @@ pub(crate) fn compose(
         bands: baseline.survey().bands,
         residuals,
         decays,
+        values,
         moved_reflections: moved_reflections(search, base, state),
         common_gain_db: common_gain.map(|index| state.energy.values[index]),
         notes,
@@ -136,10 +139,10 @@ fn causes(
 }
 
 fn is_slight(gain: &HeldOutGain) -> bool {
-    let nearer_db = gain.db_rmse_before - gain.db_rmse_after;
-    nearer_db < SLIGHT_SHARE * gain.db_rmse_before
-        && nearer_db < SLIGHT_DB
-        && gain.nats_per_bin < SLIGHT_NATS_PER_BIN
+    // Just-noticeable differences of the values of a table count as decibels do.
+    let [before, after] = gain.values_jnd.unwrap_or([gain.db_rmse_before, gain.db_rmse_after]);
+    let nearer = before - after;
+    nearer < SLIGHT_SHARE * before && nearer < SLIGHT_DB && gain.nats_per_bin < SLIGHT_NATS_PER_BIN
 }
 
 fn notes_on(

@@ -2,6 +2,7 @@
 
 use crate::extend::extended_model::ExtendedModel;
 use crate::found_parameter::FoundParameter;
+use crate::report::compared_values::ComparedValue;
 use sabine_acoustics::{Bands, PerBand};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -91,13 +92,33 @@ pub struct HeldOutGain {
     /// Upper end.
     #[serde(deserialize_with = "infinite_ends::high")]
     pub high: f64,
-    /// Root mean square error of the decay curves at held-out positions without the cause, in dB.
+    /// Root mean square error of the decay curves at held-out positions without the cause, in dB; not a number (null in JSON) where tables of
+    /// parameters are compared.
+    #[serde(deserialize_with = "or_null::number")]
     pub db_rmse_before: f64,
     /// The same with it.
+    #[serde(deserialize_with = "or_null::number")]
     pub db_rmse_after: f64,
+    /// Root mean square error of the values of tables at held-out positions, in just-noticeable differences, without the cause and with it.
+    #[serde(default)]
+    pub values_jnd: Option<[f64; 2]>,
     /// Whether every group of positions that was left out gains: one that gains far more than the others takes the interval below zero.
     #[serde(default)]
     pub in_every_group: bool,
+}
+
+/// Nor has it what is not a number.
+mod or_null {
+    use serde::{Deserialize, Deserializer};
+
+    pub fn number<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+        Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
+    }
+
+    pub fn numbers<'de, D: Deserializer<'de>>(from: D) -> Result<[f64; 3], D::Error> {
+        let found: [Option<f64>; 3] = Deserialize::deserialize(from)?;
+        Ok(found.map(|x| x.unwrap_or(f64::NAN)))
+    }
 }
 
 /// JSON has no infinity: an end that is null is infinite.
@@ -302,12 +323,19 @@ pub struct HeldOut {
     pub receivers: Vec<String>,
     /// True if they were named by the user and never fitted; else each was left out in turn.
     pub never_fitted: bool,
-    /// Root mean square error of decay curves in dB: baseline refitted, named causes, free discrepancy.
+    /// Root mean square error of decay curves in dB: baseline refitted, named causes, free discrepancy. Not numbers (null in JSON) where no
+    /// decay is compared; nor are the next two where none of their kind can be read.
+    #[serde(deserialize_with = "or_null::numbers")]
     pub db_rmse: [f64; 3],
     /// Mean error of T20 in just-noticeable differences (5 %), likewise.
+    #[serde(deserialize_with = "or_null::numbers")]
     pub t20_jnd: [f64; 3],
     /// Mean error of C50 in just-noticeable differences (1 dB), likewise.
+    #[serde(deserialize_with = "or_null::numbers")]
     pub c50_jnd: [f64; 3],
+    /// Root mean square error of the values of tables in just-noticeable differences, likewise, where tables of parameters are compared.
+    #[serde(default)]
+    pub values_jnd: Option<[f64; 3]>,
     /// Gain of the logarithm of the predictive density over the baseline, per compared bin: named causes, free discrepancy.
     pub nats_per_bin: [f64; 2],
     /// 90 % intervals of these (Student's t over groups of positions that were left out together); infinite, and null in JSON, for one
@@ -404,6 +432,8 @@ pub struct Diagnosis {
     pub residuals: Vec<ResidualCell>,
     /// Decay curves at held-out positions, or at all where none could be held out.
     pub decays: Vec<DecayCurves>,
+    /// Values of tables of parameters, where these take the place of responses: at held-out positions, or at all where none could be held out.
+    pub values: Vec<ComparedValue>,
     /// Reflections that causes of arrival times bring to peaks, the farthest moved first.
     pub moved_reflections: Vec<MovedReflection>,
     /// Gain of the recording over the simulation, in dB, where the room file leaves it open.
@@ -437,6 +467,7 @@ mod tests {
             high,
             db_rmse_before: 1.0,
             db_rmse_after: 0.5,
+            values_jnd: None,
             in_every_group: true,
         };
         let text = serde_json::to_string(&gain).unwrap();
@@ -447,6 +478,7 @@ mod tests {
             never_fitted: true,
             db_rmse: [1.0, 0.5, 0.6],
             t20_jnd: [1.0, 0.5, 0.6],
+            values_jnd: None,
             c50_jnd: [1.0, 0.5, 0.6],
             nats_per_bin: [0.1, 0.2],
             nats_interval: [[low, high], [0.1, 0.3]],

@@ -108,7 +108,7 @@ impl Serialize for Diagnosis {
         let materials: Vec<(&str, &FittedMaterial)> = self.materials.iter().map(|(n, m)| (&**n, m)).collect();
         let seconds: Vec<(&str, f64)> = self.seconds.iter().map(|(stage, s)| (&**stage, *s)).collect();
         let mean: Vec<&ResidualCell> = self.residuals.iter().filter(|c| c.response.is_none()).collect();
-        let mut document = serializer.serialize_struct("Diagnosis", 17)?;
+        let mut document = serializer.serialize_struct("Diagnosis", 18)?;
         document.serialize_field("bands_hz", &self.bands.iter_hz().collect::<Vec<f64>>())?;
         document.serialize_field("verdict", &self.verdict)?;
         document.serialize_field("lack_of_fit", &self.lack_of_fit)?;
@@ -122,6 +122,7 @@ impl Serialize for Diagnosis {
         document.serialize_field("materials", &ByName(materials))?;
         document.serialize_field("held_out", &self.held_out)?;
         document.serialize_field("residuals", &mean)?;
+        document.serialize_field("values", &self.values)?;
         document.serialize_field("moved_reflections", &self.moved_reflections)?;
         document.serialize_field("common_gain_db", &self.common_gain_db)?;
         document.serialize_field("notes", &self.notes)?;
@@ -209,6 +210,7 @@ mod tests {
             bands: Bands::octaves(500.0, 500.0).unwrap(),
             residuals: vec![cell(Some("s-r")), cell(None)],
             decays: Vec::new(),
+            values: Vec::new(),
             moved_reflections: Vec::new(),
             common_gain_db: None,
             notes: Vec::new(),

@@ -1,5 +1,6 @@
 //! What a diagnosis returns.
 
+pub(crate) mod compared_values;
 pub(crate) mod composition;
 pub(crate) mod diagnosis;
 mod document;

@@ -34,6 +34,10 @@ pub(crate) struct Circumstances<'a> {
     pub at_bounds: &'a [(&'a str, Vec<String>)],
 }
 
+/// What tables do not hold.
+const OF_TABLES: &str = "Tables of parameters were compared: they hold no arrival times and no levels, so that wrong positions, moved walls, \
+                         gains and noise cannot show. Responses tell more.";
+
 pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
     let mut notes = about.baseline.observations.notes.clone();
     if about.baseline.survey().air_assumed {
@@ -83,7 +87,11 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
             parameters.join(" and ")
         ));
     }
-    if about.baseline.simulation.arrivals.iter().any(Vec::is_empty) {
+    let are_tables = about.baseline.observations.are_tables();
+    if are_tables {
+        notes.push(OF_TABLES.into());
+    }
+    if !are_tables && about.baseline.simulation.arrivals.iter().any(Vec::is_empty) {
         notes.push("Where the direct line is blocked, arrival times are not compared.".into());
     }
     if about.scattered && about.verdict == Verdict::Unexplained {

@@ -5,7 +5,7 @@ use crate::infer::baseline::{Baseline, dispersion};
 use crate::infer::search::State;
 use crate::report::diagnosis::ResidualCell;
 
-/// Residuals of the fitted responses by octave and bin, their mean over responses, and the dispersion under the causes.
+/// Residuals of the fitted responses by octave and bin, their mean over responses, and the dispersion under the causes. Tables have no bins.
 pub(crate) fn residual_map(
     baseline: &Baseline,
     base: &State,
@@ -15,6 +15,10 @@ pub(crate) fn residual_map(
     let all: Vec<usize> = (0..baseline.pairs()).filter(|&p| baseline.observations.fitted[p]).collect();
     let before = baseline.residuals(&[], &base.energy.values, &all);
     let after = baseline.residuals(cases, &state.energy.values, &all);
+    let dispersion = dispersion(&after, baseline.survey().bands.len());
+    if baseline.observations.are_tables() {
+        return (Vec::new(), dispersion);
+    }
     let db = |ln: f64| ln * 10.0 / std::f64::consts::LN_10;
     let mut cells = Vec::new();
     let mut means: std::collections::BTreeMap<(usize, usize), (f64, f64, f64, f64)> =
@@ -48,5 +52,5 @@ pub(crate) fn residual_map(
             expected_sd_db: db((variance / n / n).sqrt()),
         });
     }
-    (cells, dispersion(&after, baseline.survey().bands.len()))
+    (cells, dispersion)
 }

@@ -2,6 +2,7 @@
 
 use crate::observe::time_bins::Bins;
 use crate::simulate::modes::Modes;
+use crate::simulate::table_chance::TableChance;
 #[cfg(test)]
 use sabine_paths::PathSet;
 
@@ -34,6 +35,8 @@ pub(crate) struct BandState {
     pub monte_carlo: Vec<f64>,
     /// What the tracer's chance moves together.
     pub modes: Modes,
+    /// The same of the values that a table states of the pair; `None` of a pair without a table, and where a value cannot be read.
+    pub table: Option<TableChance>,
     /// By how much the logarithm of the energy that is to be expected lies above that of what the rays have found in the bin: these are
     /// smoothed, and corrected for what chance does to logarithms.
     pub correction: Vec<f64>,
@@ -62,6 +65,7 @@ impl BandState {
             variance: Vec::with_capacity(count),
             monte_carlo: Vec::with_capacity(count),
             modes: Modes::default(),
+            table: None,
             correction: Vec::with_capacity(count),
             batch_deviations: Vec::with_capacity(count * batches),
             batches,
@@ -104,6 +108,7 @@ impl BandState {
                 2,
                 (0..count).flat_map(|bin| [0.1 * (0.7 * bin as f64).sin(), 0.004 * bin as f64]).collect(),
             ),
+            table: None,
             correction: (0..count).map(|bin| 0.002 * bin as f64).collect(),
             batch_deviations: (0..count * usize::from(PathSet::BATCHES))
                 .map(|i| 0.02 * (1.7 * i as f32).sin())

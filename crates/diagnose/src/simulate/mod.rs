@@ -13,6 +13,8 @@ pub(crate) mod scene_tracer;
 pub(crate) mod schroeder;
 pub(crate) mod simulation;
 pub(crate) mod smoothing;
+pub(crate) mod table_chance;
+pub(crate) mod table_readings;
 pub(crate) mod tables;
 pub(crate) mod traced_pair;
 pub(crate) mod traced_room;

@@ -10,7 +10,7 @@ use crate::extend::displaced_surface::DisplacedSurface;
 use crate::extend::moved_mesh::find_ranges;
 use crate::extend::rigid_motion::RigidMotion;
 use crate::observe::observations::Observations;
-use crate::observe::observed_response::PEAKS_S;
+use crate::observe::observed_response::{Measured, PEAKS_S};
 use crate::simulate::band_state::BandState;
 use crate::simulate::edges::Edges;
 use crate::simulate::met_surfaces::MetSurfaces;
@@ -18,6 +18,7 @@ use crate::simulate::monte_carlo_modes;
 #[cfg(test)]
 use crate::simulate::scene_tracer::Rays;
 use crate::simulate::scene_tracer::{PreparedTracer, SceneTracer};
+use crate::simulate::table_chance::TableChance;
 use crate::simulate::tables::Tables;
 use crate::simulate::traced_pair::{Arrival, IsolatedReflection, TracedPair};
 use crate::simulate::traced_room::{trace, traced_s, traced_scene, traced_until_s};
@@ -191,6 +192,7 @@ impl Simulation {
         self.compared_s =
             (0..observations.survey.bands.len()).map(|b| compared_s(&self.states, &self.ends, b)).collect();
         self.states.par_iter_mut().zip(&self.ends).for_each(|(s, ends)| monte_carlo_modes::find(s, ends));
+        self.find_table_chances(&observations.measured);
         self.reference = (0..observations.survey.bands.len())
             .map(|band| {
                 let early: Vec<f64> = self
@@ -207,12 +209,22 @@ impl Simulation {
         Ok(())
     }
 
-    /// Predicts the arrivals of all pairs; none where the direct line is blocked. The survey learns which surfaces they meet, and how far
+    /// How chance moves what tables state, where they take the place of responses.
+    pub fn find_table_chances(&mut self, measured: &[Measured]) {
+        self.states.par_iter_mut().zip(measured).for_each(|(states, measured)| {
+            let stated = measured.table.iter().flatten();
+            states.iter_mut().zip(stated).for_each(|(state, own)| state.table = TableChance::of(own, state));
+        });
+    }
+
+    /// Predicts the arrivals of all pairs; none where the direct line is blocked, nor of tables, which hold no times. The survey learns which surfaces they meet, and how far
     /// these can be moved.
-    pub fn predict_arrivals(&mut self, survey: &mut Survey) -> Result<(), Error> {
+    pub fn predict_arrivals(&mut self, observations: &mut Observations) -> Result<(), Error> {
+        let are_timed = !observations.are_tables();
+        let survey = &mut observations.survey;
         let materials = self.expanded_materials()?;
         let one = |(index, pair): (usize, &TracedPair)| -> Result<Vec<Arrival>, Error> {
-            if !pair.has_direct() {
+            if !pair.has_direct() || !are_timed {
                 return Ok(Vec::new());
             }
             let mut found = pair.arrivals(&materials, PEAKS_S * ARRIVALS_MARGIN)?;

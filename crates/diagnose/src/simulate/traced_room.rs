@@ -30,6 +30,10 @@ const MARGIN_DB: f64 = 12.0;
 pub(crate) fn traced_s(survey: &Survey, measured: &[Measured], range_db: f64) -> f64 {
     let mut longest = MIN_TRACED_S;
     for m in measured {
+        if m.table.is_some() {
+            longest = longest.max(m.duration_s);
+            continue;
+        }
         for (band, energies) in m.energies.iter().enumerate() {
             let Some(energies) = energies else { continue };
             let bins = crate::observe::time_bins::Bins::new(survey.bands, band);

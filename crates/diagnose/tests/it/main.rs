@@ -8,6 +8,7 @@ mod extended_model;
 mod hidden_distortion;
 mod hidden_edges;
 mod hidden_effects;
+mod hidden_in_tables;
 mod hidden_law;
 mod hidden_laws_in_rooms;
 mod hidden_local_reaction;

@@ -37,15 +37,18 @@ pub fn section(page: &mut Page, findings: &Findings) {
     // Without a cause the second would repeat the first.
     let shown: &[usize] = if findings.causes.is_empty() { &[0, 2] } else { &[0, 1, 2] };
     page.markup(&held_out_bars(held, shown));
-    let [t20, c50] = [held.t20_jnd, held.c50_jnd].map(|v| v.map(|x| format!("{x:.1}")));
-    page.markup(
-        "<p class=\"key\">Mean error in steps that are just noticeable (5 % of T20, 1 dB of C50)</p>",
-    );
-    let mut rows = vec![["", "T20", "C50"].map(str::to_owned).to_vec()];
-    for &i in shown {
-        rows.push(vec![PREDICTIONS[i].to_owned(), t20[i].clone(), c50[i].clone()]);
+    if held.values_jnd.is_none() {
+        let told = |x: f64| if x.is_finite() { format!("{x:.1}") } else { "-".to_owned() };
+        let [t20, c50] = [held.t20_jnd, held.c50_jnd].map(|v| v.map(told));
+        page.markup(
+            "<p class=\"key\">Mean error in steps that are just noticeable (5 % of T20, 1 dB of C50)</p>",
+        );
+        let mut rows = vec![["", "T20", "C50"].map(str::to_owned).to_vec()];
+        for &i in shown {
+            rows.push(vec![PREDICTIONS[i].to_owned(), t20[i].clone(), c50[i].clone()]);
+        }
+        page.table(&rows);
     }
-    page.table(&rows);
     page.paragraph(if !is_named {
         "The free correction may bend every band and time as it likes and explains nothing. Where it does much better than the simulation, something is missing."
     } else {
@@ -54,13 +57,17 @@ pub fn section(page: &mut Page, findings: &Findings) {
 }
 
 fn held_out_bars(held: &HeldOut, shown: &[usize]) -> String {
-    let most_db = held.db_rmse.iter().copied().fold(0.1, f64::max);
-    let mut html = String::from(
-        "<div class=\"bars\"><p class=\"key\">Error of predicted decay curves (shorter is better)</p>",
-    );
+    let (what, unit, errors) = match held.values_jnd {
+        Some(errors) => {
+            ("predicted values of the tables, root mean square in just-noticeable differences", "JND", errors)
+        }
+        None => ("predicted decay curves", "dB", held.db_rmse),
+    };
+    let most = errors.iter().copied().fold(0.1, f64::max);
+    let mut html = format!("<div class=\"bars\"><p class=\"key\">Error of {what} (shorter is better)</p>");
     for &i in shown {
-        let text = format!("{:.2} dB", held.db_rmse[i]);
-        let bar = Bar { colour: i, share: held.db_rmse[i] / most_db, interval: None, text };
+        let text = format!("{:.2} {unit}", errors[i]);
+        let bar = Bar { colour: i, share: errors[i] / most, interval: None, text };
         html += &bars::group(PREDICTIONS[i], &[bar], None);
     }
     html += "<p class=\"key\">Gain in predicting them, over materials refitted only (longer is better; line: 90 % interval over positions)</p>";
@@ -79,5 +86,6 @@ fn held_out_bars(held: &HeldOut, shown: &[usize]) -> String {
             if known { format!("{low:.3} to {high:.3}") } else { "one position has no interval".to_owned() };
         html += &bars::group(&format!("{} ({interval})", PREDICTIONS[i]), &[bar], None);
     }
-    html + "<p class=\"key\">In nats for each compared time bin: 0.7 means twice as probable.</p></div>"
+    let each = if held.values_jnd.is_some() { "value of the tables" } else { "compared time bin" };
+    html + &format!("<p class=\"key\">In nats for each {each}: 0.7 means twice as probable.</p></div>")
 }

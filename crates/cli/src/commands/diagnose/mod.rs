@@ -1,4 +1,4 @@
-//! What a simulated room gets wrong against measured responses, why, and what mending it gains.
+//! What a simulated room gets wrong against measured responses, or tables of parameters, why, and what mending it gains.
 //!
 //! Without arguments it runs on the built-in demo, whose two responses show what can be said with that little.
 
@@ -12,6 +12,7 @@ mod report;
 #[cfg(test)]
 mod report_tests;
 mod residual_map;
+mod values;
 pub(in crate::commands) mod words;
 
 use crate::bar::Bar;
@@ -21,13 +22,14 @@ use crate::laws::naming_laws;
 use crate::output::OutputFolder;
 use crate::room::RoomArguments;
 use clap::{Args, ValueEnum};
-use findings::Findings;
+use findings::{Findings, Measured};
 use sabine::acoustics::Error as ValueError;
 use sabine::diagnose::{DiagnoseConfig, Diagnoser, Error as DiagnoseError, ExtendedModel, read_laws};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use words::Off;
 
-/// Find what a simulation of a room gets wrong against measured responses.
+/// Find what a simulation of a room gets wrong against measured responses, or tables of T30, EDT, C80.
 #[derive(Args)]
 pub struct Arguments {
     #[command(flatten)]
@@ -121,9 +123,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     // A folder that cannot be written to should not cost the user a computation first.
     let mut out = OutputFolder::create(&arguments.out)?;
     let (room, name) = arguments.room.read(&mut demo)?;
-    if room.responses().is_empty() && !room.parameters().is_empty() {
-        return Err("room.toml: there are tables of parameters and no responses: a diagnosis weighs arrivals and decays, which tables do not hold; `sabine fit` says which pairs and octaves the model does not explain".into());
-    }
     let bar = Bar::stopped_on_request(arguments.time_limit.map(Duration::from_secs))?;
     let mut diagnosis = diagnoser.diagnose(&room, &arguments.hold_out, &bar).map_err(|error| -> Failure {
         // An error of its own may come first, and counts then.
@@ -136,26 +135,24 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     })?;
     bar.finish();
 
-    if !room.parameters().is_empty() {
-        diagnosis
-            .notes
-            .push("tables of parameters were not used: `sabine fit` holds them against the model".to_owned());
+    if !room.parameters().is_empty() && !room.responses().is_empty() {
+        diagnosis.notes.push(
+            "tables of parameters were not used beside responses: `sabine fit` holds them against the model"
+                .to_owned(),
+        );
     }
-    let mut receivers: Vec<usize> = room.responses().iter().map(|r| r.receiver).collect();
-    receivers.sort_unstable();
-    receivers.dedup();
+    let measured = Measured::of(&room);
     let model = diagnosis.model.to_toml()?;
     let found = diagnosis.model.room(&room);
     if let Err(error) = &found {
         // What took minutes to find is not withheld for a drawing.
         diagnosis.notes.push(format!("the room as found cannot be drawn: {error}"));
     }
-    let (responses, receivers) = (room.responses().len(), receivers.len());
-    let json = findings::json(&diagnosis, &name, responses, receivers, threshold_nats)?;
+    let json = findings::json(&diagnosis, &name, measured, threshold_nats)?;
     out.write("diagnosis.json", json.as_bytes())?;
     let drawn = found.as_ref().ok().filter(|_| drawing::has_a_place(&diagnosis.model));
     let drawing = drawn.map(|found| drawing::svg(&room, found, &diagnosis.moved_reflections));
-    let findings = Findings::new(diagnosis, name, responses, receivers, threshold_nats);
+    let findings = Findings::new(diagnosis, name, measured, threshold_nats);
     out.write("report.html", report::html(&findings, drawing.as_deref())?.as_bytes())?;
     out.write("extended_model.toml", model.as_bytes())?;
     if let Ok(found) = &found {
@@ -190,9 +187,9 @@ fn print_findings(findings: &Findings, out: &Path) {
             );
         }
         if let Some(gain) = &cause.held_out_gain {
+            let Off { what, unit, before, after } = words::off(gain);
             println!(
-                "  decay curves at positions not seen: {:.2} dB off before, {:.2} dB after",
-                gain.db_rmse_before, gain.db_rmse_after
+                "  {what} at positions not seen: {before:.2} {unit} off before, {after:.2} {unit} after"
             );
         }
     }

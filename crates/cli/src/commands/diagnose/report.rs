@@ -1,13 +1,13 @@
 //! The page: what is wrong, how sure that is, what mending it gains, and what to measure next.
 
 use super::bars::{self, Bar};
-use super::findings::Findings;
+use super::findings::{Findings, Measured};
 use super::residual_map::{self, ResidualMap};
 use super::words::{
-    capital, effect, effect_of, headline, hertz, in_band, interval, meaning, named, number, parameter,
-    plan_command, sentence,
+    Off, capital, effect, effect_of, headline, hertz, in_band, interval, meaning, named, number, off,
+    parameter, plan_command, sentence,
 };
-use super::{held_out, laws, look_alikes};
+use super::{held_out, laws, look_alikes, values};
 use crate::chart::{Chart, Look, Scale, Series};
 use crate::failure::Failure;
 use crate::page::{Page, escape};
@@ -33,15 +33,19 @@ const MOST_ROWS: usize = 12;
 pub fn html(findings: &Findings, drawing: Option<&str>) -> Result<String> {
     let mut page = Page::new("What the simulation gets wrong");
     page.markup(bars::STYLE);
+    let Measured { responses, tables, receivers } = findings.measured;
+    let counted = |count: usize, of: &str| format!("{count} {of}{}", if count == 1 { "" } else { "s" });
     page.paragraph(&format!(
-        "The room \"{}\", simulated and compared with {} measured response{} at {} microphone position{}.",
+        "The room \"{}\", simulated and compared with {} at {}.",
         std::path::Path::new(&findings.room)
             .file_name()
             .map_or(findings.room.clone(), |n| n.to_string_lossy().into_owned()),
-        findings.responses,
-        if findings.responses == 1 { "" } else { "s" },
-        findings.receivers,
-        if findings.receivers == 1 { "" } else { "s" },
+        if tables == 0 {
+            counted(responses, "measured response")
+        } else {
+            format!("tables of {}", counted(tables, "source-receiver pair"))
+        },
+        counted(receivers, "microphone position"),
     ));
     let told: String = meaning(findings).iter().map(|s| format!("<p>{}</p>", escape(s))).collect();
     page.markup(&format!(
@@ -63,6 +67,7 @@ pub fn html(findings: &Findings, drawing: Option<&str>) -> Result<String> {
     residuals(&mut page, findings)?;
     evidence(&mut page, findings);
     decays(&mut page, findings)?;
+    values::section(&mut page, findings)?;
     materials(&mut page, findings)?;
     look_alikes::section(&mut page, findings);
     page.heading("Time taken");
@@ -166,7 +171,7 @@ fn rays_sentence(cause: &Cause) -> String {
 
 fn gain_sentence(cause: &Cause) -> String {
     let Some(gain) = &cause.held_out_gain else { return String::new() };
-    let (before, after) = (gain.db_rmse_before, gain.db_rmse_after);
+    let Off { what, unit, before, after } = off(gain);
     // What bears on times alone leaves decays as they are.
     let verdict = if (after - before).abs() < 0.005 {
         "are the same with and without it, which says nothing about it"
@@ -176,7 +181,7 @@ fn gain_sentence(cause: &Cause) -> String {
         "do not come closer, which speaks against it"
     };
     format!(
-        " At positions that the fit had not seen, decay curves {verdict}: {before:.2} dB off before, {after:.2} dB after."
+        " At positions that the fit had not seen, {what} {verdict}: {before:.2} {unit} off before, {after:.2} {unit} after."
     )
 }
 

@@ -1,7 +1,7 @@
 //! The catalogue's identifiers in plain words.
 
 use super::findings::Findings;
-use sabine::diagnose::{Cause, FoundParameter, Verdict, catalogue, on_request};
+use sabine::diagnose::{Cause, FoundParameter, HeldOutGain, Verdict, catalogue, on_request};
 use std::borrow::Cow;
 
 /// Below this probability chance is not believed, as by default in the diagnosis.
@@ -206,6 +206,25 @@ fn worst_place(findings: &Findings, after: bool) -> Option<String> {
         value(worst).abs(),
         if after { "" } else { " without it" },
     ))
+}
+
+/// How far a cause brings what was measured at positions that no fit has seen.
+pub struct Off {
+    pub what: &'static str,
+    pub unit: &'static str,
+    pub before: f64,
+    pub after: f64,
+}
+
+/// Of decay curves in dB, of the values of tables in just-noticeable differences.
+pub fn off(gain: &HeldOutGain) -> Off {
+    match gain.values_jnd {
+        Some([before, after]) => Off { what: "values of the tables", unit: "JND", before, after },
+        None => {
+            let (before, after) = (gain.db_rmse_before, gain.db_rmse_after);
+            Off { what: "decay curves", unit: "dB", before, after }
+        }
+    }
 }
 
 /// As many figures as an interval of such a width warrants; to a thousandth where there is none.

@@ -2,7 +2,7 @@
 
 use crate::effect::Case;
 use crate::infer::baseline::Baseline;
-use crate::likelihood::decay::{DRIFTS, unit_drift};
+use crate::likelihood::decay::{BinResidual, DRIFTS, unit_drift};
 use crate::likelihood::parameters::assignment;
 use crate::observe::observed_response::Measured;
 use rand::SeedableRng;
@@ -20,7 +20,12 @@ pub(super) fn simulate(baseline: &Baseline, cases: &[&Case], values: &[f64], num
     let mut level = (usize::MAX, 0, 0.0f64);
     let mut drift = [0.0f64; DRIFTS];
     let mut chance: (usize, Vec<f64>) = (usize::MAX, Vec::new());
-    for r in baseline.residuals(cases, values, &all) {
+    let residuals = baseline.residuals(cases, values, &all);
+    if baseline.observations.are_tables() {
+        draw_tables(baseline, &residuals, &assignment, &mut measured, &mut random);
+        return measured;
+    }
+    for r in residuals {
         let modes = &baseline.simulation.states[r.pair][r.band].modes;
         if chance.0 != r.pair {
             chance = (r.pair, (0..modes.count()).map(|_| StandardNormal.sample(&mut random)).collect());
@@ -41,4 +46,31 @@ pub(super) fn simulate(baseline: &Baseline, cases: &[&Case], values: &[f64], num
         }
     }
     measured
+}
+
+/// The same of tables: what interference, rays and the measurement itself leave open.
+fn draw_tables(
+    baseline: &Baseline,
+    residuals: &[BinResidual],
+    assignment: &[usize],
+    measured: &mut [Measured],
+    random: &mut Pcg64Mcg,
+) {
+    let mut draw = || -> f64 { StandardNormal.sample(random) };
+    let mut rays: (usize, Vec<f64>) = (usize::MAX, Vec::new());
+    for octave in residuals.chunk_by(|a, b| (a.pair, a.band) == (b.pair, b.band)) {
+        let (pair, band) = (octave[0].pair, octave[0].band);
+        let Some(chance) = &baseline.simulation.states[pair][band].table else { continue };
+        if rays.0 != pair {
+            rays = (pair, (0..chance.modes.count()).map(|_| draw()).collect());
+        }
+        let own: Vec<f64> = (0..chance.count()).map(|_| draw()).collect();
+        let along = |moves: &[f64], by: &[f64]| moves.iter().zip(by).map(|(m, z)| m * z).sum::<f64>();
+        let Some(quantities) = &mut measured[assignment[pair]].energies[band] else { continue };
+        for r in octave {
+            let by_chance = along(chance.of_value(r.bin), &own) + along(chance.modes.of(r.bin), &rays.1);
+            let by_measurement = (r.variance * baseline.dispersion[band]).sqrt() * draw();
+            quantities[r.bin] = (r.ln_predicted + by_chance + by_measurement).exp();
+        }
+    }
 }

@@ -6,6 +6,7 @@
 
 use crate::likelihood::laplace::Slopes;
 use crate::simulate::modes::Modes;
+use crate::simulate::table_chance::TableChance;
 use crate::statistics::{HUBER_LOG_RATIO, exp_all, log_density};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
@@ -32,6 +33,19 @@ pub(super) struct BandBins<'a> {
     pub level_sd: f64,
     /// Standard deviation of the drift's first cosine, as a logarithm of energy; that of the k-th is a k-th of it.
     pub drift_sd: f64,
+    /// How chance moves the values of a table, where these take the place of bins: they have no level and no drift.
+    pub table: Option<&'a TableChance>,
+}
+
+impl BandBins<'_> {
+    /// Number of directions of its own.
+    fn own(&self) -> usize {
+        match self.table {
+            Some(chance) => chance.count(),
+            None if self.drift_sd > 0.0 => 1 + DRIFTS,
+            None => 1,
+        }
+    }
 }
 
 /// All directions in which the bins of one response move together, a standard normal deviate along each: first those of each band (its
@@ -64,7 +78,7 @@ impl<'a> Directions<'a> {
             .iter()
             .map(|b| {
                 let first = count;
-                count += if b.drift_sd > 0.0 { 1 + DRIFTS } else { 1 };
+                count += b.own();
                 first..count
             })
             .collect();
@@ -100,8 +114,10 @@ impl<'a> Directions<'a> {
     pub fn top(&self) -> Offsets {
         let deviates = self.most_probable();
         let of = (0..self.bands.len()).map(|band| self.moved(&deviates, band)).collect();
-        let levels =
-            self.own.iter().zip(self.bands).map(|(own, b)| deviates[own.start] * b.level_sd).collect();
+        let level = |(own, b): (&Range<usize>, &BandBins<'_>)| {
+            if b.table.is_some() { 0.0 } else { deviates[own.start] * b.level_sd }
+        };
+        let levels = self.own.iter().zip(self.bands).map(level).collect();
         let log_likelihood = self.log_likelihood(&deviates, 0..self.bands.len(), 0..self.count());
         Offsets { levels, of, log_likelihood }
     }
@@ -115,7 +131,7 @@ impl<'a> Directions<'a> {
         }
         // Bands have nothing in common.
         for (band, own) in self.own.iter().enumerate() {
-            if own.len() == 1 {
+            if own.len() == 1 && self.bands[band].table.is_none() {
                 let BandBins { ln_ratio, shapes, level_sd, .. } = self.bands[band];
                 deviates[own.start] = most_probable_level(ln_ratio, shapes, level_sd) / level_sd;
             } else {
@@ -238,8 +254,12 @@ fn moves(bins: &BandBins<'_>, own: usize) -> Vec<f64> {
     let count = bins.ln_ratio.len();
     let mut moves = Vec::with_capacity(count * (own + bins.modes.count()));
     for bin in 0..count {
-        moves.push(bins.level_sd);
-        moves.extend(unit_drift(bin, count).iter().take(own - 1).map(|unit| bins.drift_sd * unit));
+        if let Some(chance) = bins.table {
+            moves.extend_from_slice(chance.of_value(bin));
+        } else {
+            moves.push(bins.level_sd);
+            moves.extend(unit_drift(bin, count).iter().take(own - 1).map(|unit| bins.drift_sd * unit));
+        }
         moves.extend_from_slice(bins.modes.of(bin));
     }
     moves
@@ -334,6 +354,7 @@ mod tests {
             modes: &Modes::default(),
             level_sd: sd,
             drift_sd: 0.0,
+            table: None,
         }])
         .top()
         .levels[0]
@@ -360,6 +381,7 @@ mod tests {
                 modes: &modes,
                 level_sd: 0.3,
                 drift_sd: 0.0,
+                table: None,
             }];
             let best = level_of(&ratios, &shapes, 0.3);
             let directions = Directions::new(&bins);
@@ -383,6 +405,7 @@ mod tests {
             modes: &modes,
             level_sd: 0.2,
             drift_sd: 0.0,
+            table: None,
         });
         let directions = Directions::new(&bins);
         let found = directions.top();
@@ -413,7 +436,14 @@ mod tests {
         // A mode that has nothing to say here.
         let alternating = Modes::new(1, (0..60).map(|bin| if bin % 2 == 0 { 0.1 } else { -0.1 }).collect());
         for modes in [&Modes::default(), &alternating] {
-            let bins = [BandBins { ln_ratio: &ratios, shapes: &shapes, modes, level_sd: 0.2, drift_sd: 0.3 }];
+            let bins = [BandBins {
+                ln_ratio: &ratios,
+                shapes: &shapes,
+                modes,
+                level_sd: 0.2,
+                drift_sd: 0.3,
+                table: None,
+            }];
             let directions = Directions::new(&bins);
             let found = directions.top();
             assert!((found.levels[0] - 0.2).abs() < 0.02, "{:?}", found.levels);
@@ -453,6 +483,7 @@ mod tests {
             modes: &modes,
             level_sd: sd,
             drift_sd: 0.0,
+            table: None,
         }];
         let directions = Directions::new(&bins);
         let mut shared = SharedInformation::new(&directions);

@@ -2,6 +2,7 @@
 
 use super::chance::{Place, TakenOff};
 use super::offsets::{BandBins, Directions, SharedInformation};
+use super::table_band::TableBand;
 use super::{EnergyModel, LN_PER_DB, STEP};
 use crate::effect::DecayTerm;
 use crate::likelihood::laplace::Slopes;
@@ -27,6 +28,8 @@ pub(super) struct ComparedBand<'a> {
     modes: &'a Modes,
     level_sd: f64,
     drift_sd: f64,
+    /// The table whose values take the place of the bins, where the pair has one.
+    table: Option<TableBand<'a>>,
 }
 
 impl ComparedBand<'_> {
@@ -35,8 +38,9 @@ impl ComparedBand<'_> {
     }
 
     pub fn bins(&self) -> BandBins<'_> {
-        let Self { ln_ratio, shapes, modes, level_sd, drift_sd, .. } = self;
-        BandBins { ln_ratio, shapes, modes, level_sd: *level_sd, drift_sd: *drift_sd }
+        let Self { ln_ratio, shapes, modes, level_sd, drift_sd, table, .. } = self;
+        let table = table.as_ref().map(|table| table.chance);
+        BandBins { ln_ratio, shapes, modes, level_sd: *level_sd, drift_sd: *drift_sd, table }
     }
 }
 
@@ -46,12 +50,19 @@ impl EnergyModel<'_> {
         (0..self.data.survey.bands.len())
             .filter_map(|band| {
                 let energies = self.compared(pair, band)?;
-                let paths = self.paths(values, (pair, band), energies.len(), sloping);
-                let predicted = self.affected(values, (pair, band), paths.0.clone());
+                let bins = self.predicted_bins(pair, band, energies.len());
+                let paths = self.paths(values, (pair, band), bins, sloping);
+                let ln_energy = self.affected(values, (pair, band), paths.0.clone());
+                let table = self.table(pair, band, &ln_energy);
+                let (predicted, variances, modes) = match &table {
+                    Some(table) => (table.predicted(), table.variances(), &table.chance.modes),
+                    None => {
+                        let variances = self.variances(values, pair, band, bins);
+                        (ln_energy, variances, &self.data.states[pair][band].modes)
+                    }
+                };
                 let ln_ratio = self.ln_ratio(band, energies, &predicted);
-                let variances = self.variances(values, pair, band, energies.len());
                 let shapes = self.shapes(band, &variances);
-                let modes = &self.data.states[pair][band].modes;
                 Some(ComparedBand {
                     band,
                     paths,
@@ -62,6 +73,7 @@ impl EnergyModel<'_> {
                     modes,
                     level_sd: self.data.level_sd[band],
                     drift_sd: self.data.drift_sd[band],
+                    table,
                 })
             })
             .collect()
@@ -73,9 +85,16 @@ impl EnergyModel<'_> {
         let bins: Vec<BandBins<'_>> = compared.iter().map(ComparedBand::bins).collect();
         let directions = Directions::new(&bins);
         let offsets = directions.top();
-        let tops: f64 = compared.iter().map(|one| self.tops((pair, one.band), &one.variances)).sum();
-        let taken_off: Vec<Option<TakenOff>> =
-            compared.iter().map(|one| self.chance_taken_off(values, one.place(pair))).collect();
+        // What a table leaves to chance no effect changes.
+        let of_bins = |one: &&ComparedBand<'_>| one.table.is_none();
+        let tops: f64 =
+            compared.iter().filter(of_bins).map(|one| self.tops((pair, one.band), &one.variances)).sum();
+        let taken_off: Vec<Option<TakenOff>> = compared
+            .iter()
+            .map(|one| {
+                Some(one).filter(of_bins).and_then(|one| self.chance_taken_off(values, one.place(pair)))
+            })
+            .collect();
         let chance: f64 = taken_off.iter().flatten().map(|t| t.nats).sum();
         let value = offsets.log_likelihood + tops + chance;
         let Some(slopes) = slopes else { return value };
@@ -85,7 +104,9 @@ impl EnergyModel<'_> {
             let (columns, rows) = self.rows(values, pair, one);
             add_slopes(slopes, (&columns, &rows), (&one.shapes, &ln_ratio));
             shared.add(place, (&columns, &rows));
-            self.add_variance_slopes(values, (pair, one.band), &one.variances, &ln_ratio, slopes);
+            if one.table.is_none() {
+                self.add_variance_slopes(values, (pair, one.band), &one.variances, &ln_ratio, slopes);
+            }
             if let Some(taken_off) = &taken_off[place] {
                 self.add_chance_gradient(values, one.place(pair), (taken_off, &one.paths.1), slopes);
             }
@@ -129,6 +150,13 @@ impl EnergyModel<'_> {
                     rows.push(self.difference(values, placed.first + i, &view, gain_db, paths));
                 }
             }
+        }
+        if let Some(table) = &one.table {
+            let by_bin = table.slopes();
+            let along = |row: &Vec<f64>| -> Vec<f64> {
+                by_bin.iter().map(|own| own.iter().zip(row).map(|(s, x)| s * x).sum()).collect()
+            };
+            rows.iter_mut().for_each(|row| *row = along(row));
         }
         (columns, rows)
     }

@@ -39,32 +39,79 @@ fn the_gradient_is_that_of_central_differences() {
         for state in tables.states.iter_mut().flatten() {
             state.monte_carlo = state.variance.iter().map(|v| 0.4 * v).collect();
         }
-        let used = [true; 3];
         for effect in effects {
-            let mut cases = effect.cases(&tables.survey);
-            let prepared = tables.prepared(&mut cases);
-            let data = EnergyData { tables: &prepared, ..tables.energy_data() };
-            let cases: Vec<&Case> = cases.iter().collect();
-            let model = EnergyModel::new(&data, &cases, &used);
-            let values = somewhere(&model);
-            let mut slopes = Slopes::zero(values.len());
-            model.log_likelihood(&values, Some(&mut slopes));
-            for i in 0..values.len() {
-                let step = 1e-5 * model.priors[i].sd.min(1.0);
-                let at = |offset: f64| {
-                    let mut moved = values.clone();
-                    moved[i] += offset;
-                    model.log_likelihood(&moved, None)
-                };
-                let expected = (at(step) - at(-step)) / (2.0 * step);
-                let found = slopes.gradient[i];
-                let off = (found - expected).abs();
-                let name = effect.id();
-                // Slopes of effects are differences themselves, rounded at 1e-6 of the likelihood's size.
-                assert!(off < 1e-3 * expected.abs() + 2e-3, "{name} {levels:?} {i}: {found} {expected}");
-            }
+            assert_gradient(&tables, effect, &format!("{} {levels:?}", effect.id()));
         }
     }
+}
+
+/// The gradient of the likelihood of an effect's cases, away from their neutral values, against central differences.
+fn assert_gradient(tables: &HandMade, effect: &dyn Effect, name: &str) {
+    let mut cases = effect.cases(&tables.survey);
+    let prepared = tables.prepared(&mut cases);
+    let data = EnergyData { tables: &prepared, ..tables.energy_data() };
+    let cases: Vec<&Case> = cases.iter().collect();
+    let model = EnergyModel::new(&data, &cases, &[true; 3]);
+    let values = somewhere(&model);
+    let mut slopes = Slopes::zero(values.len());
+    assert!(model.log_likelihood(&values, Some(&mut slopes)).is_finite(), "{name}");
+    for i in 0..values.len() {
+        let step = 1e-5 * model.priors[i].sd.min(1.0);
+        let at = |offset: f64| {
+            let mut moved = values.clone();
+            moved[i] += offset;
+            model.log_likelihood(&moved, None)
+        };
+        let expected = (at(step) - at(-step)) / (2.0 * step);
+        let found = slopes.gradient[i];
+        let off = (found - expected).abs();
+        // Slopes of effects are differences themselves, rounded at 1e-6 of the likelihood's size.
+        assert!(off < 1e-3 * expected.abs() + 2e-3, "{name} {i}: {found} {expected}");
+    }
+}
+
+#[test]
+fn the_gradient_of_tables_is_that_of_central_differences() {
+    let tables = HandMade::new(Levels::Common, TimeZero::Emission).with_parameters();
+    let effects: [&dyn Effect; 6] = [
+        &AirAbsorption,
+        &AngleDependentAbsorption,
+        &CoherentReflections,
+        &CoupledVolume,
+        &Scattering,
+        &SourceDirectivity,
+    ];
+    for effect in effects {
+        assert_gradient(&tables, effect, &effect.id());
+    }
+}
+
+/// The normal distribution about what is predicted, with the covariance of the measurement, of interference and of the rays.
+#[test]
+fn tables_are_as_probable_as_their_covariance_says() {
+    use nalgebra::{DMatrix, DVector};
+    let mut tables = HandMade::new(Levels::Absolute, TimeZero::Emission).with_parameters();
+    // A band by itself: the chance of the rays is that of all bands of a pair together.
+    tables.measured.iter_mut().for_each(|m| m.energies[1] = None);
+    let data = EnergyData { dispersion: &[1.0; 2], ..tables.energy_data() };
+    let used = [false, true, false];
+    let model = EnergyModel::new(&data, &[], &used);
+    let chance = tables.states[1][0].table.as_ref().unwrap();
+    let stated = tables.measured[1].table.as_ref().unwrap()[0].clone();
+    let own = stated.iter().zip(&chance.by_width_of_bins).map(|(s, width)| s.ln_sd.powi(2) + width.powi(2));
+    let measurement = DVector::from_iterator(stated.len(), own);
+    let covariance = chance.covariance(stated.len()) + DMatrix::from_diagonal(&measurement);
+    let inverse = covariance.try_inverse().unwrap();
+    let [here, there] = [0.0, 0.15].map(|more| {
+        let mut values = model.start(None);
+        values[model.layout.absorption(1, 0)] += more;
+        let predicted = model.predicted(&values, 1, 0, stated.len());
+        let measured = model.compared(1, 0).unwrap().iter().map(|q| q.ln());
+        let off = DVector::from_iterator(stated.len(), measured.zip(predicted).map(|(m, p)| m - p));
+        (model.log_likelihood(&values, None), -0.5 * off.dot(&(&inverse * &off)))
+    });
+    let (found, expected) = (there.0 - here.0, there.1 - here.1);
+    assert!(expected.abs() > 0.1 && (found / expected - 1.0).abs() < 0.05, "{found} {expected}");
 }
 
 #[test]

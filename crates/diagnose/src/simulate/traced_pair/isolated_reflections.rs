@@ -69,6 +69,7 @@ impl TracedPair {
                 variance: vec![0.0; isolated_reflections.len()],
                 monte_carlo: Vec::new(),
                 modes: Modes::default(),
+                table: None,
                 correction: Vec::new(),
                 batch_deviations: Vec::new(),
                 batches: usize::from(self.paths.batch_count()),
