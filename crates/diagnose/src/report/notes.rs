@@ -36,17 +36,19 @@ pub(crate) struct Circumstances<'a> {
 
 /// What tables do not hold.
 const OF_TABLES: &str = "Tables of parameters were compared: they hold no arrival times and no levels, so that wrong positions, moved walls, \
-                         gains and noise cannot show. Responses tell more.";
+                         gains and noise cannot show, and no law beyond the catalogue is looked for. Responses tell more.";
 
 pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
     let mut notes = about.baseline.observations.notes.clone();
     if about.baseline.survey().air_assumed {
         notes.push("The room file states no climate: 20 degrees and 50 % humidity were assumed.".into());
     }
+    let are_tables = about.baseline.observations.are_tables();
     if about.baseline.survey().responses.len() == 1 {
-        notes.push(
-            "One response only: what is the same at every position cannot be told from what is not.".into(),
-        );
+        let one = if are_tables { "pair" } else { "response" };
+        notes.push(format!(
+            "One {one} only: what is the same at every position cannot be told from what is not."
+        ));
     }
     if !about.held_out {
         notes.push("Too few receivers to hold any out: no gain at new positions can be given.".into());
@@ -87,7 +89,6 @@ pub(crate) fn notes(about: &Circumstances<'_>) -> Vec<String> {
             parameters.join(" and ")
         ));
     }
-    let are_tables = about.baseline.observations.are_tables();
     if are_tables {
         notes.push(OF_TABLES.into());
     }

@@ -35,6 +35,8 @@ use std::sync::Arc;
 const REFERENCE_S: f64 = 0.05;
 /// Exact paths are kept as arrivals for this much longer than peaks are looked for.
 const ARRIVALS_MARGIN: f64 = 1.2;
+/// A table's values hang on so much more of the decay than is compared bin by bin, in dB: T30 on what comes after its 35 dB.
+const TABLE_RANGE_DB: f64 = 15.0;
 /// Bounds of absorption.
 pub(crate) const ABSORPTION: (f64, f64) = (0.002, 0.98);
 
@@ -187,8 +189,9 @@ impl Simulation {
         if reflections {
             self.isolated_reflections = isolated.into_iter().flatten().collect();
         }
-        self.ends =
-            self.states.iter().map(|s| s.iter().map(|b| range_end(b, self.range_db)).collect()).collect();
+        let range_db = self.range_db + if observations.are_tables() { TABLE_RANGE_DB } else { 0.0 };
+        let ends = |s: &Vec<BandState>| s.iter().map(|b| range_end(b, range_db)).collect();
+        self.ends = self.states.iter().map(ends).collect();
         self.compared_s =
             (0..observations.survey.bands.len()).map(|b| compared_s(&self.states, &self.ends, b)).collect();
         self.states.par_iter_mut().zip(&self.ends).for_each(|(s, ends)| monte_carlo_modes::find(s, ends));

@@ -18,9 +18,11 @@ pub fn section(page: &mut Page, findings: &Findings) -> Result<(), Failure> {
         return Ok(());
     }
     let held = all.iter().any(|value| value.held_out);
+    // Without a cause nothing comes after.
+    let is_named = !findings.causes.is_empty();
     page.heading(if held { "Values at positions that were predicted" } else { "Values of the tables" });
     page.paragraph(
-        "Means over all pairs. Beneath, how far single values lie off, in steps that are just noticeable (5 % of decay times, 1 dB of C50 and C80, 10 ms of Ts).",
+        "Means over all pairs; above each, how far single values lie off (root mean square) in steps that are just noticeable: 5 % of decay times, 1 dB of C50 and C80, 10 ms of Ts.",
     );
     page.markup("<div class=\"small\">");
     for kind in ParameterKind::ALL {
@@ -28,13 +30,15 @@ pub fn section(page: &mut Page, findings: &Findings) -> Result<(), Failure> {
         if own.is_empty() {
             continue;
         }
-        let chart = curves(kind, &own, &findings.bands_hz).svg()?;
+        let chart = curves(kind, &own, (&findings.bands_hz, is_named)).svg()?;
         let off = |of: fn(&ComparedValue) -> f64| root_mean_square(own.iter().map(|v| of(v)));
-        page.markup(&format!(
-            "<figure><figcaption>{kind}: {:.1} JND off before, {:.1} after</figcaption>{chart}</figure>",
-            off(|v| v.jnd_before),
-            off(|v| v.jnd_after)
-        ));
+        let before = off(|v| v.jnd_before);
+        let told = if is_named {
+            format!("{before:.1} JND off before, {:.1} after", off(|v| v.jnd_after))
+        } else {
+            format!("{before:.1} JND off")
+        };
+        page.markup(&format!("<figure><figcaption>{kind}: {told}</figcaption>{chart}</figure>"));
     }
     page.markup("</div>");
     farthest(page, all);
@@ -46,7 +50,7 @@ fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
     (sum / f64::max(count, 1.0)).sqrt()
 }
 
-fn curves(kind: ParameterKind, own: &[&ComparedValue], bands_hz: &[f64]) -> Chart {
+fn curves(kind: ParameterKind, own: &[&ComparedValue], (bands_hz, is_named): (&[f64], bool)) -> Chart {
     let mean = |of: fn(&ComparedValue) -> f64| -> Vec<(f64, f64)> {
         let at = |&hz: &f64| {
             let here: Vec<f64> = own.iter().filter(|v| v.band_hz == hz).map(|v| of(v)).collect();
@@ -59,16 +63,20 @@ fn curves(kind: ParameterKind, own: &[&ComparedValue], bands_hz: &[f64]) -> Char
         ParameterKind::D50 => "",
         _ => " (s)",
     };
+    let simulated = if is_named { "before" } else { "simulated" };
+    let mut series = vec![
+        Series::new("measured", Look::Dots, 2, mean(|v| v.measured)),
+        Series::new(simulated, Look::Dashed, 0, mean(|v| v.before)),
+    ];
+    if is_named {
+        series.push(Series::new("after", Look::Line, 1, mean(|v| v.after)));
+    }
     Chart {
         x_label: String::new(),
         y_label: format!("{kind}{unit}"),
         x: Scale::Octaves(bands_hz.to_vec()),
         y: None,
-        series: vec![
-            Series::new("measured", Look::Dots, 2, mean(|v| v.measured)),
-            Series::new("before", Look::Dashed, 0, mean(|v| v.before)),
-            Series::new("after", Look::Line, 1, mean(|v| v.after)),
-        ],
+        series,
         small: true,
     }
 }

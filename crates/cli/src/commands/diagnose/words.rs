@@ -150,14 +150,17 @@ pub fn meaning(findings: &Findings) -> Vec<String> {
                 let names: Vec<String> = findings.causes.iter().map(named).collect();
                 told.push(format!("This was found, and does not suffice: {}.", names.join("; ")));
             }
-            told.push(
-                if findings.law_search.is_some() {
-                    "A formula beyond the list of causes was looked for, and none stands; the report says how strong one would have to be."
-                } else {
-                    "The option --discover looks for a formula that no list of causes has."
-                }
-                .to_owned(),
-            );
+            // Formulas are weighed by bins, which tables do not have.
+            if findings.measured.tables == 0 {
+                told.push(
+                    if findings.law_search.is_some() {
+                        "A formula beyond the list of causes was looked for, and none stands; the report says how strong one would have to be."
+                    } else {
+                        "The option --discover looks for a formula that no list of causes has."
+                    }
+                    .to_owned(),
+                );
+            }
         }
     }
     let slight: Vec<String> = findings.causes.iter().filter(|c| c.slight).map(named).collect();
