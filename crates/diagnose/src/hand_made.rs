@@ -10,11 +10,10 @@ use crate::likelihood::laplace::Prior;
 use crate::observe::early_energy::EarlySamples;
 use crate::observe::observations::Observations;
 use crate::observe::observed_response::Measured;
-use crate::observe::parameter_table::StatedParameter;
+use crate::observe::stated_parameter::StatedParameter;
 use crate::observe::time_bins::Bins;
 use crate::simulate::band_state::BandState;
 use crate::simulate::simulation::Simulation;
-use crate::simulate::table_chance::TableChance;
 use crate::simulate::table_readings::{TimeAxis, read};
 use crate::simulate::tables::Tables as Prepared;
 use crate::simulate::traced_pair::Arrival;
@@ -216,7 +215,7 @@ impl Tables {
                 let predicted = read(&stated, axis, &state.ln_energy);
                 let off = |k: usize| 0.03 * (3.0 * k as f64 + 2.0 * pair as f64 + band as f64).sin();
                 *energies = Some(predicted.iter().enumerate().map(|(k, ln)| (ln + off(k)).exp()).collect());
-                state.table = TableChance::of(&stated, state);
+                state.find_table_chance(&stated);
             }
             measured.table = Some(vec![stated.clone(); measured.energies.len()]);
         }

@@ -95,7 +95,8 @@ impl Baseline {
     /// Leaves out values of tables that the prediction does not have.
     fn leave_unreadable(&mut self) -> Result<(), Error> {
         if self.observations.are_tables() {
-            self.observations.leave_unreadable(&self.simulation.states)?;
+            let kept = self.simulation.readable(&self.observations.measured);
+            self.observations.keep_values(&kept)?;
             self.simulation.find_table_chances(&self.observations.measured);
         }
         Ok(())

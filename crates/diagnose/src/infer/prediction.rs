@@ -3,7 +3,7 @@
 use crate::effect::Case;
 use crate::infer::baseline::Baseline;
 use crate::likelihood::decay::EnergyModel;
-use crate::observe::parameter_table::{StatedParameter, value_of};
+use crate::observe::stated_parameter::{StatedParameter, value_of};
 use sabine_acoustics::ParameterKind;
 use sabine_scene::Levels;
 

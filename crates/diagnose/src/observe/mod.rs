@@ -6,4 +6,5 @@ pub(crate) mod observations;
 pub(crate) mod observed_response;
 pub(crate) mod parameter_table;
 pub(crate) mod pre_arrival;
+pub(crate) mod stated_parameter;
 pub(crate) mod time_bins;

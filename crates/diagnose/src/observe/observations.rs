@@ -5,7 +5,6 @@ use crate::observe::band_pulse::{BandPulse, CELL_S};
 use crate::observe::observed_response::Measured;
 use crate::observe::parameter_table;
 use crate::observe::pre_arrival::PreArrival;
-use crate::simulate::band_state::BandState;
 use crate::statistics::median;
 use crate::survey::planes::planes;
 use crate::survey::surfaces::Surfaces;
@@ -102,10 +101,10 @@ impl Observations {
         self.measured.iter().any(|m| m.table.is_some())
     }
 
-    /// Leaves out values of tables that the prediction does not have, and notes how many.
-    pub fn leave_unreadable(&mut self, states: &[Vec<BandState>]) -> Result<(), Error> {
-        let pairs = self.measured.iter_mut().zip(states);
-        let left_out: usize = pairs.map(|(measured, states)| measured.leave_unreadable(states)).sum();
+    /// Keeps those values of tables that the prediction has (`[pair][band][value]`), and notes how many are left out.
+    pub fn keep_values(&mut self, kept: &[Vec<Vec<bool>>]) -> Result<(), Error> {
+        let left_out: usize =
+            self.measured.iter_mut().zip(kept).map(|(measured, kept)| measured.keep(kept)).sum();
         if left_out > 0 {
             self.notes.push(format!(
                 "{left_out} values of the tables are not used: the simulated decays do not have them (too short, or nothing before or after 50 or 80 ms)."

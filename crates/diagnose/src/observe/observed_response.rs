@@ -2,9 +2,9 @@
 
 use crate::observe::band_pulse::BandPulse;
 use crate::observe::early_energy::{EarlySamples, is_fast};
-use crate::observe::parameter_table::StatedParameter;
 use crate::observe::pre_arrival;
 use crate::observe::pre_arrival::PreArrivalBand;
+use crate::observe::stated_parameter::StatedParameter;
 use crate::observe::time_bins::Bins;
 use sabine_acoustics::{Bands, FilterBank, ImpulseResponse, NoReading, Onset};
 
@@ -36,7 +36,7 @@ const ABOVE_END: f64 = 2.0;
 pub(crate) struct Measured {
     /// Energy of each whole bin, `[band][bin]`, 1 for an undisturbed pulse of amplitude 1; `None` in a band above half the sample rate. Of a
     /// pair with a table in place of a response: the quantities of its values
-    /// ([`quantity`](crate::observe::parameter_table::quantity)), `[band][value]`.
+    /// ([`quantity`](crate::observe::stated_parameter::quantity)), `[band][value]`.
     pub energies: Vec<Option<Vec<f64>>>,
     /// What its values are of, `[band][value]`, where a table takes the place of the response.
     pub table: Option<Vec<Vec<StatedParameter>>>,

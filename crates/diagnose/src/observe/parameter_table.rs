@@ -2,8 +2,7 @@
 
 use crate::observe::early_energy::EarlySamples;
 use crate::observe::observed_response::Measured;
-use crate::simulate::band_state::BandState;
-use crate::simulate::table_readings::{TimeAxis, readable};
+use crate::observe::stated_parameter::{StatedParameter, quantity};
 use crate::survey::SurveyedResponse;
 use sabine_acoustics::{Bands, ParameterKind};
 use sabine_scene::{MeasuredRoom, ParameterEntry};
@@ -15,48 +14,6 @@ const TRACED_SHARE: f64 = 0.85;
 const DECAY_TIMES: f64 = 6.0 * LN_10;
 /// D50 says nothing so near to all or nothing.
 const LEAST_SHARE: f64 = 1e-3;
-
-/// A parameter that a table states of a pair in an octave.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct StatedParameter {
-    pub kind: ParameterKind,
-    /// Standard deviation of the logarithm of [`quantity`]: as stated, or one just-noticeable difference.
-    pub ln_sd: f64,
-}
-
-/// What is compared of a parameter, by its logarithm: decay and centre times as they are, ratios of early to late energy as energies.
-pub(crate) fn quantity(kind: ParameterKind, value: f64) -> f64 {
-    match kind {
-        ParameterKind::C50 | ParameterKind::C80 => 10f64.powf(value / 10.0),
-        ParameterKind::D50 => value / (1.0 - value),
-        _ => value,
-    }
-}
-
-/// The value of a parameter of which that is compared.
-pub(crate) fn value_of(kind: ParameterKind, quantity: f64) -> f64 {
-    match kind {
-        ParameterKind::C50 | ParameterKind::C80 => 10.0 * quantity.log10(),
-        ParameterKind::D50 => quantity / (1.0 + quantity),
-        _ => quantity,
-    }
-}
-
-/// Change of the logarithm of the quantity with the value.
-fn ln_slope(kind: ParameterKind, value: f64) -> f64 {
-    match kind {
-        ParameterKind::C50 | ParameterKind::C80 => LN_10 / 10.0,
-        ParameterKind::D50 => 1.0 / (value * (1.0 - value)),
-        _ => 1.0 / value,
-    }
-}
-
-impl StatedParameter {
-    fn of(entry: &ParameterEntry) -> Self {
-        let sd = entry.standard_deviation.unwrap_or_else(|| entry.kind.jnd(entry.value));
-        Self { kind: entry.kind, ln_sd: sd * ln_slope(entry.kind, entry.value) }
-    }
-}
 
 /// The pairs of a room's tables, in the order of the file, and what is not used of them, in words.
 pub(crate) fn pairs(room: &MeasuredRoom) -> (Vec<(SurveyedResponse, Measured)>, Vec<String>) {
@@ -113,20 +70,16 @@ fn longest_s<'a>(entries: impl Iterator<Item = &'a ParameterEntry>) -> f64 {
 }
 
 impl Measured {
-    /// Leaves out values of a table that the prediction does not have; says how many.
-    pub fn leave_unreadable(&mut self, states: &[BandState]) -> usize {
+    /// Leaves out values of a table, those that are not to be kept by octave; says how many.
+    pub fn keep(&mut self, kept: &[Vec<bool>]) -> usize {
         let mut left_out = 0;
-        for ((stated, quantities), state) in
-            self.table.iter_mut().flatten().zip(&mut self.energies).zip(states)
+        for ((stated, quantities), kept) in self.table.iter_mut().flatten().zip(&mut self.energies).zip(kept)
         {
             let Some(own) = quantities else { continue };
-            let axis = TimeAxis { bins: state.bins, time_s: &state.time_s };
-            let keep = readable(stated, axis, &state.ln_energy);
-            let before = own.len();
-            let (mut of_stated, mut of_own) = (keep.iter(), keep.iter());
+            left_out += kept.iter().filter(|kept| !**kept).count();
+            let (mut of_stated, mut of_own) = (kept.iter(), kept.iter());
             stated.retain(|_| of_stated.next().copied().unwrap_or(false));
             own.retain(|_| of_own.next().copied().unwrap_or(false));
-            left_out += before - own.len();
             if own.is_empty() {
                 *quantities = None;
             }
@@ -163,28 +116,6 @@ impl Measured {
             sample_rate_hz: 0,
             duration_s: longest_s,
             sounds_until_s: longest_s,
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn quantities_are_those_of_values_and_their_errors_go_along() {
-        for (kind, value) in [
-            (ParameterKind::T30, 1.4),
-            (ParameterKind::Edt, 0.3),
-            (ParameterKind::C80, -2.5),
-            (ParameterKind::C50, 6.0),
-            (ParameterKind::D50, 0.7),
-            (ParameterKind::CentreTime, 0.08),
-        ] {
-            assert!((value_of(kind, quantity(kind, value)) - value).abs() < 1e-12, "{kind}");
-            let step = 1e-6;
-            let slope = (quantity(kind, value + step) / quantity(kind, value - step)).ln() / (2.0 * step);
-            assert!((ln_slope(kind, value) / slope - 1.0).abs() < 1e-6, "{kind}");
         }
     }
 }

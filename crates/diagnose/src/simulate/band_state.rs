@@ -1,8 +1,10 @@
 //! What is predicted of one band of a response.
 
+use crate::observe::stated_parameter::StatedParameter;
 use crate::observe::time_bins::Bins;
 use crate::simulate::modes::Modes;
 use crate::simulate::table_chance::TableChance;
+use crate::simulate::table_readings::TimeAxis;
 #[cfg(test)]
 use sabine_paths::PathSet;
 
@@ -70,6 +72,13 @@ impl BandState {
             batch_deviations: Vec::with_capacity(count * batches),
             batches,
         }
+    }
+
+    /// Finds how chance moves what a table states of the pair.
+    pub fn find_table_chance(&mut self, stated: &[StatedParameter]) {
+        let axis = TimeAxis { bins: self.bins, time_s: &self.time_s };
+        let ln_energy: Vec<f64> = self.ln_energy.iter().zip(&self.correction).map(|(l, c)| l + c).collect();
+        self.table = TableChance::of(stated, axis, (&ln_energy, &self.variance), &self.modes);
     }
 
     /// Nats of log-likelihood that the tracer's chance costs on average in each bin; variances exceed what is expected by `dispersion`.

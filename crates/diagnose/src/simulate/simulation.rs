@@ -11,6 +11,7 @@ use crate::extend::moved_mesh::find_ranges;
 use crate::extend::rigid_motion::RigidMotion;
 use crate::observe::observations::Observations;
 use crate::observe::observed_response::{Measured, PEAKS_S};
+use crate::observe::stated_parameter::StatedParameter;
 use crate::simulate::band_state::BandState;
 use crate::simulate::edges::Edges;
 use crate::simulate::met_surfaces::MetSurfaces;
@@ -18,7 +19,7 @@ use crate::simulate::monte_carlo_modes;
 #[cfg(test)]
 use crate::simulate::scene_tracer::Rays;
 use crate::simulate::scene_tracer::{PreparedTracer, SceneTracer};
-use crate::simulate::table_chance::TableChance;
+use crate::simulate::table_readings::{TimeAxis, readable};
 use crate::simulate::tables::Tables;
 use crate::simulate::traced_pair::{Arrival, IsolatedReflection, TracedPair};
 use crate::simulate::traced_room::{trace, traced_s, traced_scene, traced_until_s};
@@ -216,8 +217,19 @@ impl Simulation {
     pub fn find_table_chances(&mut self, measured: &[Measured]) {
         self.states.par_iter_mut().zip(measured).for_each(|(states, measured)| {
             let stated = measured.table.iter().flatten();
-            states.iter_mut().zip(stated).for_each(|(state, own)| state.table = TableChance::of(own, state));
+            states.iter_mut().zip(stated).for_each(|(state, own)| state.find_table_chance(own));
         });
+    }
+
+    /// Which values of tables the predictions have, `[pair][band][value]`.
+    pub fn readable(&self, measured: &[Measured]) -> Vec<Vec<Vec<bool>>> {
+        let of_band = |(state, stated): (&BandState, &Vec<StatedParameter>)| {
+            readable(stated, TimeAxis { bins: state.bins, time_s: &state.time_s }, &state.ln_energy)
+        };
+        let of_pair = |(states, measured): (&Vec<BandState>, &Measured)| {
+            states.iter().zip(measured.table.iter().flatten()).map(of_band).collect()
+        };
+        self.states.iter().zip(measured).map(of_pair).collect()
     }
 
     /// Predicts the arrivals of all pairs; none where the direct line is blocked, nor of tables, which hold no times. The survey learns which surfaces they meet, and how far

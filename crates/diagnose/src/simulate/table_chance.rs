@@ -1,7 +1,6 @@
 //! How chance moves the parameters that a table states.
 
-use crate::observe::parameter_table::StatedParameter;
-use crate::simulate::band_state::BandState;
+use crate::observe::stated_parameter::StatedParameter;
 use crate::simulate::modes::Modes;
 use crate::simulate::table_readings::{TimeAxis, by_width_of_bins, read, readable, slopes};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -34,30 +33,33 @@ pub(crate) struct TableChance {
 impl TableChance {
     /// From draws of the bins, which scatter as they are expected to; the rays' part to first order. An early decay time hangs on few
     /// arrivals, and is no linear function of them. `None` where a value cannot be read from the prediction.
-    pub fn of(stated: &[StatedParameter], state: &BandState) -> Option<Self> {
-        let axis = TimeAxis { bins: state.bins, time_s: &state.time_s };
-        let ln_energy: Vec<f64> = state.ln_energy.iter().zip(&state.correction).map(|(l, c)| l + c).collect();
-        if stated.is_empty() || readable(stated, axis, &ln_energy).contains(&false) {
+    pub fn of(
+        stated: &[StatedParameter],
+        axis: TimeAxis<'_>,
+        (ln_energy, variance): (&[f64], &[f64]),
+        modes: &Modes,
+    ) -> Option<Self> {
+        if stated.is_empty() || readable(stated, axis, ln_energy).contains(&false) {
             return None;
         }
         let values = stated.len();
-        let (bias, covariance) = scatter(stated, axis, (&ln_energy, &state.variance));
+        let (bias, covariance) = scatter(stated, axis, (ln_energy, variance));
         let found = SymmetricEigen::new(covariance);
         let kept: Vec<usize> = (0..values).filter(|&k| found.eigenvalues[k] > NO_CHANCE).collect();
         let direction = |i: usize, k: usize| found.eigenvectors[(i, k)] * found.eigenvalues[k].sqrt();
         let own = (0..values).flat_map(|i| kept.iter().map(move |&k| (i, k))).map(|(i, k)| direction(i, k));
-        let by_bin = slopes(stated, axis, &ln_energy);
+        let by_bin = slopes(stated, axis, ln_energy);
         let moved = |i: usize, mode: usize| -> f64 {
-            by_bin[i].iter().enumerate().map(|(bin, slope)| slope * state.modes.of(bin)[mode]).sum()
+            by_bin[i].iter().enumerate().map(|(bin, slope)| slope * modes.of(bin)[mode]).sum()
         };
-        let modes = state.modes.count();
-        let moves = (0..values).flat_map(|i| (0..modes).map(move |mode| (i, mode))).map(|(i, m)| moved(i, m));
+        let count = modes.count();
+        let moves = (0..values).flat_map(|i| (0..count).map(move |mode| (i, mode))).map(|(i, m)| moved(i, m));
         Some(Self {
             own: own.collect(),
             count: kept.len(),
-            modes: Modes::new(modes, moves.collect()),
+            modes: Modes::new(count, moves.collect()),
             bias,
-            by_width_of_bins: by_width_of_bins(stated, axis, &ln_energy),
+            by_width_of_bins: by_width_of_bins(stated, axis, ln_energy),
         })
     }
 
@@ -110,6 +112,7 @@ fn scatter(
 mod tests {
     #![allow(clippy::unwrap_used)] // a panic is how a test fails
     use super::*;
+    use crate::simulate::band_state::BandState;
     use crate::simulate::table_readings::tests::{ALL, exponential, stated};
     use rand_distr::StandardNormal;
 
@@ -126,7 +129,8 @@ mod tests {
         state.time_s.clone_from(&time_s);
         state.correction = vec![0.0; count];
         state.variance = (0..count).map(|bin| 0.06 + 0.02 * (bin % 3) as f64).collect();
-        let chance = TableChance::of(&stated(), &state).unwrap();
+        state.find_table_chance(&stated());
+        let chance = state.table.clone().unwrap();
         let expected = chance.covariance(ALL.len());
         let axis = TimeAxis { bins, time_s: &time_s };
         let middle = column(&read(&stated(), axis, &ln_energy));

@@ -1,6 +1,6 @@
 //! Parameters of ISO 3382-1 of predicted bins, and their derivatives.
 
-use crate::observe::parameter_table::StatedParameter;
+use crate::observe::stated_parameter::StatedParameter;
 use crate::observe::time_bins::Bins;
 use sabine_acoustics::ParameterKind;
 use std::f64::consts::LN_10;

@@ -1,7 +1,7 @@
 //! A pair of which a table states parameters in place of a response: what its bins are read for.
 
 use super::EnergyModel;
-use crate::observe::parameter_table::StatedParameter;
+use crate::observe::stated_parameter::StatedParameter;
 use crate::simulate::table_chance::TableChance;
 use crate::simulate::table_readings::{TimeAxis, read, slopes};
 
