@@ -59,7 +59,7 @@ impl Settings<'_> {
 #[pyfunction]
 pub fn diagnose(py: Python<'_>, room: &Room, settings: Settings<'_>) -> Result<(String, String), Failure> {
     let measured = room.measured.as_ref().ok_or_else(|| {
-        refused("room: it has neither measured responses nor tables to compare with; read a room folder that has some")
+        refused("room: it has no measured responses, and no tables of parameters, to compare with; read a room folder that has some")
     })?;
     let (diagnoser, hold_out) = (settings.diagnoser()?, settings.hold_out);
     interruptible(py, |observer| {
