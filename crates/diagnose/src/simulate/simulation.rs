@@ -232,8 +232,8 @@ impl Simulation {
         self.states.iter().zip(measured).map(of_pair).collect()
     }
 
-    /// Predicts the arrivals of all pairs; none where the direct line is blocked, nor of tables, which hold no times. The survey learns which surfaces they meet, and how far
-    /// these can be moved.
+    /// Predicts the arrivals of all pairs; none where the direct line is blocked, nor of tables, which hold no times. The survey learns which
+    /// surfaces they meet, and how far these can be moved.
     pub fn predict_arrivals(&mut self, observations: &mut Observations) -> Result<(), Error> {
         let are_timed = !observations.are_tables();
         let survey = &mut observations.survey;

@@ -166,4 +166,25 @@ mod tests {
             }
         }
     }
+
+    /// ISO 3382-2:2008, A.2: one integrated impulse response counts as ten decays of interrupted noise, and in a band of the width B the standard
+    /// deviations of T20 and T30 over the places of a diffuse field are these.
+    #[test]
+    fn decay_times_of_a_diffuse_field_scatter_as_the_standard_says() {
+        for (t60_s, hz) in [(1.0, 1000.0), (0.8, 500.0)] {
+            let (bins, ln_energy, time_s) = exponential(t60_s, hz, 1.2 * t60_s);
+            let width_hz = hz * (2f64.sqrt() - 2f64.sqrt().recip());
+            let variance = vec![1.0 / (width_hz * bins.width_s); ln_energy.len()];
+            let axis = TimeAxis { bins, time_s: &time_s };
+            let chance =
+                TableChance::of(&stated(), axis, (&ln_energy, &variance), &Modes::new(0, Vec::new()))
+                    .unwrap();
+            let found = chance.covariance(ALL.len());
+            for (value, a, b) in [(1, 0.88, 1.90), (2, 0.55, 1.52)] {
+                let expected = a * ((1.0 + b / 10.0) / (width_hz * t60_s)).sqrt();
+                let sd = found[(value, value)].sqrt();
+                assert!((sd / expected - 1.0).abs() < 0.2, "{}: {sd} {expected}", ALL[value]);
+            }
+        }
+    }
 }
