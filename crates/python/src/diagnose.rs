@@ -55,7 +55,7 @@ impl Settings<'_> {
 /// Diagnoses a room that was read from a folder: the diagnosis as JSON, as in `diagnosis.json`, and the extended model as TOML.
 ///
 /// # Errors
-/// Settings are refused, the room has no responses, or what [`Diagnoser::diagnose`] says.
+/// Settings are refused, the room has neither responses nor tables, or what [`Diagnoser::diagnose`] says.
 #[pyfunction]
 pub fn diagnose(py: Python<'_>, room: &Room, settings: Settings<'_>) -> Result<(String, String), Failure> {
     let measured = room.measured.as_ref().ok_or_else(|| {

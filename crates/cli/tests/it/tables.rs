@@ -1,5 +1,5 @@
-//! `sabine fit` and `sabine diagnose` on a room that was measured as a table: parameters of image sources and particles (testkit's laboratory), read by
-//! `sabine-acoustics`, the responses themselves thrown away.
+//! `sabine fit` and `sabine diagnose` on a room that was measured as a table: parameters of image sources and particles (testkit's
+//! laboratory), read by `sabine-acoustics`, the responses themselves thrown away.
 
 use crate::sabine;
 use sabine::acoustics::{Bands, ParameterKind, RoomParameters};
