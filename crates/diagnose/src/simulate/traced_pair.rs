@@ -204,11 +204,11 @@ impl TracedPair {
         kernels: &[BandPulse],
         duration_s: f64,
     ) -> Vec<BandState> {
-        let mut states: Vec<BandState> = energies
-            .par_iter()
-            .enumerate()
-            .map(|(band, e)| self.band(band, e, Bins::new(bands, band), &kernels[band], duration_s))
-            .collect();
+        let factors = self.factors();
+        let of_band = |(band, e): (usize, &Vec<f32>)| {
+            self.band(band, (e, &factors), Bins::new(bands, band), &kernels[band], duration_s)
+        };
+        let mut states: Vec<BandState> = energies.par_iter().enumerate().map(of_band).collect();
         for (band, state) in states.iter_mut().enumerate() {
             for (b, &share) in kernels[band].shares.iter().enumerate() {
                 if b != band && share > Self::MIN_LEAK {

@@ -18,12 +18,14 @@ impl Columns {
 
     pub(crate) fn add_exactly(&mut self, time_s: f64, amplitudes: &[f64]) {
         let (first, values) = pulse(self.position(time_s));
+        let count = self.samples[0].len() as i64;
+        // The part of the pulse that falls inside.
+        let from = first.clamp(0, count);
+        let to = (first + values.len() as i64).clamp(from, count);
+        let values = &values[(from - first).min(values.len() as i64) as usize..];
         for (column, amplitude) in self.samples.iter_mut().zip(amplitudes) {
-            for (i, value) in (first..).zip(values) {
-                if let Some(sample) = usize::try_from(i).ok().and_then(|i| column.get_mut(i)) {
-                    *sample += amplitude * value;
-                }
-            }
+            let inside = &mut column[from as usize..to as usize];
+            inside.iter_mut().zip(values).for_each(|(sample, value)| *sample += amplitude * value);
         }
     }
 

@@ -13,6 +13,8 @@ use std::collections::BTreeMap;
 
 /// Of a bin: energy, time, departure, its products, arrival, its products.
 const COLUMNS: usize = 20;
+/// Of a path: the same without its energy, which each band has for itself.
+pub(super) type PathFactors = [f64; COLUMNS - 1];
 
 /// Sums over the paths of one band, by bin.
 struct Gathered {
@@ -68,12 +70,12 @@ impl TracedPair {
     pub(super) fn band(
         &self,
         band: usize,
-        energies: &[f32],
+        (energies, factors): (&[f32], &[PathFactors]),
         bins: Bins,
         pulse: &BandPulse,
         duration_s: f64,
     ) -> BandState {
-        let gathered = self.gather(energies, bins, pulse, duration_s);
+        let gathered = self.gather((energies, factors), bins, pulse, duration_s);
         let expected = self.expected(energies, bins, pulse, duration_s);
         gathered.finish(bins, pulse, pulse.shares[band], self.paths.materials(), &expected)
     }
@@ -121,7 +123,13 @@ impl TracedPair {
         ExpectedEnergy { exact: sums, sampled: smoothed(&sampled, batches), batches }
     }
 
-    fn gather(&self, energies: &[f32], bins: Bins, pulse: &BandPulse, duration_s: f64) -> Gathered {
+    fn gather(
+        &self,
+        (energies, factors): (&[f32], &[PathFactors]),
+        bins: Bins,
+        pulse: &BandPulse,
+        duration_s: f64,
+    ) -> Gathered {
         let count = bins.count(duration_s);
         let mut found = Gathered {
             count,
@@ -147,33 +155,59 @@ impl TracedPair {
                 continue;
             }
             if self.paths.is_exact(i) && time_s < ISOLATED_S {
-                self.add_isolated(i, f64::from(e), bins, pulse, &mut found);
+                self.add_isolated((i, &factors[i]), f64::from(e), bins, pulse, &mut found);
             } else {
-                self.add_to_cell(i, f64::from(e), cell, &mut in_cells);
+                self.add_to_cell((i, &factors[i]), f64::from(e), cell, &mut in_cells);
             }
         }
         found.add_cells(&in_cells, width, bins, pulse);
         found
     }
 
-    /// Columns of a path.
-    fn row(&self, path: usize, energy: f64) -> [f64; COLUMNS] {
-        let time_s = f64::from(self.times_s[path]);
-        let [x, y, z] = self.departures[path].map(f64::from);
-        let [u, v, w] = self.arrivals[path].map(f64::from);
-        let departure = [x, y, z, x * x, y * y, z * z, x * y, x * z, y * z];
-        let arrival = [u, v, w, u * u, v * v, w * w, u * v, u * w, v * w];
-        let mut row = [energy; COLUMNS];
-        row[1] *= time_s;
-        row[2..].iter_mut().zip(departure.into_iter().chain(arrival)).for_each(|(r, factor)| *r *= factor);
-        row
+    /// Factors of all paths.
+    pub(super) fn factors(&self) -> Vec<PathFactors> {
+        let ends = self.departures.iter().zip(&self.arrivals);
+        let of_path = |(time_s, (departure, arrival)): (&f32, (&[f32; 3], &[f32; 3]))| {
+            let [x, y, z] = departure.map(f64::from);
+            let [u, v, w] = arrival.map(f64::from);
+            [
+                f64::from(*time_s),
+                x,
+                y,
+                z,
+                x * x,
+                y * y,
+                z * z,
+                x * y,
+                x * z,
+                y * z,
+                u,
+                v,
+                w,
+                u * u,
+                v * v,
+                w * w,
+                u * v,
+                u * w,
+                v * w,
+            ]
+        };
+        self.times_s.iter().zip(ends).map(of_path).collect()
     }
 
     /// An early exact path, which keeps its very time.
-    fn add_isolated(&self, path: usize, energy: f64, bins: Bins, pulse: &BandPulse, found: &mut Gathered) {
+    fn add_isolated(
+        &self,
+        (path, factors): (usize, &PathFactors),
+        energy: f64,
+        bins: Bins,
+        pulse: &BandPulse,
+        found: &mut Gathered,
+    ) {
         let m = self.paths.materials();
         let (time_s, count) = (f64::from(self.times_s[path]), found.count);
-        let row = self.row(path, energy);
+        let mut row = [energy; COLUMNS];
+        row[1..].iter_mut().zip(factors).for_each(|(r, factor)| *r *= factor);
         let mut hits_row = vec![energy; 1 + m];
         let hits = &self.hits[path * m..(path + 1) * m];
         hits_row[1..].iter_mut().zip(hits).for_each(|(a, n)| *a = energy * f64::from(*n));
@@ -193,14 +227,21 @@ impl TracedPair {
         });
     }
 
-    fn add_to_cell(&self, path: usize, energy: f64, cell: usize, cells: &mut Cells) {
+    fn add_to_cell(
+        &self,
+        (path, factors): (usize, &PathFactors),
+        energy: f64,
+        cell: usize,
+        cells: &mut Cells,
+    ) {
         let m = self.paths.materials();
         cells.energy[cell] += energy;
         if self.paths.is_exact(path) {
             cells.exact_squares[cell] += energy * energy;
         }
-        let row = self.row(path, energy);
-        add(&mut cells.gathered[cell * COLUMNS..(cell + 1) * COLUMNS], &row, 1.0);
+        let own = &mut cells.gathered[cell * COLUMNS..(cell + 1) * COLUMNS];
+        own[0] += energy;
+        add(&mut own[1..], factors, energy);
         let group = cell * hit_groups::MAX_GROUPS + usize::from(self.groups[path]);
         let own = &mut cells.grouped[group * (1 + m)..][..1 + m];
         own[0] += energy;
