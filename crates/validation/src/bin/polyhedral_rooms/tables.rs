@@ -41,6 +41,11 @@ pub fn print(trials: &[Trial]) {
         let says = |what: &str| format!("{what}, {}", world(nuisances));
         share(&says("a false name where nothing is hidden"), of(null).map(|t| !t.false_names.is_empty()));
         share(&says("`adequate` where nothing is hidden"), of(null).map(|t| t.answer == "adequate"));
+        let is_told = |t: &Trial| t.task.planted == Planted::Nothing && t.verdict.is_some();
+        let misfit = |t: &Trial| {
+            t.false_names.is_empty() && matches!(t.verdict.as_deref(), Some("incomplete" | "unexplained"))
+        };
+        share(&says("a misfit and no false name where nothing is hidden"), of(is_told).map(misfit));
         share(&says("right and nothing else, of one effect"), of(due).map(|t| t.outcome == Outcome::Right));
         share(&says("what is hidden is named"), of(due).map(|t| named_it(&t)));
         share(&says("a false name, of one effect"), of(due).map(|t| !t.false_names.is_empty()));

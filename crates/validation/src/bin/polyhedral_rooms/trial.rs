@@ -59,6 +59,8 @@ impl fmt::Display for Outcome {
 #[derive(Clone, Debug)]
 pub struct Trial {
     pub task: Task,
+    /// None in records of before December 2026.
+    pub verdict: Option<String>,
     pub outcome: Outcome,
     pub answer: String,
     /// Names of what is not there.
@@ -80,6 +82,8 @@ struct Row {
     nuisances: bool,
     receivers: usize,
     rays: usize,
+    #[serde(default)]
+    verdict: Option<String>,
     outcome: Outcome,
     answer: String,
     false_names: String,
@@ -103,6 +107,7 @@ pub fn from_csv(text: &str) -> Result<Vec<Trial>, AnyError> {
             receivers: row.receivers,
             rays: row.rays,
         },
+        verdict: row.verdict,
         outcome: row.outcome,
         answer: row.answer,
         false_names: row.false_names.split_whitespace().map(str::to_owned).collect(),
@@ -124,6 +129,7 @@ pub fn to_csv(trials: &[Trial]) -> Result<Vec<u8>, AnyError> {
             nuisances: t.task.nuisances,
             receivers: t.task.receivers,
             rays: t.task.rays,
+            verdict: t.verdict.clone(),
             outcome: t.outcome,
             answer: t.answer.clone(),
             false_names: t.false_names.join(" "),
@@ -185,6 +191,7 @@ impl Task {
         }
         Ok(Trial {
             task: *self,
+            verdict: Some(found.verdict.to_string()),
             outcome,
             answer: answer(&found),
             false_names,
