@@ -167,13 +167,14 @@ def is_planted(cause, truth):
 
 def judge(found, truth):
     """Outcome of a box of pyroomacoustics, and its false names."""
-    wanted, law = truth["effect"] != "null", truth["effect"] == "swell"
+    wanted = truth["effect"] != "null"
     right = [cause for cause in found["causes"] if is_planted(cause, truth)]
     false = [c["effect"] for c in found["causes"] if c not in right and c["effect"] not in ALWAYS_THERE]
     there = bool(right)
-    if law:
-        # A formula of the time in the file is the statement that is due.
+    if truth["effect"] == "swell":
+        # A formula of the time in the file is the statement that is due; laws that are found stand among the causes, too.
         there = any("file_time_s" in law["formula"] or "time_after" in law["formula"] for law in found["laws"])
+        false = [name for name in false if not (there and name == "unknown_law")]
     if found["verdict"] == "ambiguous" and not there:
         return ("set" if NAMES.get(truth["effect"]) in found["alternatives"] else "wrong"), false
     if false:
